@@ -1,0 +1,84 @@
+"""Energy of one ligament and of one contact pair: the definition that all else is derived from.
+
+The compiled kernels (sim/kernels.py) are tested against the automatic derivatives of these functions.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+
+class LigamentLaw(NamedTuple):
+    """Stiffness of a ligament: axial and shear in N/mm, bending in N mm/rad."""
+
+    axial: Array
+    shear: Array
+    bending: Array
+
+
+class ContactLaw(NamedTuple):
+    """Contact of two units on the void angle: N mm/rad^2, rad, rad."""
+
+    stiffness: Array
+    barrier: Array
+    cutoff: Array
+
+
+def rotate(vector: Array, angle: Array) -> Array:
+    """Rotates a 2-vector counter-clockwise."""
+    c, s = jnp.cos(angle), jnp.sin(angle)
+    return jnp.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
+
+
+def ligament_energy(
+    motion_a: Array, motion_b: Array, arm_a: Array, arm_b: Array, vector: Array, law: LigamentLaw
+) -> Array:
+    """Strain energy of one ligament in large rotation, N mm.
+
+    Args:
+        motion_a, motion_b: (3,) displacement (mm) and rotation (rad) of the two units.
+        arm_a, arm_b: (2,) reference vectors from the units' centroids to the ligament's ends, mm.
+        vector: (2,) reference vector of the ligament, mm.
+        law: stiffnesses.
+
+    The shear angle is measured from the direction that the mean rotation of the two units gives the
+    ligament, so it needs no unwrapping (Bordiga et al. 2025, SI; DifFlexMM).
+    """
+    current = (
+        vector
+        + (motion_b[:2] + rotate(arm_b, motion_b[2]) - arm_b)
+        - (motion_a[:2] + rotate(arm_a, motion_a[2]) - arm_a)
+    )
+    rest_length = jnp.linalg.norm(vector)
+    carried = rotate(vector, (motion_a[2] + motion_b[2]) / 2)
+    stretch = jnp.linalg.norm(current) - rest_length
+    shear = jnp.arctan2(
+        carried[0] * current[1] - carried[1] * current[0], jnp.dot(carried, current)
+    )
+    bend = motion_b[2] - motion_a[2]
+    return 0.5 * (
+        law.axial * stretch**2 + law.shear * (rest_length * shear) ** 2 + law.bending * bend**2
+    )
+
+
+def contact_energy(void_angle: Array, law: ContactLaw) -> Array:
+    """Energy of one void that closes below the cutoff, infinite at the barrier, N mm.
+
+    With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1) - 2),
+    which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is silently zero; here it
+    is infinite: a state there is not admissible.
+    """
+    width = law.cutoff - law.barrier
+    x = jnp.minimum(void_angle - law.cutoff, 0.0) / width
+    inside = x > -1
+    energy = law.stiffness / 2 * (width * x) ** 2 / (1 - jnp.where(inside, x, 0.0) ** 2)
+    return jnp.where(inside, energy, jnp.inf)
+
+
+def contact_void_angles(void_angle: Array, rotation_a: Array, rotation_b: Array) -> Array:
+    """Current void angles (2,) of a ligament; exact, since the units are rigid."""
+    turn = rotation_a - rotation_b
+    return void_angle + jnp.array([turn, -turn])

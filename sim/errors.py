@@ -1,0 +1,16 @@
+"""Errors that a solve may end with; each says where it failed and what to try."""
+
+
+class SimulationError(RuntimeError):
+    """A solve could not reach its tolerance.
+
+    Args:
+        reason: what failed, where (step, worst unit) and what to try, in one sentence.
+        step: index of the failed time or load step, or None.
+        unit: id of the unit with the largest residual, or None.
+    """
+
+    def __init__(self, reason: str, step: int | None = None, unit: int | None = None) -> None:
+        super().__init__(reason)
+        self.step = step
+        self.unit = unit

@@ -1,0 +1,101 @@
+"""Shape of the units as functions of the vertices, in JAX: centroid, inertia, arms, angles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from sim.lattice import Lattice
+
+VOID_BRANCH = -jnp.pi / 4
+"""Void angles are unwrapped on [VOID_BRANCH, VOID_BRANCH + 2 pi): open voids reach beyond 270 deg,
+overlapping edges are slightly negative."""
+
+
+class Shape(NamedTuple):
+    """Reference shape of a network.
+
+    Attributes:
+        centroid: (n_units, 2) mm.
+        area: (n_units,) mm^2.
+        polar_moment: (n_units,) about the centroid, mm^4.
+        arm: (n_vertices, 2) centroid to vertex, mm.
+        void_angle: (n_ligaments, 2) opening on the two sides of each ligament, rad.
+    """
+
+    centroid: Array
+    area: Array
+    polar_moment: Array
+    arm: Array
+    void_angle: Array
+
+
+def shape(lattice: Lattice, vertices: Array) -> Shape:
+    """Shape of the network whose vertices lie at ``vertices`` (n_vertices, 2), in mm."""
+    centroid, area, polar_moment = inertia(lattice, vertices)
+    arm = vertices - centroid[lattice.unit]
+    return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
+
+
+def inertia(lattice: Lattice, vertices: Array) -> tuple[Array, Array, Array]:
+    """Centroid, area and polar moment about the centroid of each polygon (shoelace sums).
+
+    Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
+    """
+
+    def total(values: Array) -> Array:
+        return jax.ops.segment_sum(values, lattice.unit, lattice.n_units)
+
+    here = vertices - lattice.site[lattice.unit]
+    there = here[lattice.next_vertex]
+    cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    area = total(cross) / 2
+    offset = total((here + there) * cross[:, None]) / (6 * area[:, None])
+    squares = jnp.sum(here * here + here * there + there * there, axis=1)
+    polar_moment = total(cross * squares) / 12 - area * jnp.sum(offset**2, axis=1)
+    return lattice.site + offset, area, polar_moment
+
+
+def void_angles(lattice: Lattice, vertices: Array) -> Array:
+    """Signed, unwrapped angles (n_ligaments, 2) of the voids on both sides of each ligament, rad.
+
+    The first lies between the clockwise edge of the second end and the counter-clockwise edge of the
+    first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid units a
+    and b they change by exactly theta_a - theta_b and theta_b - theta_a.
+    """
+    first, second = lattice.ligaments.T
+    one = angle_between(
+        vertices[lattice.previous_vertex[second]] - vertices[second],
+        vertices[lattice.next_vertex[first]] - vertices[first],
+    )
+    other = angle_between(
+        vertices[lattice.previous_vertex[first]] - vertices[first],
+        vertices[lattice.next_vertex[second]] - vertices[second],
+    )
+    return unwrap(jnp.stack([one, other], axis=1), VOID_BRANCH)
+
+
+def block_angles(lattice: Lattice, vertices: Array) -> Array:
+    """Interior angle (n_vertices,) of each unit at each vertex, on [0, 2 pi), rad."""
+    following = vertices[lattice.next_vertex] - vertices
+    preceding = vertices[lattice.previous_vertex] - vertices
+    return unwrap(angle_between(following, preceding), 0.0)
+
+
+def edge_lengths(lattice: Lattice, vertices: Array) -> Array:
+    """Length (n_vertices,) of the edge from each vertex to its counter-clockwise neighbour, mm."""
+    return jnp.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
+
+
+def angle_between(start: Array, end: Array) -> Array:
+    """Signed angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
+    cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
+    return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))
+
+
+def unwrap(angle: Array, branch: float | Array) -> Array:
+    """Moves angles on (-pi, pi] to [branch, branch + 2 pi)."""
+    return jnp.where(angle < branch, angle + 2 * jnp.pi, angle)

@@ -1,0 +1,132 @@
+"""Networks of polygonal units joined at their vertices by ligaments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A polygon network in its reference state (specimen frame, mm).
+
+    The vertices of all units lie in one flat array, each polygon contiguous and counter-clockwise,
+    so that units of any number of vertices mix freely.
+
+    Attributes:
+        vertices: (n_vertices, 2) positions.
+        unit: (n_vertices,) owner of each vertex.
+        ligaments: (n_ligaments, 2) vertex ids; a ligament runs from the first to the second.
+        group: (n_vertices,) design group; the vertices of a group are shifted together, so the two
+            ends of a ligament share one and the ligament keeps its vector.
+        site: (n_units, 2) lattice points.
+        index: (n_units, 2) lattice indices (i, j).
+        spacing: distance of neighbouring lattice points.
+    """
+
+    vertices: Floats
+    unit: Ints
+    ligaments: Ints
+    group: Ints
+    site: Floats
+    index: Ints
+    spacing: float
+
+    @property
+    def n_units(self) -> int:
+        return len(self.site)
+
+    @property
+    def n_vertices(self) -> int:
+        return len(self.vertices)
+
+    @property
+    def n_ligaments(self) -> int:
+        return len(self.ligaments)
+
+    @cached_property
+    def n_groups(self) -> int:
+        return int(self.group.max()) + 1
+
+    @cached_property
+    def first_vertex(self) -> Ints:
+        """(n_units + 1,) start of each polygon in the vertex array, with the end appended."""
+        counts = np.bincount(self.unit, minlength=self.n_units)
+        return np.concatenate([[0], np.cumsum(counts)])
+
+    @cached_property
+    def next_vertex(self) -> Ints:
+        """(n_vertices,) the counter-clockwise neighbour of each vertex in its polygon."""
+        start, end = self.first_vertex[self.unit], self.first_vertex[self.unit + 1]
+        following = np.arange(self.n_vertices) + 1
+        return np.where(following == end, start, following)
+
+    @cached_property
+    def previous_vertex(self) -> Ints:
+        """(n_vertices,) the clockwise neighbour of each vertex in its polygon."""
+        previous = np.empty_like(self.next_vertex)
+        previous[self.next_vertex] = np.arange(self.n_vertices)
+        return previous
+
+    @cached_property
+    def ligament_units(self) -> Ints:
+        """(n_ligaments, 2) units joined by each ligament."""
+        return self.unit[self.ligaments]
+
+    @cached_property
+    def ligament_vectors(self) -> Floats:
+        """(n_ligaments, 2) reference vector of each ligament."""
+        ends = self.vertices[self.ligaments]
+        return ends[:, 1] - ends[:, 0]
+
+    def padded(self, values: Floats) -> Floats:
+        """Rearranges a per-vertex array (n_vertices, k) into (n_units, most_vertices, k), NaN padded."""
+        counts = np.diff(self.first_vertex)
+        out = np.full((self.n_units, int(counts.max()), values.shape[1]), np.nan)
+        out[self.unit, np.arange(self.n_vertices) - self.first_vertex[self.unit]] = values
+        return out
+
+
+def quads(
+    columns: int, rows: int, spacing: float, ligament_length: float, bias_angle: float
+) -> Lattice:
+    """Rotating squares: quadrilateral units on a square grid, joined at their four corners.
+
+    Unit ``i + columns * j`` has its lattice point at ``(i, j) * spacing`` and its vertices in the
+    order right, top, left, bottom. Units with even ``i + j`` are turned by ``-bias_angle`` (rad), the
+    others by ``+bias_angle``, and scaled so that the ligaments stay horizontal and vertical.
+    """
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
+    site = np.stack([i, j], axis=1) * spacing
+    turn = np.where((i + j) % 2 == 0, -1.0, 1.0) * np.tan(bias_angle)
+    half = (spacing - ligament_length) / 2
+    right = half * np.stack([np.ones_like(turn), turn], axis=1)
+    top = np.stack([-right[:, 1], right[:, 0]], axis=1)
+    vertices = (site[:, None, :] + np.stack([right, top, -right, -top], axis=1)).reshape(-1, 2)
+
+    unit_id = np.arange(columns * rows).reshape(rows, columns)
+    horizontal = np.stack([4 * unit_id[:, :-1].ravel(), 4 * unit_id[:, 1:].ravel() + 2], axis=1)
+    vertical = np.stack([4 * unit_id[:-1].ravel() + 1, 4 * unit_id[1:].ravel() + 3], axis=1)
+    ligaments = np.concatenate([horizontal, vertical])
+    return Lattice(
+        vertices=vertices,
+        unit=np.repeat(np.arange(columns * rows), 4),
+        ligaments=ligaments,
+        group=_groups(len(vertices), ligaments),
+        site=site,
+        index=np.stack([i, j], axis=1),
+        spacing=spacing,
+    )
+
+
+def _groups(n_vertices: int, ligaments: Ints) -> Ints:
+    """Numbers the design groups: the ends of a ligament together, free vertices alone."""
+    representative = np.arange(n_vertices)
+    representative[ligaments.max(axis=1)] = ligaments.min(axis=1)
+    return np.unique(representative, return_inverse=True)[1]
