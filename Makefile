@@ -1,0 +1,72 @@
+# Bootstrap and thin aliases. `make fig2` builds Figure 2 from nothing, `make test` runs the tests.
+# They presume Python >= 3.11 with venv and pip, and make.
+SHELL := /bin/bash
+PYTHON ?= python3
+BIN := .venv/bin
+STUDIES := $(notdir $(patsubst %/problem.yaml,%,$(wildcard experiments/*/problem.yaml)))
+SOURCES := $(wildcard sim pipeline reports tests docs)
+WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
+
+.PHONY: help setup test clients lint format bench lock clean $(STUDIES)
+
+help:
+	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
+	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
+	@echo "make test      run the tests"
+	@echo "make clients   run the tests that need a browser (Chromium)"
+	@echo "make bench     measure speed against the baselines"
+	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
+	@echo "make setup     only make .venv from requirements.lock"
+	@echo "make lock      renew requirements.lock from pyproject.toml (with Python 3.11)"
+	@echo "make clean     remove results and caches (.venv stays)"
+
+setup: .venv/requirements.lock
+
+# The copy of the lock says what the environment holds.
+.venv/requirements.lock: requirements.lock
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	    echo "error: this needs Python 3.11 or newer, but '$(PYTHON)' is $$($(PYTHON) --version 2>&1)." \
+	    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	    echo "error: '$(PYTHON)' comes without venv or pip. On Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
+	@$(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@cp requirements.lock $@
+
+$(STUDIES): setup
+	@exec $(BIN)/python -m pipeline.run $@
+
+# a study with a preset: make fig2@edge3
+$(foreach study,$(STUDIES),$(study)@%): setup
+	@exec $(BIN)/python -m pipeline.run $@
+
+test: setup
+	$(BIN)/python -m pytest --ignore tests/clients
+
+clients: setup
+	$(BIN)/python -m pytest tests/clients
+
+lint: setup
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/snakefmt --check --quiet $(WORKFLOW)
+	$(BIN)/snakemake --lint
+
+format: setup
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+	$(BIN)/snakefmt --quiet $(WORKFLOW)
+
+bench: setup
+	$(BIN)/python -m pipeline.bench
+
+lock: setup
+	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }
+	CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --extra dev --strip-extras \
+	    --allow-unsafe --generate-hashes --no-annotate --no-emit-index-url --no-emit-trusted-host \
+	    --no-emit-find-links --no-emit-options --output-file requirements.lock pyproject.toml
+
+clean:
+	rm -rf results .cache .snakemake .hypothesis .mypy_cache .pytest_cache .ruff_cache
