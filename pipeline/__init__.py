@@ -1,0 +1,1 @@
+"""The stages: each module reads datasets, calls `sim`, and writes a dataset."""

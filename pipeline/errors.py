@@ -1,0 +1,55 @@
+"""The one error that people are meant to read: what is wrong, where, and what to do about it."""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+
+_LONGEST_VALUE = 120
+
+
+class UserError(Exception):
+    """A mistake in the input or a refusal by the machine, told on one screen without a traceback.
+
+    Args:
+        what: the fault in one sentence.
+        file: the file that holds it.
+        line: its line, counted from one.
+        key: the dotted key or the variable's name.
+        value: the offending value as it was given.
+        remedy: what to change, with an example where that helps.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        file: str | PathLike[str] | None = None,
+        line: int | None = None,
+        key: str | None = None,
+        value: object = None,
+        remedy: str | None = None,
+    ) -> None:
+        super().__init__(what)
+        self.what = what
+        self.file = None if file is None else fspath(file)
+        self.line = line
+        self.key = key
+        self.value = value
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        place = self.file
+        if place is not None and self.line is not None:
+            place = f"{place}, line {self.line}"
+        rows = {
+            "file": place,
+            "key": self.key,
+            "value": None if self.value is None else _shortened(repr(self.value)),
+            "remedy": self.remedy,
+        }
+        told = [f"  {name + ':':<8}{text}" for name, text in rows.items() if text is not None]
+        return "\n".join([self.what, *told])
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."

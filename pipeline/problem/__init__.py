@@ -1,0 +1,28 @@
+"""The problem file: typed, with units, checked. `load` is the way in."""
+
+from pipeline.problem.checks import cloak_units, interest_units
+from pipeline.problem.identity import (
+    Stage,
+    canonical_json,
+    content_hash,
+    from_canonical,
+    section_hash,
+)
+from pipeline.problem.loading import load, preset_names
+from pipeline.problem.model import Problem
+from pipeline.problem.selection import selected_units, units_within
+
+__all__ = [
+    "Problem",
+    "Stage",
+    "canonical_json",
+    "cloak_units",
+    "content_hash",
+    "from_canonical",
+    "interest_units",
+    "load",
+    "preset_names",
+    "section_hash",
+    "selected_units",
+    "units_within",
+]

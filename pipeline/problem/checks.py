@@ -1,0 +1,345 @@
+"""What one key alone cannot tell: geometry, regions, supports, loads and the start's feasibility."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from pipeline.problem.model import Problem
+from pipeline.problem.selection import (
+    Region,
+    Selector,
+    centre_of,
+    selected_units,
+    units_within,
+)
+from pipeline.problem.yamlfile import KeyPath
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A fault in a problem: what, at which key, and what to do."""
+
+    what: str
+    keys: KeyPath
+    remedy: str
+
+
+Findings = Iterator[Finding]
+
+
+def findings(problem: Problem) -> Findings:
+    """The faults of a problem, in the order in which they should be mended."""
+    for check in _CHECKS:
+        yield from check(problem)
+
+
+def _lattice(problem: Problem) -> Findings:
+    lattice = problem.lattice
+    if lattice.ligament_length >= lattice.spacing:
+        what = f"ligaments of {lattice.ligament_length:g} mm leave no room for units"
+        remedy = f"keep it below the spacing, {lattice.spacing:g} mm"
+        yield Finding(what, ("lattice", "ligament_length"), remedy)
+    if abs(lattice.bias_angle) >= math.pi / 4:
+        what = f"a bias of {math.degrees(lattice.bias_angle):g} deg closes the voids"
+        yield Finding(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
+
+
+def _contact(problem: Problem) -> Findings:
+    contact = problem.contact
+    barrier, cutoff = (
+        math.degrees(angle) for angle in (contact.barrier_angle, contact.cutoff_angle)
+    )
+    if barrier >= cutoff:
+        what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
+        yield Finding(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
+    elif cutoff >= (void := _smallest_void(problem)):
+        what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
+        yield Finding(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
+
+
+def _smallest_void(problem: Problem) -> float:
+    return 90.0 - 2.0 * abs(math.degrees(problem.lattice.bias_angle))
+
+
+def _selectors(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
+    for index, support in enumerate(problem.supports):
+        yield ("supports", index, "units"), support.units
+    yield ("drive", "units"), problem.drive.units
+
+
+def _units_exist(problem: Problem) -> Findings:
+    for keys, selector in _selectors(problem):
+        try:
+            selected_units(selector, problem.lattice)
+        except IndexError as error:
+            lattice = problem.lattice
+            remedy = f"i runs to {lattice.columns - 1} and j to {lattice.rows - 1}, from zero"
+            yield Finding(str(error), keys, remedy)
+
+
+def _drive_is_free(problem: Problem) -> Findings:
+    driven = set(selected_units(problem.drive.units, problem.lattice))
+    for support in problem.supports:
+        if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
+            j, i = divmod(both[0], problem.lattice.columns)
+            what = f"unit [{i}, {j}] is driven and clamped"
+            yield Finding(what, ("drive", "units"), "drive or clamp it, not both")
+
+
+def _horizon(problem: Problem) -> Findings:
+    if problem.horizon.periods is not None and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no period"
+        yield Finding(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
+    if problem.sweep is not None and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no frequency to sweep"
+        yield Finding(what, ("sweep",), "leave the sweep out, or drive harmonically")
+
+
+def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
+    lattice = problem.lattice
+    x, y = centre_of(region, lattice)
+    _, inner, outer = region.bounds
+    margin = 0.5 * lattice.spacing
+    right, top = (lattice.columns - 1) * lattice.spacing, (lattice.rows - 1) * lattice.spacing
+    room = margin + min(x, y, right - x, top - y)
+    shape = "disc" if region.disc is not None else "ring"
+    key = "radius" if shape == "disc" else "outer"
+    if outer > room:
+        what = f"{keys[0]} of radius {outer:g} mm reaches beyond the lattice"
+        remedy = f"keep it within {room:g} mm of its centre ({x:g}, {y:g}) mm"
+        yield Finding(what, (*keys, shape, key), remedy)
+    elif inner >= outer:
+        what = f"the ring's inner radius ({inner:g} mm) is not below the outer ({outer:g} mm)"
+        yield Finding(what, (*keys, shape, "inner"), f"keep it below {outer:g} mm")
+
+
+def _regions(problem: Problem) -> Findings:
+    yield from _region_fits(problem, problem.cloak, ("cloak",))
+    if not cloak_units(problem):
+        what = "no unit lies in the cloak (driven units and the region of interest are left out)"
+        yield Finding(what, ("cloak",), "enlarge it, or move its centre")
+    if isinstance(problem.objective.region, Region):
+        yield from _region_fits(problem, problem.objective.region, ("objective", "region"))
+    if not interest_units(problem):
+        key = ("cloak",) if problem.objective.region == "surroundings" else ("objective", "region")
+        yield Finding("no unit lies in the region of interest", key, "leave units outside it")
+
+
+def cloak_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units to design: the cloak without driven units and the region of interest."""
+    taken = set(selected_units(problem.drive.units, problem.lattice))
+    if isinstance(problem.objective.region, Region):
+        taken |= set(units_within(problem.objective.region, problem.lattice))
+    inside = units_within(problem.cloak, problem.lattice)
+    return tuple(unit for unit in inside if unit not in taken)
+
+
+def interest_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units that the objective looks at; driven units are no surroundings."""
+    if isinstance(problem.objective.region, Region):
+        return units_within(problem.objective.region, problem.lattice)
+    taken = set(cloak_units(problem)) | set(selected_units(problem.drive.units, problem.lattice))
+    return tuple(unit for unit, _, _ in problem.lattice.sites() if unit not in taken)
+
+
+def _start_is_feasible(problem: Problem) -> Findings:
+    lattice, limits = problem.lattice, problem.constraints
+    start = {
+        "edge_length": (limits.edge_length, lattice.edge_length, "mm"),
+        "block_angle": (_degrees(limits.block_angle), 90.0, "deg"),
+        "void_angle": (_degrees(limits.void_angle), _smallest_void(problem), "deg"),
+        "gap": (limits.gap, lattice.ligament_length, "mm"),
+    }
+    for name, (asked, has, unit) in start.items():
+        if asked is not None and asked > has:
+            what = f"infeasible at the start: the undeformed units have {has:g} {unit}"
+            yield Finding(what, ("constraints", name), f"ask for at most {has:.3g} {unit}")
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
+def _symmetry(problem: Problem) -> Findings:
+    lattice = problem.lattice
+    if problem.optimiser.symmetry == "C4" and lattice.columns != lattice.rows:
+        what = f"a lattice of {lattice.columns} x {lattice.rows} has no fourfold symmetry"
+        yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
+
+
+def _optimiser(problem: Problem) -> Findings:
+    optimiser = problem.optimiser
+    if not optimiser.methods.chosen:
+        yield Finding("no method chosen", ("optimiser", "methods"), "give sqp, mma or both")
+    if optimiser.trust_radius > optimiser.trust_radius_max:
+        remedy = f"keep it at or below {optimiser.trust_radius_max:g} mm"
+        yield Finding("larger than its maximum", ("optimiser", "trust_radius"), remedy)
+
+
+_CHECKS:
+        yield from check(problem)
+
+
+def _lattice(problem: Problem) -> Findings:
+    lattice = problem.lattice
+    if lattice.ligament_length >= lattice.spacing:
+        what = f"ligaments of {lattice.ligament_length:g} mm leave no room for units"
+        remedy = f"keep it below the spacing, {lattice.spacing:g} mm"
+        yield Finding(what, ("lattice", "ligament_length"), remedy)
+    if abs(lattice.bias_angle) >= math.pi / 4:
+        what = f"a bias of {math.degrees(lattice.bias_angle):g} deg closes the voids"
+        yield Finding(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
+
+
+def _contact(problem: Problem) -> Findings:
+    contact = problem.contact
+    barrier, cutoff = (
+        math.degrees(angle) for angle in (contact.barrier_angle, contact.cutoff_angle)
+    )
+    if barrier >= cutoff:
+        what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
+        yield Finding(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
+    elif cutoff >= (void := _smallest_void(problem)):
+        what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
+        yield Finding(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
+
+
+def _smallest_void(problem: Problem) -> float:
+    return 90.0 - 2.0 * abs(math.degrees(problem.lattice.bias_angle))
+
+
+def _selectors(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
+    for index, support in enumerate(problem.supports):
+        yield ("supports", index, "units"), support.units
+    yield ("drive", "units"), problem.drive.units
+
+
+def _units_exist(problem: Problem) -> Findings:
+    for keys, selector in _selectors(problem):
+        try:
+            selected_units(selector, problem.lattice)
+        except IndexError as error:
+            lattice = problem.lattice
+            remedy = f"i runs to {lattice.columns - 1} and j to {lattice.rows - 1}, from zero"
+            yield Finding(str(error), keys, remedy)
+
+
+def _drive_is_free(problem: Problem) -> Findings:
+    driven = set(selected_units(problem.drive.units, problem.lattice))
+    for support in problem.supports:
+        if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
+            j, i = divmod(both[0], problem.lattice.columns)
+            what = f"unit [{i}, {j}] is driven and clamped"
+            yield Finding(what, ("drive", "units"), "drive or clamp it, not both")
+
+
+def _horizon(problem: Problem) -> Findings:
+    if problem.horizon.periods is not None and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no period"
+        yield Finding(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
+    if problem.sweep is not None and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no frequency to sweep"
+        yield Finding(what, ("sweep",), "leave the sweep out, or drive harmonically")
+
+
+def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
+    lattice = problem.lattice
+    x, y = centre_of(region, lattice)
+    _, inner, outer = region.bounds
+    margin = 0.5 * lattice.spacing
+    right, top = (lattice.columns - 1) * lattice.spacing, (lattice.rows - 1) * lattice.spacing
+    room = margin + min(x, y, right - x, top - y)
+    shape = "disc" if region.disc is not None else "ring"
+    key = "radius" if shape == "disc" else "outer"
+    if outer > room:
+        what = f"{keys[0]} of radius {outer:g} mm reaches beyond the lattice"
+        remedy = f"keep it within {room:g} mm of its centre ({x:g}, {y:g}) mm"
+        yield Finding(what, (*keys, shape, key), remedy)
+    elif inner >= outer:
+        what = f"the ring's inner radius ({inner:g} mm) is not below the outer ({outer:g} mm)"
+        yield Finding(what, (*keys, shape, "inner"), f"keep it below {outer:g} mm")
+
+
+def _regions(problem: Problem) -> Findings:
+    yield from _region_fits(problem, problem.cloak, ("cloak",))
+    if not cloak_units(problem):
+        what = "no unit lies in the cloak (driven units and the region of interest are left out)"
+        yield Finding(what, ("cloak",), "enlarge it, or move its centre")
+    if isinstance(problem.objective.region, Region):
+        yield from _region_fits(problem, problem.objective.region, ("objective", "region"))
+    if not interest_units(problem):
+        key = ("cloak",) if problem.objective.region == "surroundings" else ("objective", "region")
+        yield Finding("no unit lies in the region of interest", key, "leave units outside it")
+
+
+def cloak_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units to design: the cloak without driven units and the region of interest."""
+    taken = set(selected_units(problem.drive.units, problem.lattice))
+    if isinstance(problem.objective.region, Region):
+        taken |= set(units_within(problem.objective.region, problem.lattice))
+    inside = units_within(problem.cloak, problem.lattice)
+    return tuple(unit for unit in inside if unit not in taken)
+
+
+def interest_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units that the objective looks at; driven units are no surroundings."""
+    if isinstance(problem.objective.region, Region):
+        return units_within(problem.objective.region, problem.lattice)
+    taken = set(cloak_units(problem)) | set(selected_units(problem.drive.units, problem.lattice))
+    return tuple(unit for unit, _, _ in problem.lattice.sites() if unit not in taken)
+
+
+def _start_is_feasible(problem: Problem) -> Findings:
+    lattice, limits = problem.lattice, problem.constraints
+    start = {
+        "edge_length": (limits.edge_length, lattice.edge_length, "mm"),
+        "block_angle": (_degrees(limits.block_angle), 90.0, "deg"),
+        "void_angle": (_degrees(limits.void_angle), _smallest_void(problem), "deg"),
+        "gap": (limits.gap, lattice.ligament_length, "mm"),
+    }
+    for name, (asked, has, unit) in start.items():
+        if asked is not None and asked > has:
+            what = f"infeasible at the start: the undeformed units have {has:g} {unit}"
+            yield Finding(what, ("constraints", name), f"ask for at most {has:.3g} {unit}")
+
+
+def _degrees(angle: float | None) -> float | None:
+    return None if angle is None else math.degrees(angle)
+
+
+def _symmetry(problem: Problem) -> Findings:
+    lattice = problem.lattice
+    if problem.optimiser.symmetry == "C4" and lattice.columns != lattice.rows:
+        what = f"a lattice of {lattice.columns} x {lattice.rows} has no fourfold symmetry"
+        yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
+
+
+def _optimiser(problem: Problem) -> Findings:
+    optimiser = problem.optimiser
+    if not optimiser.methods.chosen:
+        yield Finding("no method chosen", ("optimiser", "methods"), "give sqp, mma or both")
+    if optimiser.trust_radius > optimiser.trust_radius_max:
+        remedy = f"keep it at or below {optimiser.trust_radius_max:g} mm"
+        yield Finding("larger than its maximum", ("optimiser", "trust_radius"), remedy)
+
+
+def _recording(problem: Problem) -> Findings:
+    if isinstance(problem.drive, TimeSeries) and problem.source is not None:
+        path = problem.source.parent / problem.drive.file
+        if not path.is_file():
+            yield Finding(f"no such file: {path}", ("drive", "file"), "check the path")
+
+
+_CHECKS: tuple[Callable[[Problem], Findings], ...] = (
+    _lattice,
+    _contact,
+    _units_exist,
+    _drive_is_free,
+    _horizon,
+    _regions,
+    _start_is_feasible,
+    _symmetry,
+    _optimiser,
+)

@@ -1,0 +1,57 @@
+"""Canonical text and hashes of a problem, whole or as far as one stage depends on it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any, Literal
+
+from pipeline.problem.model import Problem
+from pipeline.problem.quantities import SIM_UNITS
+
+Stage = Literal["design", "simulate", "sweep", "report"]
+
+_WORDS = ("title", "doc")
+_UNUSED: dict[Stage, tuple[str, ...]] = {
+    "design": (*_WORDS, "response", "sweep"),
+    "simulate": (*_WORDS, "sweep"),
+    "sweep": (*_WORDS, "response"),
+    "report": (),
+}
+
+
+def canonical_json(problem: Problem, stage: Stage = "report", method: str | None = None) -> str:
+    """The problem in working units as JSON with sorted keys: equal problems, equal bytes.
+
+    Args:
+        problem: the problem.
+        stage: leave out what this stage does not depend on.
+        method: also leave out the other optimisation methods.
+    """
+    data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
+    for name in _UNUSED[stage]:
+        data.pop(name, None)
+    if method is not None:
+        methods = data["optimiser"]["methods"]
+        data["optimiser"]["methods"] = {method: methods[method]}
+    return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def from_canonical(text: str | dict[str, Any]) -> Problem:
+    """The problem that `canonical_json` wrote (sections left out have their defaults)."""
+    data = json.loads(text) if isinstance(text, str) else text
+    return Problem.model_validate(data, context=SIM_UNITS)
+
+
+def content_hash(problem: Problem) -> str:
+    """SHA-256 of the whole problem, in hex."""
+    return _sha256(canonical_json(problem))
+
+
+def section_hash(problem: Problem, stage: Stage, method: str | None = None) -> str:
+    """SHA-256 of what a stage depends on, in hex: equal hashes, no need to run it again."""
+    return _sha256(canonical_json(problem, stage, method))
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

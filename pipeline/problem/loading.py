@@ -1,0 +1,192 @@
+"""From a YAML file and the name of a preset to a checked problem, or one clear message."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from pipeline.errors import UserError
+from pipeline.problem import yamlfile
+from pipeline.problem.checks import findings
+from pipeline.problem.drives import TimeSeries
+from pipeline.problem.model import Problem
+from pipeline.problem.yamlfile import Document, KeyPath
+
+
+def load(path: str | Path, preset: str | None = None) -> Problem:
+    """The problem in a YAML file, with one of its presets laid over it.
+
+    Raises
+    ------
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    document = yamlfile.read(Path(path))
+    data = dict(document.data)
+    presets = data.pop("presets", None) or {}
+    if preset is not None:
+        data = overlaid(data, _preset(document, presets, preset))
+    try:
+        problem = Problem.model_validate(data)
+    except ValidationError as error:
+        raise _told(error, document, data, preset) from error
+    for finding in findings(problem):
+        raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
+    return _with_recording(problem, document)
+
+
+def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with `overlay` laid over it: mappings merge, all else replaces, null removes a key."""
+    merged = dict(base)
+    for key, value in overlay.items():
+        below = merged.get(key)
+        if value is None:
+            merged.pop(key, None)
+        elif isinstance(value, Mapping):
+            merged[key] = overlaid(below if isinstance(below, Mapping) else {}, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def preset_names(path: str | Path) -> tuple[str, ...]:
+    """The names of the presets in a problem file.
+
+    Raises
+    ------
+        UserError: the file cannot be read.
+    """
+    presets = yamlfile.read(Path(path)).data.get("presets")
+    return tuple(presets) if isinstance(presets, dict) else ()
+
+
+def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
+    where = {"file": document.path, "line": document.line(("presets", name))}
+    if not isinstance(presets, dict):
+        raise UserError("presets is not a mapping", key="presets", remedy="name: {...}", **where)
+    if name not in presets:
+        known = ", ".join(map(str, presets)) or "none"
+        near = get_close_matches(name, [str(key) for key in presets], n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise UserError(
+            f"no preset {name!r}", key="presets", remedy=f"{hint}presets here: {known}", **where
+        )
+    if not isinstance(presets[name], dict):
+        remedy = "write the keys that it changes below it"
+        raise UserError("not a mapping", key=f"presets.{name}", remedy=remedy, **where)
+    return presets[name]
+
+
+def _told(
+    error: ValidationError, document: Document, data: dict[str, Any], preset: str | None
+) -> UserError:
+    first, *others = error.errors(include_url=False)
+    keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
+    what, remedy, key = _in_words(first)
+    if key is not None:
+        keys = (*keys, key)
+    if others:
+        remedy += f" ({len(others)} more after this one)"
+    return _user_error(document, preset, data, keys, what, remedy)
+
+
+def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
+    """What is wrong, the remedy, and a key below the error's place if there is one."""
+    context = error.get("ctx", {})
+    match error["type"]:
+        case "problem":
+            return context["what"], context["remedy"], context["key"]
+        case "missing":
+            return "missing key", "add it", None
+        case "union_tag_not_found":
+            return "missing key", f"give one of {context['discriminator']}", "kind"
+        case "union_tag_invalid":
+            return "unknown kind", f"give one of {context['expected_tags']}", "kind"
+        case "literal_error":
+            return "not one of the choices", f"give {context['expected']}", None
+        case "model_type" | "model_attributes_type" | "dict_type":
+            return "keys and values are wanted here", "write them below it, indented", None
+        case "finite_number":
+            return "not a finite number", "give a finite number", None
+    return error["msg"][0].lower() + error["msg"][1:], "correct the value", None
+
+
+def _real_keys(location: KeyPath, data: object, missing: bool) -> KeyPath:
+    """The location without the tags of unions, which are no keys of the file."""
+    keys: list[str | int] = []
+    for index, part in enumerate(location):
+        if (isinstance(data, Mapping) and part in data) or (isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)):
+            data = data[part]
+        elif not (missing and index == len(location) - 1):
+            continue
+        keys.append(part)
+    return tuple(keys)
+
+
+def _user_error(
+    document: Document,
+    preset: str | None,
+    data: Mapping[str, Any],
+    keys: KeyPath,
+    what: str,
+    remedy: str,
+) -> UserError:
+    overlay: KeyPath = () if preset is None else ("presets", preset)
+    place = keys if (*overlay, *keys) not in document.lines else (*overlay, *keys)
+    return UserError(
+        what,
+        file=document.path,
+        line=document.line(place),
+        key=_dotted(place),
+        value=_value(data, keys),
+        remedy=remedy,
+    )
+
+
+def _dotted(keys: KeyPath) -> str:
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
+    return text.removeprefix(".") or "(the whole file)"
+
+
+def _value(data: object, keys: KeyPath) -> object:
+    """The value at `keys` if it is a plain one: a whole section would not help the reader."""
+    for key in keys:
+        if isinstance(data, Mapping):
+            data = data.get(key)
+        elif isinstance(data, list) and isinstance(key, int):
+            data = data[key]
+    return None if isinstance(data, Mapping) else data
+
+
+def _with_recording(problem: Problem, document: Document) -> Problem:
+    """The problem with the content hash of the measured motion that it refers to, if any."""
+    drive = problem.drive
+    if not isinstance(drive, TimeSeries):
+        return problem
+    try:
+        content = (document.path.parent / drive.file).read_bytes()
+    except OSError as error:
+        raise UserError(
+            f"the measured motion cannot be read: {error.strerror}",
+            file=document.path,
+            line=document.line(("drive", "file")),
+            key="drive.file",
+            value=drive.file,
+            remedy="give its path as seen from the problem file",
+        ) from error
+    found = hashlib.sha256(content).hexdigest()
+    if drive.sha256 not in (None, found):
+        raise UserError(
+            f"{drive.file} is not the file that was meant: its SHA-256 is {found}",
+            file=document.path,
+            line=document.line(("drive", "sha256")),
+            key="drive.sha256",
+            value=drive.sha256,
+            remedy="restore the file, or correct or remove the hash",
+        )
+    return problem.model_copy(update={"drive": drive.model_copy(update={"sha256": found})})

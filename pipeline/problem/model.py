@@ -1,0 +1,231 @@
+"""The typed problem: every section of `problem.yaml`, in working units once validated."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.problem.drives import Drive, Harmonic, RampHarmonic
+from pipeline.problem.quantities import (
+    Angle,
+    BendingStiffness,
+    ContactStiffness,
+    Count,
+    Damping,
+    Density,
+    Duration,
+    Frequency,
+    Gap,
+    Length,
+    Positive,
+    Ratio,
+    RotaryDamping,
+    Stiffness,
+    fault,
+)
+from pipeline.problem.section import Section, exactly_one
+from pipeline.problem.selection import Lattice, Region, Selector
+
+_UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
+_UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
+
+
+class DampingLaw(Section):
+    """Viscous damping to ground per unit: the authors' ratio, or the two coefficients."""
+
+    ratio: Ratio | None = None
+    translation: Damping | None = None
+    rotation: RotaryDamping | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        pair = [self.translation is not None, self.rotation is not None]
+        if (self.ratio is not None) == any(pair) or any(pair) != all(pair):
+            raise fault("one form of damping is wanted", "give ratio, or translation and rotation")
+        return self
+
+
+class Material(Section):
+    """Units (mass per area) and ligaments (three stiffnesses), with the damping."""
+
+    density: Density
+    axial_stiffness: Stiffness
+    shear_stiffness: Stiffness
+    bending_stiffness: BendingStiffness
+    damping: DampingLaw
+
+    def damping_coefficients(self, spacing: float) -> tuple[float, float]:
+        """Translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.
+
+        The ratio is that of a single-ligament oscillator with the mass and inertia of a square
+        that is not rotated, whatever the design (the authors' formula).
+        """
+        law = self.damping
+        if law.ratio is None:
+            assert law.translation is not None and law.rotation is not None
+            return law.translation, law.rotation
+        mass = _UNROTATED_AREA * self.density * spacing**2
+        inertia = _UNROTATED_MOMENT * self.density * spacing**4
+        return (
+            law.ratio * 2.0 * math.sqrt(mass * self.shear_stiffness),
+            law.ratio * 2.0 * math.sqrt(inertia * self.bending_stiffness),
+        )
+
+
+class Contact(Section):
+    """Contact through the void angles: none above the cut-off, without bound at the barrier."""
+
+    law: Literal["angle"]
+    stiffness: ContactStiffness
+    barrier_angle: Angle
+    cutoff_angle: Angle
+
+
+class Support(Section):
+    """Units with some of their degrees of freedom held at zero."""
+
+    units: Selector
+    clamp: Annotated[tuple[Literal["ux", "uy", "theta"], ...], Field(min_length=1)] = (
+        "ux",
+        "uy",
+        "theta",
+    )
+
+
+class Horizon(Section):
+    """How long the loss looks, in periods of the drive or in time, and in how many samples."""
+
+    periods: Positive | None = None
+    duration: Duration | None = None
+    samples: Count = 200
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        exactly_one(self, "periods", "duration")
+        return self
+
+
+class Objective(Section):
+    """What the surroundings or a region should do."""
+
+    kind: Literal["displacement", "strain_energy"]
+    target: Literal["rest"]
+    region: Literal["surroundings"] | Region = "surroundings"
+
+
+class Constraints(Section):
+    """What can be made: lower bounds at every unit, none where a key is left out."""
+
+    edge_length: Length | None = None
+    block_angle: Angle | None = None
+    void_angle: Angle | None = None
+    gap: Gap | None = None
+    convex: bool = True
+
+
+class Method(Section):
+    """The budget of one optimisation method."""
+
+    evaluations: Count
+
+
+class Methods(Section):
+    """The optimisation methods to run; the better design is shipped."""
+
+    sqp: Method | None = None
+    mma: Method | None = None
+
+    @property
+    def chosen(self) -> dict[str, Method]:
+        """The methods asked for, by name."""
+        pairs = {"sqp": self.sqp, "mma": self.mma}
+        return {name: method for name, method in pairs.items() if method is not None}
+
+
+class Optimiser(Section):
+    """How to look for the design; lengths are shifts of vertices."""
+
+    methods: Methods
+    symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
+    trust_radius: Length = 0.5
+    trust_radius_max: Length = 3.0
+    kick: Length = 0.15
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class Solver(Section):
+    """Accuracy of the simulation and the integrator; `auto` chooses by the scene."""
+
+    accuracy: Literal["draft", "default", "tight"] = "default"
+    integrator: Literal["auto", "implicit", "explicit"] = "auto"
+
+
+class Response(Section):
+    """How much of the response the report shows."""
+
+    cycles: Positive = 4.0
+    samples: Annotated[int, Field(ge=2, strict=True)] = 401
+
+
+class DirectionAxis(Section):
+    """Equally spaced directions, both ends included."""
+
+    start: Angle = Field(alias="from")
+    stop: Angle = Field(alias="to")
+    points: Count
+
+
+class FrequencyAxis(Section):
+    """Equally spaced frequencies, both ends included."""
+
+    start: Frequency = Field(alias="from")
+    stop: Frequency = Field(alias="to")
+    points: Count
+
+
+class Sweep(Section):
+    """The robustness map: the loss over load direction and frequency."""
+
+    direction: DirectionAxis
+    frequency: FrequencyAxis
+    periods: Positive = 2.0
+
+
+class Problem(Section):
+    """A study: what to design, under which loads, to which end; in mm, N, s, tonne, rad."""
+
+    title: str = ""
+    doc: str = ""
+    lattice: Lattice
+    material: Material
+    contact: Contact
+    supports: tuple[Support, ...] = ()
+    drive: Drive
+    horizon: Horizon
+    cloak: Region
+    objective: Objective
+    constraints: Constraints = Constraints()
+    optimiser: Optimiser
+    solver: Solver = Solver()
+    response: Response | None = None
+    sweep: Sweep | None = None
+
+    @property
+    def frequency(self) -> float | None:
+        """The frequency of the drive in Hz, where it has one."""
+        return self.drive.frequency if isinstance(self.drive, Harmonic | RampHarmonic) else None
+
+    @property
+    def horizon_time(self) -> float:
+        """The time over which the loss is taken, in s."""
+        if self.horizon.duration is not None:
+            return self.horizon.duration
+        assert self.horizon.periods is not None and self.frequency is not None
+        return self.horizon.periods / self.frequency
+
+    @property
+    def damping_coefficients(self) -> tuple[float, float]:
+        """Translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit."""
+        return self.material.damping_coefficients(self.lattice.spacing)

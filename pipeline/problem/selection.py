@@ -1,0 +1,172 @@
+"""Which units a selector or a region means, by arithmetic on the lattice sites.
+
+Unit ids are `i + columns * j`; the site of unit (i, j) is `(i, j) * spacing` in the specimen frame.
+The squares of the starting lattice are symmetric about their sites, so sites are their centroids.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from pipeline.problem.quantities import Angle, Coordinate, Gap, Length
+from pipeline.problem.section import Section, exactly_one
+
+_HAIR = 1e-9  # relative; keeps sites that lie on a circle on its inner side
+
+Index = Annotated[int, Field(ge=0, strict=True)]
+Size = Annotated[int, Field(ge=1, le=1000, strict=True)]
+
+
+class Lattice(Section):
+    """Squares of alternating bias on a square lattice, joined by ligaments at their corners."""
+
+    kind: Literal["quads"] = "quads"
+    columns: Size
+    rows: Size
+    spacing: Length
+    ligament_length: Length
+    bias_angle: Angle
+
+    @property
+    def edge_length(self) -> float:
+        """Edge of the starting squares in mm."""
+        return (self.spacing - self.ligament_length) / math.sqrt(2.0) / math.cos(self.bias_angle)
+
+    @property
+    def centre_site(self) -> tuple[float, float]:
+        """The site of the centre unit, or the middle of the lattice where there is none, in mm."""
+        return self.spacing * (self.columns - 1) / 2, self.spacing * (self.rows - 1) / 2
+
+    def unit(self, i: int, j: int) -> int:
+        """The id of unit (i, j)."""
+        return i + self.columns * j
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
+        for j in range(self.rows):
+            for i in range(self.columns):
+                yield self.unit(i, j), i * self.spacing, j * self.spacing
+
+
+class ListedUnits(Section):
+    """Units by their lattice indices (i, j), counted from zero."""
+
+    units: Annotated[tuple[tuple[Index, Index], ...], Field(min_length=1)]
+
+
+def _selector_tag(value: Any) -> str:
+    return "listed" if isinstance(value, dict | ListedUnits) else "named"
+
+
+NamedUnits = Literal["corners", "left", "right", "top", "bottom", "centre"]
+Selector = Annotated[
+    Annotated[NamedUnits, Tag("named")] | Annotated[ListedUnits, Tag("listed")],
+    Discriminator(_selector_tag),
+]
+
+
+def _centre_tag(value: Any) -> str:
+    return "named" if isinstance(value, str) else "listed"
+
+
+Centre = Annotated[
+    Annotated[Literal["centre"], Tag("named")]
+    | Annotated[tuple[Coordinate, Coordinate], Tag("listed")],
+    Discriminator(_centre_tag),
+]
+
+
+class Disc(Section):
+    """Units whose site lies within `radius` of `centre`, the rim included."""
+
+    centre: Centre = "centre"
+    radius: Length
+
+
+class Ring(Section):
+    """Units whose site lies beyond `inner` and within `outer` of `centre`."""
+
+    centre: Centre = "centre"
+    inner: Gap
+    outer: Length
+
+
+class Region(Section):
+    """A disc or a ring of units."""
+
+    disc: Disc | None = None
+    ring: Ring | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Self:
+        exactly_one(self, "disc", "ring")
+        return self
+
+    @property
+    def bounds(self) -> tuple[Centre, float, float]:
+        """Centre, inner radius (-1 for a disc, which holds its own centre) and outer radius, mm."""
+        if self.ring is not None:
+            return self.ring.centre, self.ring.inner, self.ring.outer
+        assert self.disc is not None
+        return self.disc.centre, -1.0, self.disc.radius
+
+
+def centre_of(region: Region, lattice: Lattice) -> tuple[float, float]:
+    """The centre of a region in mm, specimen frame."""
+    centre, _, _ = region.bounds
+    return lattice.centre_site if isinstance(centre, str) else centre
+
+
+def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
+    """The ids of the units whose site lies in the region, ascending."""
+    x0, y0 = centre_of(region, lattice)
+    _, inner, outer = region.bounds
+    hair = _HAIR * lattice.spacing
+    return tuple(
+        unit
+        for unit, x, y in lattice.sites()
+        if inner + hair < math.hypot(x - x0, y - y0) <= outer + hair
+    )
+
+
+def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:
+    """The ids that a selector means, ascending; listed units must lie in the lattice.
+
+    Raises
+    ------
+        IndexError: a listed unit is not in the lattice, or there is no one centre unit.
+    """
+    if isinstance(selector, ListedUnits):
+        return tuple(sorted({_listed(i, j, lattice) for i, j in selector.units}))
+    if selector == "centre":
+        return (_centre_unit(lattice),)
+    right, top = lattice.columns - 1, lattice.rows - 1
+    chosen = {
+        "corners": lambda i, j: i in (0, right) and j in (0, top),
+        "left": lambda i, j: i == 0,
+        "right": lambda i, j: i == right,
+        "bottom": lambda i, j: j == 0,
+        "top": lambda i, j: j == top,
+    }[selector]
+    return tuple(
+        lattice.unit(i, j)
+        for j in range(lattice.rows)
+        for i in range(lattice.columns)
+        if chosen(i, j)
+    )
+
+
+def _listed(i: int, j: int, lattice: Lattice) -> int:
+    if i >= lattice.columns or j >= lattice.rows:
+        raise IndexError(f"unit [{i}, {j}] is not in the lattice")
+    return lattice.unit(i, j)
+
+
+def _centre_unit(lattice: Lattice) -> int:
+    if lattice.columns % 2 == 0 or lattice.rows % 2 == 0:
+        raise IndexError("a lattice of even size has no centre unit")
+    return lattice.unit(lattice.columns // 2, lattice.rows // 2)

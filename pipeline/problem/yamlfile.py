@@ -1,0 +1,120 @@
+"""Reading a YAML file safely: plain data only, bounded, with the line of every key."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from pipeline.errors import UserError
+
+_LARGEST = 256 * 1024
+
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """The mapping in a YAML file, with the line (from one) of each of its keys and items."""
+
+    path: Path
+    data: dict[str, Any]
+    lines: dict[KeyPath, int]
+
+    def line(self, keys: KeyPath) -> int | None:
+        """The line of a key, or of the nearest key above it."""
+        for length in range(len(keys), 0, -1):
+            if (line := self.lines.get(keys[:length])) is not None:
+                return line
+        return None
+
+
+class _Loader(yaml.SafeLoader):
+    """The safe loader, without aliases (which can expand without bound) and duplicate keys."""
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.MarkedYAMLError("aliases (*name) are not supported", problem_mark=mark)
+        return super().compose_node(parent, index)
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if key.value in seen:
+                what = f"the key {key.value!r} is given twice"
+                raise yaml.MarkedYAMLError(what, problem_mark=key.start_mark)
+            seen.add(str(key.value))
+        return super().construct_mapping(node, deep)
+
+
+def read(path: Path) -> Document:
+    """The mapping in a YAML file.
+
+    Raises
+    ------
+        UserError: no such file, too large, not UTF-8, not YAML, a duplicate key, or not a mapping.
+    """
+    text = _text(path)
+    try:
+        loader = _Loader(text)
+        try:
+            node = loader.get_single_node()
+            data = None if node is None else loader.construct_document(node)
+        finally:
+            loader.dispose()
+    except yaml.MarkedYAMLError as error:
+        raise _syntax_error(path, error) from error
+    except (yaml.YAMLError, ValueError) as error:
+        raise UserError(f"not YAML: {error}", file=path, remedy="write plain YAML text") from error
+    except RecursionError as error:
+        raise UserError("nested too deeply", file=path, remedy="write it flatter") from error
+    if not isinstance(data, dict):
+        remedy = "write keys and values, such as `lattice:` and its keys below it"
+        raise UserError("the file does not hold keys and values", file=path, remedy=remedy)
+    return Document(path, data, dict(_lines(node, ())))
+
+
+def _text(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        content = path.read_bytes() if size <= _LARGEST else b""
+        text = content.decode("utf-8")
+    except FileNotFoundError as error:
+        raise UserError("no such file", file=path, remedy="check the path") from error
+    except IsADirectoryError as error:
+        raise UserError("a folder, not a file", file=path, remedy="name the YAML file") from error
+    except UnicodeDecodeError as error:
+        raise UserError("not a UTF-8 text", file=path, remedy="save it as UTF-8") from error
+    if size > _LARGEST:
+        what = f"too large for a problem file ({size} bytes)"
+        raise UserError(what, file=path, remedy=f"keep it below {_LARGEST} bytes")
+    return text
+
+
+def _syntax_error(path: Path, error: yaml.MarkedYAMLError) -> UserError:
+    mark = error.problem_mark or error.context_mark
+    told = ", ".join(part for part in (error.context, error.problem) if part)
+    return UserError(
+        f"not valid YAML: {told}" if error.problem else told,
+        file=path,
+        line=None if mark is None else mark.line + 1,
+        remedy="correct the text there or just above (colons, indentation, quotes)"
+        if error.problem
+        else "keep one of them, written out",
+    )
+
+
+def _lines(node: yaml.Node, keys: KeyPath) -> Iterator[tuple[KeyPath, int]]:
+    if isinstance(node, yaml.MappingNode):
+        children = [(key.value, key.start_mark, value) for key, value in node.value]
+    elif isinstance(node, yaml.SequenceNode):
+        children = [(index, item.start_mark, item) for index, item in enumerate(node.value)]
+    else:
+        return
+    for key, mark, child in children:
+        yield (*keys, key), mark.line + 1
+        yield from _lines(child, (*keys, key))

@@ -1,0 +1,121 @@
+"""Quantities in words ("15 mm", "6.18 kg/m^2") to floats in the working units mm, N, s, tonne, rad.
+
+The registry is our own and small: it loads in a millisecond, and it counts the angle as a dimension
+so that degrees cannot be given where a length is wanted, nor a bare number where an angle is.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+_DEFINITIONS = """
+micro- = 1e-6 = µ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+meter = [length] = m = metre
+second = [time] = s
+gram = [mass] = g
+radian = [angle] = rad
+degree = 0.017453292519943295 * radian = deg = °
+tonne = 1e6 * gram = t
+minute = 60 * second = min
+inch = 0.0254 * meter = in
+hertz = 1 / second = Hz
+newton = 1000 * gram * meter / second ** 2 = N
+pascal = newton / meter ** 2 = Pa
+joule = newton * meter = J
+"""
+
+_LONGEST = 80
+_NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+# Only products of integer powers go to pint, whose own grammar would evaluate any arithmetic.
+_POWER = r"[A-Za-zµ°]+(?:(?:\^|\*\*)-?\d)?"
+_UNIT = rf"(?P<unit>{_POWER}(?:\s*[*·/ ]\s*{_POWER})*)"
+_QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """A kind of quantity: its name, the working unit, units of equal right, and an example."""
+
+    name: str
+    unit: str
+    example: str
+    also: tuple[str, ...] = ()
+
+
+LENGTH = Dimension("a length", "mm", "15 mm")
+ANGLE = Dimension("an angle", "rad", "20 deg")
+TIME = Dimension("a time", "s", "0.5 s")
+FREQUENCY = Dimension("a frequency", "Hz", "2 Hz")
+AREAL_DENSITY = Dimension("a mass per area", "tonne/mm^2", "6.18 kg/m^2")
+STIFFNESS = Dimension("a stiffness", "N/mm", "120 N/mm")
+BENDING_STIFFNESS = Dimension("a bending stiffness", "N mm/rad", "1.5 N mm/rad", ("N mm",))
+CONTACT_STIFFNESS = Dimension("a contact stiffness", "N mm/rad^2", "1.5 N mm/rad^2", ("N mm",))
+DAMPING = Dimension("a damping", "tonne/s", "2.876e-2 kg/s")
+ROTARY_DAMPING = Dimension(
+    "a rotary damping", "tonne mm^2/s/rad", "1.2e-7 kg m^2/s", ("tonne mm^2/s",)
+)
+
+
+class QuantityError(ValueError):
+    """A quantity that cannot be read; `remedy` says how to write it."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.what = what
+        self.remedy = remedy
+
+
+@lru_cache(maxsize=1)
+def _registry() -> UnitRegistry:
+    from pint import UnitRegistry
+
+    return UnitRegistry(_DEFINITIONS.strip().splitlines())  # type: ignore[arg-type]
+
+
+def parse(text: object, dimension: Dimension) -> float:
+    """The quantity `text` as a float in the working unit of `dimension`.
+
+    Raises
+    ------
+        QuantityError: no unit, an unknown one, one of another dimension, or no finite number.
+    """
+    wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise QuantityError("not a quantity", wanted)
+    match = _QUANTITY.fullmatch(str(text)[:_LONGEST])
+    if match is None:
+        raise QuantityError("not a number with a unit", wanted)
+    if match["rest"] is not None:
+        raise QuantityError(f"unknown unit {match['rest']!r}", wanted)
+    if match["unit"] is None:
+        raise QuantityError("the unit is missing", wanted)
+    value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
+    if not math.isfinite(value):
+        raise QuantityError("not a finite number", wanted)
+    return value
+
+
+def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
+    """Working units of `dimension` in one `unit`."""
+    from pint.errors import UndefinedUnitError
+
+    registry = _registry()
+    try:
+        given = registry.Quantity(1.0, registry.parse_units(unit))
+    except UndefinedUnitError as error:
+        raise QuantityError(f"unknown unit {unit!r}", wanted) from error
+    for accepted in (dimension.unit, *dimension.also):
+        if given.is_compatible_with(accepted):
+            return float(given.to(accepted).magnitude)
+    raise QuantityError(f"the unit {unit!r} is not that of {dimension.name}", wanted)
