@@ -1,1 +1,5 @@
 """The stages: each module reads datasets, calls `sim`, and writes a dataset."""
+
+from pipeline.environment import pin
+
+pin()
