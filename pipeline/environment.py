@@ -34,7 +34,7 @@ CACHES = {
 
 
 def pin() -> None:
-    """Sets the variables for this process and its children; caches asked for elsewhere stay there."""
+    """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
     os.environ.update(ONE_THREAD | REPRODUCIBLE)
     for name, value in CACHES.items():
         os.environ.setdefault(name, value)

@@ -1,27 +1,27 @@
-"""What the Snakefile asks before anything runs: which studies there are, and what each stage depends on.
+"""What the rules ask before anything runs: which studies there are, and what a stage needs of them.
 
-A stage depends on the sections of its problem file and on the source of every module it imports.
-Both enter the workflow as hashes, so that a rerun follows from what a file says, never from its date.
-Nothing heavy is imported here: this is the time one waits for "nothing to be done".
+A stage depends on sections of its problem file and on source (pipeline/sources.py). Both enter the
+rules as hashes: a rerun follows from what a file says, never from its date. Nothing heavy is
+imported here: this is the time one waits for "nothing to be done".
 """
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import yaml
+from snakemake.exceptions import WorkflowError
+from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT
+from pipeline.errors import UserError
+from pipeline.problem import Problem, Stage, load, section_hash
 
-PACKAGES = ("sim", "pipeline", "reports")
-RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".yaml"}
 RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job
 
 
@@ -74,82 +74,46 @@ def studies(root: Path = ROOT) -> list[Study]:
     return found
 
 
-@cache
-def source_hash(module: str, root: Path = ROOT) -> str:
-    """Hash of the source of a module and of everything of this project that it imports."""
-    digest = hashlib.sha256()
-    for path in source_files(module, root):
-        content = path.read_bytes()
-        digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode() + content)
-    return digest.hexdigest()[:16]
+def study_of(wildcards: Wildcards) -> Study:
+    """The study that a job works on, from its wildcards `name` and `preset`."""
+    return Study.parse(f"{wildcards.name}{wildcards.preset}")
 
 
 @cache
-def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
-    """Files whose content decides what `python -m module` does, sorted.
-
-    These are the modules reached by import statements, at any depth and inside functions too, the
-    packages that hold them, and the resources (templates, styles) in the folders of those packages.
+def problem_of(study: Study) -> Problem:
+    """The problem of a study.
 
     Raises:
-        ModuleNotFoundError: there is no such module below `root`.
+        WorkflowError: the problem file is wrong; tells where and what to do.
     """
-    if _locate(module, root) is None:
-        raise ModuleNotFoundError(f"no module {module!r} below {root}", name=module)
-    modules: dict[str, Path] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        path = _locate(name, root)
-        if name in modules or path is None:
-            continue
-        modules[name] = path
-        waiting += _parents(name)
-        waiting += _imported(path, name)
-    packages = {path.parent for path in modules.values() if path.name == "__init__.py"}
-    resources = (file for package in packages for file in _resources(package))
-    return tuple(sorted({*modules.values(), *resources}))
+    try:
+        return load(ROOT / study.problem, study.preset or None)
+    except UserError as error:
+        raise WorkflowError(str(error)) from error
 
 
-def _locate(module: str, root: Path) -> Path | None:
-    """File of a module of this project; None for what lies outside or is no module."""
-    if module.partition(".")[0] not in PACKAGES:
-        return None
-    base = root.joinpath(*module.split("."))
-    candidates = (base / "__init__.py", base.with_name(f"{base.name}.py"))
-    return next((path for path in candidates if path.is_file()), None)
+def options(wildcards: Wildcards) -> str:
+    """Command-line options by which a stage finds its problem."""
+    return study_of(wildcards).options
 
 
-def _parents(module: str) -> list[str]:
-    parts = module.split(".")
-    return [".".join(parts[:depth]) for depth in range(1, len(parts))]
+def designs(wildcards: Wildcards) -> list[str]:
+    """The designs to choose from, one for each method that the problem names."""
+    study = study_of(wildcards)
+    return [
+        f"results/{study}/design_{method}.nc"
+        for method in problem_of(study).optimiser.methods.chosen
+    ]
 
 
-@cache
-def _imported(path: Path, module: str) -> tuple[str, ...]:
-    """Names that a file imports and that may be modules: `from a import b` gives a and a.b."""
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
-    nodes = ast.walk(ast.parse(path.read_bytes(), filename=str(path)))
-    return tuple(name for node in nodes for name in _names(node, package))
+def section(stage: Stage) -> Callable[[Wildcards], str]:
+    """A function from wildcards to the hash of what `stage` depends on in the problem file.
 
-
-def _names(node: ast.AST, package: str) -> Iterator[str]:
-    if isinstance(node, ast.Import):
-        yield from (alias.name for alias in node.names)
-    elif isinstance(node, ast.ImportFrom):
-        above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
-        base = ".".join([*above, *filter(None, [node.module])])
-        yield base
-        yield from (f"{base}.{alias.name}" for alias in node.names)
-
-
-def _resources(folder: Path) -> Iterator[Path]:
-    """Resources in a package's folder and in those of its subfolders that are no packages."""
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and not (path / "__init__.py").exists():
-            yield from _resources(path)
-        elif path.suffix in RESOURCES:
-            yield path
+    A job with a wildcard `method` depends on that method's settings and not on the others'.
+    """
+    return lambda wildcards: section_hash(
+        problem_of(study_of(wildcards)), stage, wildcards.get("method")
+    )
 
 
 def prepare_jobs() -> None:

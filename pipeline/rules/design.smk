@@ -1,0 +1,34 @@
+# Two methods, one thread each: they run side by side on two cores.
+rule design:
+    input:
+        ancient("experiments/{name}/problem.yaml"),
+    output:
+        "results/{name}{preset}/design_{method}.nc",
+    log:
+        "results/{name}{preset}/logs/design_{method}.log",
+    threads: 1
+    params:
+        study=options,
+        problem=section("design"),
+        source=source_hash("pipeline.design"),
+    shell:
+        "python -m pipeline.design {params.study} --method {wildcards.method}"
+        " --out {output} --log {log}"
+
+
+rule select:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        designs=designs,
+    output:
+        "results/{name}{preset}/design.nc",
+    log:
+        "results/{name}{preset}/logs/select.log",
+    threads: 1
+    params:
+        study=options,
+        problem=section("design"),
+        source=source_hash("pipeline.select"),
+    shell:
+        "python -m pipeline.select {params.study} --designs {input.designs}"
+        " --out {output} --log {log}"

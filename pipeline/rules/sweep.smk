@@ -1,0 +1,36 @@
+# A few jobs of many cases each, for a laptop and for a cluster alike.
+SWEEP_CHUNKS = config.get("sweep_chunks", 4)
+
+
+rule sweep:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+    output:
+        temp("results/{name}{preset}/sweep_{chunk}.nc"),
+    log:
+        "results/{name}{preset}/logs/sweep_{chunk}.log",
+    threads: 1
+    params:
+        study=options,
+        chunks=SWEEP_CHUNKS,
+        problem=section("sweep"),
+        source=source_hash("pipeline.sweep"),
+    shell:
+        "python -m pipeline.sweep run {params.study} --design {input.design}"
+        " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
+
+
+rule gather_sweep:
+    input:
+        expand("results/{{name}}{{preset}}/sweep_{chunk}.nc", chunk=range(SWEEP_CHUNKS)),
+    output:
+        "results/{name}{preset}/sweep.nc",
+    log:
+        "results/{name}{preset}/logs/sweep.log",
+    threads: 1
+    params:
+        problem=section("sweep"),
+        source=source_hash("pipeline.sweep"),
+    shell:
+        "python -m pipeline.sweep gather --parts {input} --out {output} --log {log}"

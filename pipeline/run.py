@@ -1,0 +1,102 @@
+"""`python -m pipeline.run TARGET...`: snakemake, started so that it goes on after any kind of end.
+
+A `kill -9` leaves a lock in the folder and may leave jobs running. Both are cleared first, unless
+another snakemake is at work here; snakemake itself then continues what is incomplete.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import psutil
+from snakemake.exceptions import WorkflowError
+
+from pipeline.environment import ROOT
+from pipeline.errors import UserError
+from pipeline.workflow import RUN_MARK, problem_of, studies
+
+SNAKEMAKE = str(Path(sys.executable).with_name("snakemake"))
+_PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
+
+
+def main(arguments: list[str]) -> None:
+    """Checks the problem files of the targets, clears what a killed run left, runs snakemake."""
+    os.chdir(ROOT)
+    try:
+        _check(arguments)
+        _clear_the_ground()
+    except (UserError, WorkflowError) as error:
+        sys.exit(f"error: {error}")
+    _end_with_parent()
+    os.execv(SNAKEMAKE, [SNAKEMAKE, *arguments])
+
+
+def _check(arguments: Iterable[str]) -> None:
+    """Reads the problem file of every study asked for: its faults are told before all else."""
+    asked = [study for study in studies() if set(study.targets) & set(arguments)]
+    for study in asked:
+        problem_of(study)
+
+
+def _clear_the_ground() -> None:
+    """Ends left-over jobs and removes the lock of a killed run.
+
+    Raises:
+        UserError: a snakemake is at work in this folder.
+    """
+    active = [process for process in _others() if _is_snakemake(process)]
+    if active:
+        raise UserError(
+            f"snakemake is already at work in this folder (process {active[0].pid})",
+            file=ROOT,
+            remedy=f"wait for it, or end it with: kill -INT {active[0].pid}",
+        )
+    orphans = [process for process in _others() if _mark(process) == str(ROOT)]
+    for process in orphans:
+        process.terminate()
+    _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
+    for process in stubborn:
+        process.kill()
+    if any(ROOT.glob(".snakemake/locks/*")):
+        subprocess.run([SNAKEMAKE, "--unlock", "--quiet", "all"], check=True)
+
+
+def _others() -> list[psutil.Process]:
+    """All processes but this one and those that started it."""
+    this = psutil.Process()
+    own = {this, *this.parents()}
+    return [process for process in psutil.process_iter() if process not in own]
+
+
+def _is_snakemake(process: psutil.Process) -> bool:
+    """Whether the process is a snakemake in this folder."""
+    try:
+        names = {Path(word).name for word in process.cmdline()[:2]}
+        return "snakemake" in names and Path(process.cwd()) == ROOT
+    except psutil.Error:
+        return False
+
+
+def _mark(process: psutil.Process) -> str | None:
+    """The repository for which a job runs; None if the process is no job or is not ours."""
+    try:
+        return process.environ().get(RUN_MARK)
+    except psutil.Error:
+        return None
+
+
+def _end_with_parent() -> None:
+    """Asks Linux to kill this process with its parent: a killed `make` leaves no snakemake."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
