@@ -68,9 +68,9 @@ def close_pairs(lattice: Lattice, vertices: Floats, distance: float) -> Ints:
 
 
 def displaced(lattice: Lattice, vertices: Floats, motion: Floats) -> Floats:
-    """Vertices (..., n_vertices, 2) after rigid motions (..., n_units, 3) of ux, uy (mm), theta (rad).
+    """Vertices (..., n_vertices, 2) after rigid motions (..., n_units, 3).
 
-    Units turn about the centroids of their polygons, the point to which their translation refers.
+    A motion is the displacement (mm) of the polygon's centroid and the turn (rad) about it.
     """
     centre = shapely.get_coordinates(shapely.centroid(polygons(lattice, vertices)))[lattice.unit]
     x, y = (vertices - centre).T

@@ -1,8 +1,8 @@
 """Manufacturability: can the units of a design be cut, joined and moved?
 
-Every requirement is one number per place (an edge, a corner, a side of a ligament, a pair of units)
-that depends on a few vertices only. The values and their local derivatives are evaluated together and
-scattered into a sparse Jacobian through a map computed once.
+Every requirement is one number per place (an edge, a corner, a side of a ligament, a pair of
+units) that depends on a few vertices only. The values and their local derivatives are evaluated
+together and scattered into a sparse Jacobian through a map computed once.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class Kind:
         return self.sign * (jax.vmap(self.measure)(vertices[self.places]) - self.limit)
 
     def values_and_slopes(self, vertices: Array) -> tuple[Array, Array]:
-        """Constraint values (n_places,) and derivatives to their vertices' coordinates, flattened."""
+        """Constraint values (n_places,) and their slopes to their vertices, flattened."""
         values, slopes = jax.vmap(jax.value_and_grad(self.measure))(vertices[self.places])
         factor = self.sign * self.scale
         return factor * (values - self.limit), factor * slopes.ravel()
@@ -137,12 +137,12 @@ class Margin:
 
 
 def kinds(lattice: Lattice, limits: Limits, moving: Ints | None = None) -> tuple[Kind, ...]:
-    """The requirements of a lattice, at the places that a movement of ``moving`` vertices can change.
+    """The requirements of a lattice, at the places that moving certain vertices can change.
 
     Args:
-        lattice: the network; the pairs of units kept apart are those nearer than one lattice spacing.
+        lattice: the network; the units kept apart are those nearer than one lattice spacing.
         limits: the requirements.
-        moving: ids of the vertices, by default all.
+        moving: ids of those vertices, by default all.
     """
     free = np.ones(lattice.n_vertices, dtype=bool)
     if moving is not None:
@@ -197,11 +197,7 @@ def _touched(places: Ints, free: np.ndarray) -> Ints:
 
 @dataclass(frozen=True)
 class Constraints:
-    """All requirements on a design as one vector function ``c(x) >= 0``, in mm.
-
-    Calling it with a design vector (n_variables,) gives the values (n_constraints,) and the sparse
-    Jacobian (n_constraints, n_variables), whose pattern never changes.
-    """
+    """All requirements on a design as one vector function ``c(x) >= 0``, in mm."""
 
     space: DesignSpace
     limits: Limits
@@ -213,9 +209,14 @@ class Constraints:
 
     @property
     def n_constraints(self) -> int:
+        """Number of values."""
         return sum(len(kind.places) for kind in self.kinds)
 
     def __call__(self, design: Floats) -> tuple[Floats, sp.csr_array]:
+        """Values (n_constraints,) at a design vector (n_variables,) and their sparse Jacobian.
+
+        The pattern of the Jacobian (n_constraints, n_variables) never changes.
+        """
         values, slopes = self._local(jnp.asarray(self.vertices(design)))
         pattern, scatter = self._scatter
         data = scatter @ np.asarray(slopes)
@@ -303,9 +304,7 @@ def describe(found: dict[str, Margin]) -> str:
     )
 
 
-def _worst(
-    lattice: Lattice, requirements: tuple[Kind, ...], vertices: Floats
-) -> dict[str, Margin]:
+def _worst(lattice: Lattice, requirements: tuple[Kind, ...], vertices: Floats) -> dict[str, Margin]:
     worst: dict[str, Margin] = {}
     for kind in requirements:
         if not len(kind.places):
@@ -318,7 +317,5 @@ def _worst(
     return worst
 
 
-KIND_NAMES = tuple(
-    {"convex": "convexity"}.get(field.name, field.name) for field in fields(Limits)
-)
+KIND_NAMES = tuple({"convex": "convexity"}.get(field.name, field.name) for field in fields(Limits))
 """Names of the kinds, in the order of the constraint vector."""

@@ -1,0 +1,175 @@
+"""Journal of expensive evaluations: a killed optimisation resumes exactly where it was.
+
+The optimisers are deterministic, so a run is resumed by running it again: evaluations that the
+journal holds are read back bit for bit, the first one that it does not hold is computed. Each
+record is flushed to the disc before its result is used, so a kill loses only the evaluation under
+way.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import logging
+import os
+import struct
+import zlib
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO
+
+import numpy as np
+
+from sim.errors import SimulationError
+from sim.lattice import Floats
+from sim.optimise.problem import Evaluate
+
+log = logging.getLogger(__name__)
+
+_HEADER = struct.Struct("<4sQI")
+_MAGIC = b"EVAL"
+
+
+class JournalInUseError(RuntimeError):
+    """Another process is writing to the journal."""
+
+
+class Journal:
+    """Append-only file of evaluations; use it as a context manager.
+
+    Each record is a header (magic, length, CRC-32 of the payload) and a payload: a line of JSON
+    with the shapes, then design, loss, gradient and further numbers as little-endian doubles. A damaged
+    or incomplete tail is cut off at the last good record. A design that differs from the recorded
+    one in any bit means that the code or the machine has changed since: the rest of the journal is
+    then of no use, it is cut off with a warning, and the run continues by computing.
+
+    Args:
+        path: the file; its folder must exist.
+        key: identifies the problem; a journal of another key is started anew.
+
+    Raises:
+        JournalInUseError: on entering, if another process holds it.
+    """
+
+    def __init__(self, path: Path, key: str) -> None:
+        self.path = path
+        self.key = key
+        self.replayed = 0
+        self._file: BinaryIO | None = None
+
+    def __enter__(self) -> Journal:
+        # "a" creates the file without touching what is there, "r+" allows cutting it.
+        self.path.open("ab").close()
+        self._file = self.path.open("r+b")
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise JournalInUseError(
+                f"{self.path} is being written by another process; wait for it or stop it"
+            ) from None
+        first = self._read()
+        if first != self.key.encode():
+            self._cut(0)
+            self._write(self.key.encode())
+        self.replayed = 0
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def wrap(self, evaluate: Evaluate) -> Evaluate:
+        """``evaluate`` with a memory: reads its results back while the journal holds them."""
+
+        def remembered(x: Floats) -> tuple[float, Floats, Floats]:
+            start = self._open.tell()
+            payload = self._read()
+            if payload is not None and _design(payload) == x.tobytes():
+                self.replayed += 1
+                return _outcome(payload)
+            if payload is not None:
+                log.warning("%s: evaluation %d differs, continuing anew", self.path, self.replayed)
+                self._cut(start)
+            return self._compute(evaluate, x)
+
+        return remembered
+
+    @property
+    def _open(self) -> BinaryIO:
+        if self._file is None:
+            raise RuntimeError("the journal is not open: use it in a with statement")
+        return self._file
+
+    def _compute(self, evaluate: Evaluate, x: Floats) -> tuple[float, Floats, Floats]:
+        try:
+            loss, gradient, aux = evaluate(x)
+        except SimulationError as failure:
+            self._write(_encode(x, np.nan, np.zeros(0), np.zeros(0), str(failure)))
+            raise
+        outcome = float(loss), np.array(gradient, dtype="<f8"), np.array(aux, dtype="<f8")
+        self._write(_encode(x, *outcome, None))
+        return outcome
+
+    def _read(self) -> bytes | None:
+        """The next payload, or None at the end; cuts off what cannot be read."""
+        start = self._open.tell()
+        header = self._open.read(_HEADER.size)
+        if len(header) == _HEADER.size:
+            magic, length, checksum = _HEADER.unpack(header)
+            if magic == _MAGIC and length <= self._size - self._open.tell():
+                payload = self._open.read(length)
+                if zlib.crc32(payload) == checksum:
+                    return payload
+        self._cut(start)
+        return None
+
+    @property
+    def _size(self) -> int:
+        return os.fstat(self._open.fileno()).st_size
+
+    def _cut(self, position: int) -> None:
+        if self._size > position:
+            self._open.truncate(position)
+            os.fsync(self._open.fileno())
+        self._open.seek(position)
+
+    def _write(self, payload: bytes) -> None:
+        self._open.write(_HEADER.pack(_MAGIC, len(payload), zlib.crc32(payload)) + payload)
+        self._open.flush()
+        os.fsync(self._open.fileno())
+
+
+def _encode(x: Floats, loss: float, gradient: Floats, aux: Floats, failure: str | None) -> bytes:
+    shapes = {
+        "design": len(x),
+        "gradient": len(gradient),
+        "aux": list(aux.shape),
+        "failure": failure,
+    }
+    numbers = np.concatenate([x, [loss], gradient, aux.ravel()]).astype("<f8")
+    return json.dumps(shapes).encode() + b"\n" + numbers.tobytes()
+
+
+def _decode(payload: bytes) -> tuple[dict, Floats]:
+    line, numbers = payload.split(b"\n", 1)
+    return json.loads(line), np.frombuffer(numbers, dtype="<f8")
+
+
+def _design(payload: bytes) -> bytes:
+    shapes, numbers = _decode(payload)
+    return numbers[: shapes["design"]].tobytes()
+
+
+def _outcome(payload: bytes) -> tuple[float, Floats, Floats]:
+    shapes, numbers = _decode(payload)
+    if shapes["failure"] is not None:
+        raise SimulationError(shapes["failure"])
+    _, loss, gradient, aux = np.split(numbers, np.cumsum([shapes["design"], 1, shapes["gradient"]]))
+    return float(loss[0]), gradient.copy(), aux.reshape(shapes["aux"]).copy()

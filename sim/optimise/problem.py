@@ -1,0 +1,238 @@
+"""What every method works on: a counted, recorded view of the problem, and its result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+
+from sim.errors import SimulationError
+from sim.lattice import Floats
+from sim.optimise.kkt import Stationarity, stationarity
+
+Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
+"""Design (n,) -> loss, gradient (n,), further numbers worth keeping, such as the single cases."""
+
+Constrain = Callable[[Floats], tuple[Floats, "sp.csr_array | Floats"]]
+"""Design (n,) -> values (m,), required to be >= 0, and their Jacobian (m, n), sparse or dense."""
+
+Callback = Callable[["Evaluation"], None]
+
+
+class InfeasibleStartError(ValueError):
+    """No design that meets all constraints was found near the start.
+
+    Attributes:
+        constraint: index of the most violated constraint at the closest design found.
+        violation: by how much.
+    """
+
+    def __init__(self, constraint: int, violation: float) -> None:
+        super().__init__(
+            f"the start violates constraint {constraint} by {violation:.3g} and no design nearby "
+            "meets them all; relax the limits or start elsewhere"
+        )
+        self.constraint = constraint
+        self.violation = violation
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One evaluation of the loss.
+
+    Attributes:
+        number: 0 for the first.
+        x: (n,) the design.
+        loss: NaN if the evaluation failed.
+        aux: further numbers returned with the loss, empty if it failed.
+        violation: largest constraint violation, 0 if feasible.
+        accepted: whether the method moved there.
+        radius: largest change of a variable that the method allowed.
+        kkt_residual: of the last accepted design (see sim.optimise.kkt).
+        failure: why the evaluation failed, or None.
+    """
+
+    number: int
+    x: Floats
+    loss: float
+    aux: Floats
+    violation: float
+    accepted: bool
+    radius: float
+    kkt_residual: float
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """Best feasible design found, and how it was found.
+
+    Attributes:
+        x: (n,) the design.
+        loss, gradient, aux: as evaluated there.
+        violation: largest constraint violation, 0 unless no feasible design was met.
+        stationarity: multipliers and residual of the optimality conditions there.
+        best: its number in ``evaluations``.
+        evaluations: all of them, in order.
+        reason: why the method stopped.
+    """
+
+    x: Floats
+    loss: float
+    gradient: Floats
+    aux: Floats
+    violation: float
+    stationarity: Stationarity
+    best: int
+    evaluations: tuple[Evaluation, ...]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Place:
+    """A design with its constraints, not yet simulated."""
+
+    x: Floats
+    values: Floats
+    jacobian: sp.csr_array
+
+    @property
+    def violation(self) -> float:
+        """Largest amount by which a constraint is missed."""
+        return max(0.0, -float(self.values.min(initial=np.inf)))
+
+
+@dataclass(frozen=True)
+class Point(Place):
+    """A simulated design."""
+
+    number: int
+    loss: float
+    gradient: Floats
+    aux: Floats
+
+
+@dataclass
+class Problem:
+    """Counts and records the evaluations of one minimisation and remembers the best design.
+
+    Attributes:
+        evaluate: the loss.
+        constrain: the constraints, or None.
+        lower, upper: (n,) bounds, infinite where there are none.
+        budget: largest number of evaluations.
+        target: loss below which a feasible design is good enough.
+        callback: called with each record.
+        steepest: largest entry of the first gradient, the scale of all KKT residuals.
+    """
+
+    evaluate: Evaluate
+    constrain: Constrain | None
+    lower: Floats
+    upper: Floats
+    budget: int
+    target: float = -np.inf
+    callback: Callback | None = None
+    evaluations: list[Evaluation] = field(default_factory=list)
+    best: Point | None = None
+    steepest: float | None = None
+
+    @property
+    def finished(self) -> str | None:
+        """Why no further evaluation may follow, or None."""
+        if self.best is not None and self.best.violation == 0 and self.best.loss <= self.target:
+            return "target reached"
+        return "evaluations used up" if len(self.evaluations) >= self.budget else None
+
+    def place(self, x: Floats) -> Place:
+        """Evaluates the constraints."""
+        if self.constrain is None:
+            return Place(x, np.zeros(0), sp.csr_array((0, len(x))))
+        values, jacobian = self.constrain(x)
+        return Place(x, np.asarray(values, dtype=float), sp.csr_array(jacobian))
+
+    def simulate(self, place: Place) -> Point | SimulationError:
+        """Evaluates the loss; a failure is returned, for the method to step back from.
+
+        A loss or gradient that is not finite counts as a failure.
+        """
+        number = len(self.evaluations)
+        try:
+            loss, gradient, aux = self.evaluate(place.x.copy())
+        except SimulationError as failure:
+            return failure
+        if not (np.isfinite(loss) and np.isfinite(gradient).all()):
+            return SimulationError("the loss or its gradient is not finite")
+        gradient, aux = np.array(gradient, dtype=float), np.array(aux, dtype=float)
+        point = Point(
+            place.x, place.values, place.jacobian, number, float(loss), gradient, aux.ravel()
+        )
+        if self.steepest is None:
+            self.steepest = float(np.abs(point.gradient).max(initial=0.0)) or 1.0
+        if self.best is None or (point.violation, point.loss) < (
+            self.best.violation,
+            self.best.loss,
+        ):
+            self.best = point
+        return point
+
+    def record(
+        self,
+        place: Place,
+        outcome: Point | SimulationError,
+        accepted: bool,
+        radius: float,
+        residual: float,
+    ) -> None:
+        """Appends the evaluation to the history and reports it."""
+        loss, aux, failure = (
+            (outcome.loss, outcome.aux, None)
+            if isinstance(outcome, Point)
+            else (np.nan, np.zeros(0), str(outcome))
+        )
+        self.evaluations.append(
+            Evaluation(
+                number=len(self.evaluations),
+                x=place.x,
+                loss=loss,
+                aux=aux,
+                violation=place.violation,
+                accepted=accepted,
+                radius=radius,
+                kkt_residual=residual,
+                failure=failure,
+            )
+        )
+        if self.callback is not None:
+            self.callback(self.evaluations[-1])
+
+    def stationarity(self, point: Point) -> Stationarity:
+        """Optimality of a simulated design."""
+        return stationarity(
+            point.gradient,
+            point.values,
+            point.jacobian,
+            point.x,
+            self.lower,
+            self.upper,
+            self.steepest or 1.0,
+        )
+
+    def result(self, reason: str) -> Result:
+        """The best design; the first evaluation must have succeeded."""
+        if self.best is None:
+            raise RuntimeError("no evaluation succeeded")
+        best = self.best
+        return Result(
+            x=best.x,
+            loss=best.loss,
+            gradient=best.gradient,
+            aux=best.aux,
+            violation=best.violation,
+            stationarity=self.stationarity(best),
+            best=best.number,
+            evaluations=tuple(self.evaluations),
+            reason=reason,
+        )

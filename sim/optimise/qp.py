@@ -1,0 +1,84 @@
+"""The two quadratic programs of a feasible SQP step, by piqp (Schwan et al. 2023)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import piqp
+import scipy.sparse as sp
+
+from sim.lattice import Floats
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """Solution of a quadratic program.
+
+    Attributes:
+        step: (n,) the minimiser.
+        multipliers: (m,) of the constraints, >= 0.
+    """
+
+    step: Floats
+    multipliers: Floats
+
+
+def dense_step(
+    hessian: Floats,
+    gradient: Floats,
+    matrix: sp.csr_array,
+    least: Floats,
+    lower: Floats,
+    upper: Floats,
+) -> Quadratic | None:
+    """Minimises gradient.d + d.hessian.d / 2 subject to matrix d >= least and lower <= d <= upper.
+
+    Returns None if there is no such d or the solver does not converge.
+    """
+    solver = _tuned(piqp.DenseSolver())
+    solver.setup(
+        np.asfortranarray(hessian),
+        gradient,
+        G=np.asfortranarray(matrix.toarray()) if len(least) else None,
+        h_l=least if len(least) else None,
+        x_l=lower,
+        x_u=upper,
+    )
+    return _solution(solver, len(least))
+
+
+def shortest_step(
+    target: Floats, matrix: sp.csr_array, least: Floats, lower: Floats, upper: Floats
+) -> Quadratic | None:
+    """The d closest to ``target`` subject to matrix d >= least and lower <= d <= upper."""
+    solver = _tuned(piqp.SparseSolver())
+    solver.setup(
+        sp.csc_matrix(sp.identity(len(target))),
+        -target,
+        G=sp.csc_matrix(matrix) if len(least) else None,
+        h_l=least if len(least) else None,
+        x_l=lower,
+        x_u=upper,
+    )
+    return _solution(solver, len(least))
+
+
+def _tuned(solver: piqp.DenseSolver | piqp.SparseSolver) -> piqp.DenseSolver | piqp.SparseSolver:
+    solver.settings.eps_abs = 1e-10
+    solver.settings.eps_rel = 1e-10
+    solver.settings.check_duality_gap = False
+    return solver
+
+
+def _solution(solver: piqp.DenseSolver | piqp.SparseSolver, count: int) -> Quadratic | None:
+    if solver.solve() != piqp.PIQP_SOLVED:
+        return None
+    found = solver.result
+    multipliers = np.maximum(np.array(found.z_l), 0.0) if count else np.zeros(0)
+    return Quadratic(np.array(found.x), multipliers)
+
+
+def reachable(values: Floats, jacobian: sp.csr_array, reach: float) -> np.ndarray:
+    """Rows of a linearised constraint that some step of at most ``reach`` could violate."""
+    return np.flatnonzero(values < reach * np.asarray(abs(jacobian).sum(axis=1)).ravel())

@@ -1,0 +1,42 @@
+"""Damped BFGS model of the Lagrangian's Hessian (Powell 1978; Nocedal and Wright, section 18.3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.lattice import Floats
+
+DAMPING = 0.2
+"""Smallest curvature along a step, relative to the model's, that an update may leave."""
+
+
+class QuasiNewton:
+    """Positive definite approximation of a Hessian, learned from gradient differences.
+
+    Attributes:
+        matrix: (n, n), a multiple of the identity until the first update.
+    """
+
+    def __init__(self, size: int, curvature: float) -> None:
+        self.matrix: Floats = np.eye(size) * curvature
+        self._learned = False
+
+    def reduction(self, gradient: Floats, step: Floats) -> float:
+        """Decrease of the loss that the model predicts for a step."""
+        return -float(gradient @ step + step @ self.matrix @ step / 2)
+
+    def update(self, step: Floats, change: Floats) -> None:
+        """Learns that the gradient of the Lagrangian changes by ``change`` along ``step``."""
+        if not step.any():
+            return
+        along = float(step @ change)
+        if not self._learned and along > 0:
+            self.matrix = np.eye(len(step)) * (along / float(step @ step))
+            self._learned = True
+        image = self.matrix @ step
+        model = float(step @ image)
+        if along < DAMPING * model:
+            blend = (1 - DAMPING) * model / (model - along)
+            change = blend * change + (1 - blend) * image
+            along = DAMPING * model
+        self.matrix += np.outer(change, change) / along - np.outer(image, image) / model

@@ -1,0 +1,195 @@
+"""Trust-region sequential quadratic programming in which every simulated design is feasible.
+
+The constraints are cheap and the loss is not: so each trial step is brought back to the feasible
+set before it is simulated, and the loss alone decides whether it is accepted (Wright and Tenny
+2004, SIAM J. Optim. 14, 1074, with a quasi-Newton model of the Lagrangian).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.errors import SimulationError
+from sim.lattice import Floats, Ints
+from sim.optimise.feasibility import feasible_start, project
+from sim.optimise.problem import Place, Point, Problem, Result
+from sim.optimise.qp import dense_step, reachable
+from sim.optimise.quasi_newton import QuasiNewton
+
+ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
+"""Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
+
+
+@dataclass(frozen=True)
+class SqpOptions:
+    """Settings; lengths in mm.
+
+    Attributes:
+        evaluations: largest number of simulations, failed ones included.
+        target: loss that is good enough.
+        radius: largest change of a variable in the first step.
+        radius_max: the same in any step.
+        radius_min: radius at which the descent has stalled.
+        residual: KKT residual at which a design counts as optimal.
+        patience: the descent has stalled if this many simulations in a row ...
+        progress: ... have together reduced the loss by less than this fraction.
+        kicks: how many times to start again from the best design with random shifts ...
+        kick: ... of at most this size.
+        seed: of the shifts.
+    """
+
+    evaluations: int = 120
+    target: float = -np.inf
+    radius: float = 0.5
+    radius_max: float = 3.0
+    radius_min: float = 1e-4
+    residual: float = 1e-5
+    patience: int = 15
+    progress: float = 1e-3
+    kicks: int = 4
+    kick: float = 0.15
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A feasible step that the model expects to pay.
+
+    Attributes:
+        place: where it leads.
+        predicted: expected decrease of the loss.
+        rows: ids of the constraints that the quadratic program knew.
+        multipliers: their multipliers.
+    """
+
+    place: Place
+    predicted: float
+    rows: Ints
+    multipliers: Floats
+
+
+def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
+    """Runs descents from the start and then from kicked copies of the best design."""
+    place = feasible_start(problem, x0, options.radius_max)
+    point = problem.simulate(place)
+    if isinstance(point, SimulationError):
+        raise point
+    residual = problem.stationarity(point).residual
+    problem.record(place, point, True, options.radius, residual)
+    reason = Descent(problem, point, options).run()
+    random = np.random.default_rng(options.seed)
+    for _ in range(options.kicks):
+        if problem.finished is not None:
+            break
+        kicked = _kick(problem, options, random)
+        if kicked is not None:
+            reason = Descent(problem, kicked, options).run()
+    return problem.result(problem.finished or reason)
+
+
+def _kick(problem: Problem, options: SqpOptions, random: np.random.Generator) -> Point | None:
+    assert problem.best is not None
+    shift = random.uniform(-options.kick, options.kick, problem.best.x.shape)
+    place = project(problem, problem.best.x + shift, options.radius)
+    if place is None:
+        return None
+    outcome = problem.simulate(place)
+    problem.record(place, outcome, isinstance(outcome, Point), options.kick, np.nan)
+    return outcome if isinstance(outcome, Point) else None
+
+
+class Descent:
+    """Steps downhill from one design until nothing more is gained, restarting the model once."""
+
+    def __init__(self, problem: Problem, point: Point, options: SqpOptions) -> None:
+        self.problem = problem
+        self.options = options
+        self.point = point
+        self.residual = problem.stationarity(point).residual
+        self.losses = [point.loss]
+        self._forget()
+
+    def run(self) -> str:
+        """Descends; returns why it stopped."""
+        restarted_at = np.inf
+        while self.problem.finished is None:
+            if self.residual <= self.options.residual:
+                return "stationary"
+            if self._stalled():
+                if self.point.loss > restarted_at * (1 - self.options.progress):
+                    return "no further progress"
+                restarted_at = self.point.loss
+                self._forget()
+            self._step()
+        return self.problem.finished
+
+    def _forget(self) -> None:
+        """Starts the model and the radius afresh."""
+        self.radius = self.options.radius
+        steepest = float(np.abs(self.point.gradient).max())
+        self.model = QuasiNewton(len(self.point.x), max(steepest, 1e-300) / self.radius)
+        self.losses = [self.point.loss]
+
+    def _stalled(self) -> bool:
+        if self.radius < self.options.radius_min:
+            return True
+        recent = self.losses[-1 - self.options.patience :]
+        gained = recent[0] - recent[-1]
+        full = len(recent) > self.options.patience
+        return full and gained < self.options.progress * abs(recent[-1])
+
+    def _step(self) -> None:
+        trial = self._propose()
+        if trial is None:
+            self.radius /= 2
+            return
+        outcome = self.problem.simulate(trial.place)
+        used = self.radius
+        if isinstance(outcome, SimulationError):
+            self.radius /= 4
+            accepted = False
+        else:
+            accepted = self._judge(trial, outcome)
+        if accepted:
+            self.residual = self.problem.stationarity(self.point).residual
+        self.losses.append(self.point.loss)
+        self.problem.record(trial.place, outcome, accepted, used, self.residual)
+
+    def _propose(self) -> Trial | None:
+        """Best step of the model within the radius, made feasible; None if there is none."""
+        point, radius = self.point, self.radius
+        rows = reachable(point.values, point.jacobian, radius)
+        found = dense_step(
+            self.model.matrix,
+            point.gradient,
+            point.jacobian[rows],
+            -point.values[rows],
+            np.maximum(self.problem.lower - point.x, -radius),
+            np.minimum(self.problem.upper - point.x, radius),
+        )
+        if found is None:
+            return None
+        place = project(self.problem, point.x + found.step, radius)
+        if place is None:
+            return None
+        predicted = self.model.reduction(point.gradient, place.x - point.x)
+        return Trial(place, predicted, rows, found.multipliers) if predicted > 0 else None
+
+    def _judge(self, trial: Trial, outcome: Point) -> bool:
+        """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""
+        step = outcome.x - self.point.x
+        ratio = (self.point.loss - outcome.loss) / trial.predicted
+        bend = outcome.jacobian[trial.rows] - self.point.jacobian[trial.rows]
+        change = outcome.gradient - self.point.gradient - bend.T @ trial.multipliers
+        self.model.update(step, change)
+        length = float(np.abs(step).max())
+        if ratio < SHRINK:
+            self.radius = min(self.radius, length) / 2
+        elif ratio > GROW and length > 0.9 * self.radius:
+            self.radius = min(2 * self.radius, self.options.radius_max)
+        if ratio <= ACCEPT:
+            return False
+        self.point = outcome
+        return True
