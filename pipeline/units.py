@@ -86,8 +86,7 @@ def _registry() -> UnitRegistry:
 def parse(text: object, dimension: Dimension) -> float:
     """The quantity `text` as a float in the working unit of `dimension`.
 
-    Raises
-    ------
+    Raises:
         QuantityError: no unit, an unknown one, one of another dimension, or no finite number.
     """
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'

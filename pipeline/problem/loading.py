@@ -22,8 +22,7 @@ from pipeline.problem.yamlfile import Document, KeyPath
 def load(path: str | Path, preset: str | None = None) -> Problem:
     """The problem in a YAML file, with one of its presets laid over it.
 
-    Raises
-    ------
+    Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
     document = yamlfile.read(Path(path))
@@ -57,8 +56,7 @@ def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, A
 def preset_names(path: str | Path) -> tuple[str, ...]:
     """The names of the presets in a problem file.
 
-    Raises
-    ------
+    Raises:
         UserError: the file cannot be read.
     """
     presets = yamlfile.read(Path(path)).data.get("presets")
@@ -120,7 +118,9 @@ def _real_keys(location: KeyPath, data: object, missing: bool) -> KeyPath:
     """The location without the tags of unions, which are no keys of the file."""
     keys: list[str | int] = []
     for index, part in enumerate(location):
-        if (isinstance(data, Mapping) and part in data) or (isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)):
+        if (isinstance(data, Mapping) and part in data) or (
+            isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+        ):
             data = data[part]
         elif not (missing and index == len(location) - 1):
             continue

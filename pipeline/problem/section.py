@@ -35,8 +35,7 @@ class Section(BaseModel):
 def exactly_one(section: Section, *names: str) -> None:
     """Refuse a section that gives none or several of the alternatives `names`.
 
-    Raises
-    ------
+    Raises:
         PydanticCustomError: naming the alternatives.
     """
     given = [name for name in names if getattr(section, name) is not None]

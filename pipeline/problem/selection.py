@@ -136,8 +136,7 @@ def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
 def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:
     """The ids that a selector means, ascending; listed units must lie in the lattice.
 
-    Raises
-    ------
+    Raises:
         IndexError: a listed unit is not in the lattice, or there is no one centre unit.
     """
     if isinstance(selector, ListedUnits):

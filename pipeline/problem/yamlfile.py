@@ -54,8 +54,7 @@ class _Loader(yaml.SafeLoader):
 def read(path: Path) -> Document:
     """The mapping in a YAML file.
 
-    Raises
-    ------
+    Raises:
         UserError: no such file, too large, not UTF-8, not YAML, a duplicate key, or not a mapping.
     """
     text = _text(path)

@@ -1,0 +1,15 @@
+"""The datasets between the stages: their schemas, and the only way to write and read them."""
+
+from pipeline.datasets.files import SchemaError, read, refusal, write
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind, Variable
+
+__all__ = [
+    "SCHEMA_VERSION",
+    "TABLES",
+    "Kind",
+    "SchemaError",
+    "Variable",
+    "read",
+    "refusal",
+    "write",
+]

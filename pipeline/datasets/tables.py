@@ -1,0 +1,212 @@
+"""The schema of every dataset, as tables: which variables there are, on which dims, in what unit.
+
+Coordinates are those of the specimen frame: origin at the lattice point of unit (0, 0), x to the
+right, y up, rotations counter-clockwise; `unit` carries the design's ids.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+SCHEMA_VERSION = 1
+
+Type = Literal["float64", "int64", "int8", "str"]
+Kind = Literal["design", "design_method", "response", "sweep"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable of a dataset.
+
+    Attributes:
+        dims: names of its dimensions.
+        units: its unit; "1" for names, ids and ratios.
+        long_name: what it is, for people and axes.
+        dtype: type in the file.
+        gaps: whether NaN is a value it may take (padding, free degrees of freedom, failed cases).
+        flags: meanings of its integer values.
+        values: all values of a coordinate that is the same in each file.
+        coordinate: whether it labels dimensions.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    dtype: Type = "float64"
+    gaps: bool = False
+    flags: Mapping[str, int] = field(default_factory=dict)
+    values: tuple[str, ...] = ()
+    coordinate: bool = False
+
+
+Table = Mapping[str, Variable]
+
+
+def _label(dims: tuple[str, ...], units: str, long_name: str, dtype: Type = "float64") -> Variable:
+    return Variable(dims, units, long_name, dtype, coordinate=True)
+
+
+def _names(dim: str, long_name: str, *values: str) -> Variable:
+    return Variable((dim,), "1", long_name, "str", values=values, coordinate=True)
+
+
+_UNIT: Table = {
+    "unit": _label(("unit",), "1", "id of the unit, i + columns j", "int64"),
+    "i": _label(("unit",), "1", "column of the unit", "int64"),
+    "j": _label(("unit",), "1", "row of the unit", "int64"),
+    "xy": _names("xy", "axis of the specimen frame", "x", "y"),
+}
+
+_CASE: Table = {
+    "direction": _label(("case",), "deg", "direction of the drive"),
+}
+
+_NETWORK: Table = {
+    "region": Variable(
+        ("unit",),
+        "1",
+        "region of the unit",
+        "int8",
+        flags={"surroundings": 0, "cloak": 1, "source": 2, "void": 3},
+    ),
+    "roi": Variable(
+        ("unit",),
+        "1",
+        "whether the unit is in the region of interest",
+        "int8",
+        flags={"outside": 0, "inside": 1},
+    ),
+    "support": Variable(
+        ("unit",),
+        "1",
+        "support of the unit",
+        "int8",
+        flags={"free": 0, "clamped": 1, "driven": 2},
+    ),
+    "ligament_unit": Variable(("ligament", "end"), "1", "units that the ligament joins", "int64"),
+    "ligament_vertex": Variable(
+        ("ligament", "end"), "1", "vertex within the unit at either end of the ligament", "int64"
+    ),
+}
+
+_SHAPE: Table = {
+    "vertices": Variable(
+        ("unit", "vertex", "xy"), "mm", "vertices of the design, counter-clockwise", gaps=True
+    ),
+    "vertices_initial": Variable(
+        ("unit", "vertex", "xy"), "mm", "vertices before the optimisation", gaps=True
+    ),
+    "centroid": Variable(("unit", "xy"), "mm", "centroid of the unit"),
+    "constraint": _names("constraint", "kind of constraint"),
+    "constraint_units": _label(("constraint",), "1", "unit of the constraint's margin", "str"),
+    "constraint_margin": Variable(
+        ("constraint",),
+        "as in constraint_units",
+        "smallest margin to the constraint's limit, negative where violated",
+        gaps=True,
+    ),
+    "smallest_gap": Variable((), "mm", "smallest gap between any two units"),
+    "overlaps": Variable((), "1", "number of overlapping pairs of units", "int64"),
+}
+
+_HISTORY: Table = {
+    "evaluation": _label(("evaluation",), "1", "number of the evaluation, from zero", "int64"),
+    "loss": Variable(("evaluation",), "1", "loss, weighted mean of the load cases", gaps=True),
+    "loss_case": Variable(("evaluation", "case"), "1", "loss of the load case", gaps=True),
+    "violation": Variable(
+        ("evaluation",), "1", "largest scaled constraint violation, zero if feasible", gaps=True
+    ),
+    "accepted": Variable(
+        ("evaluation",),
+        "1",
+        "whether the optimiser went on from this design",
+        "int8",
+        flags={"rejected": 0, "accepted": 1},
+    ),
+    "design_vector": Variable(
+        ("evaluation", "variable"), "mm", "shifts of the free vertices from the start", gaps=True
+    ),
+    "best_evaluation": Variable((), "1", "evaluation of the best feasible design", "int64"),
+    "best_loss": Variable((), "1", "loss of the best feasible design"),
+    "kkt_residual": Variable(
+        (), "1", "residual of the optimality conditions at the best feasible design", gaps=True
+    ),
+}
+
+_METHOD: Table = {"method": _names("method", "optimisation method")}
+
+
+def _per_method(table: Table) -> Table:
+    return {
+        name: variable
+        if variable.coordinate
+        else replace(variable, dims=("method", *variable.dims))
+        for name, variable in table.items()
+    }
+
+
+_RESPONSE_LABELS: Table = {
+    "structure": _names("structure", "structure", "altered", "cloaked"),
+    "frequency": Variable(("case",), "Hz", "frequency of the drive", gaps=True, coordinate=True),
+    "amplitude": Variable(("case",), "mm", "amplitude of the drive", gaps=True, coordinate=True),
+    "time": _label(("time",), "s", "time since the start of the drive"),
+    "dof": _names("dof", "degree of freedom", "ux", "uy", "theta"),
+}
+
+_MOTION = ("structure", "case", "time", "unit", "dof")
+_HISTORY_OF_CASE = ("structure", "case", "time")
+_OF_CASE = ("structure", "case")
+
+_RESPONSE: Table = {
+    "vertices": Variable(
+        ("structure", "unit", "vertex", "xy"),
+        "mm",
+        "vertices at rest, counter-clockwise",
+        gaps=True,
+    ),
+    "displacement": Variable(_MOTION, "mm (ux, uy), rad (theta)", "displacement of the units"),
+    "velocity": Variable(_MOTION, "mm/s (ux, uy), rad/s (theta)", "velocity of the units"),
+    "reaction_force": Variable(
+        _MOTION, "N (ux, uy), N mm (theta)", "force of the supports and drives", gaps=True
+    ),
+    "strain_energy": Variable(_HISTORY_OF_CASE, "N mm", "strain energy of the ligaments"),
+    "contact_energy": Variable(_HISTORY_OF_CASE, "N mm", "energy of the contacts"),
+    "min_void_angle": Variable(_HISTORY_OF_CASE, "rad", "smallest void angle"),
+    "min_gap": Variable(_OF_CASE, "mm", "smallest gap between units over the history"),
+    "overlaps": Variable(_OF_CASE, "1", "overlapping pairs of units over the history", "int64"),
+    "loss": Variable(_OF_CASE, "1", "loss, time integral"),
+    "loss_samples": Variable(_OF_CASE, "1", "loss, mean of the samples as the authors plot it"),
+    "loss_error": Variable(_OF_CASE, "1", "estimated relative error of the loss"),
+    "displacement_error": Variable(
+        _OF_CASE, "1", "estimated relative error of the displacement in the region of interest"
+    ),
+}
+
+_MAP = ("direction", "frequency")
+
+_SWEEP: Table = {
+    "direction": _label(("direction",), "deg", "direction of the drive"),
+    "frequency": _label(("frequency",), "Hz", "frequency of the drive"),
+    "loss": Variable(_MAP, "1", "loss of the cloaked structure", gaps=True),
+    "loss_altered": Variable(_MAP, "1", "loss of the structure before optimisation", gaps=True),
+    "status": Variable(_MAP, "1", "ok, or why the case failed", "str"),
+    "min_void_angle": Variable(_MAP, "rad", "smallest void angle of the cloaked case", gaps=True),
+}
+
+TABLES: Mapping[Kind, Table] = {
+    "design": _UNIT | _CASE | _METHOD | _NETWORK | _SHAPE | _per_method(_HISTORY),
+    "design_method": _UNIT | _CASE | _NETWORK | _SHAPE | _HISTORY,
+    "response": _UNIT | _CASE | _RESPONSE_LABELS | _NETWORK | _RESPONSE,
+    "sweep": _SWEEP,
+}
+"""The variables of each kind of dataset, in the order in which they are written."""
+
+ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
+    "design": {"shipped_method": "the method whose design this is"},
+    "design_method": {},
+    "response": {},
+    "sweep": {},
+}
+"""What each kind tells in attributes of its own, beside its provenance."""

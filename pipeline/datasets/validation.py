@@ -1,0 +1,66 @@
+"""Whether a dataset is what its table says: the first thing that is not, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
+
+_KINDS = {"float64": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with which variable (or attribute)."""
+
+    what: str
+    name: str
+    value: object = None
+
+
+def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[Fault]:
+    """What keeps `dataset` from being one of `kind`, beside its provenance."""
+    table = TABLES[kind]
+    for name, variable in table.items():
+        if name not in dataset.variables:
+            yield Fault("the variable is missing", name)
+        else:
+            yield from _variable_faults(dataset.variables[name], name, variable)
+    for name in dataset.variables:
+        if name not in table:
+            yield Fault(f"a {kind} dataset has no such variable", str(name))
+    for name, meaning in ATTRIBUTES[kind].items():
+        if name not in dataset.attrs:
+            yield Fault(f"the attribute is missing ({meaning})", name)
+
+
+def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator[Fault]:
+    if found.dims != table.dims:
+        yield Fault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
+    elif found.dtype.kind not in _KINDS[table.dtype]:
+        yield Fault(f"its type is not {table.dtype}", name, str(found.dtype))
+    elif (units := found.attrs.get("units", table.units)) != table.units:
+        yield Fault(f"its unit is not {table.units!r}", name, units)
+    else:
+        yield from _value_faults(found.values, name, table)
+
+
+def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fault]:
+    if table.values and tuple(values.tolist()) != table.values:
+        yield Fault(f"its values are not {_tuple(table.values)}", name, _tuple(values.tolist()))
+    if table.flags and not np.isin(values, list(table.flags.values())).all():
+        meanings = ", ".join(f"{value} {flag}" for flag, value in table.flags.items())
+        yield Fault(f"a flag has no meaning ({meanings})", name)
+    if table.dtype == "float64":
+        if np.isinf(values).any():
+            yield Fault("infinite values", name)
+        if not table.gaps and np.isnan(values).any():
+            yield Fault("NaN where every value is needed", name)
+
+
+def _tuple(names: object) -> str:
+    return "(" + ", ".join(map(str, names)) + ")"  # type: ignore[call-overload]

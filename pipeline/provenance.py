@@ -1,0 +1,80 @@
+"""Where a dataset comes from, as attributes: problem, parents, versions, commit and plan.
+
+No dates, hosts or wall times: the same sources make the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from pipeline.problem import Problem, Stage, canonical_json, section_hash
+
+PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
+_ROOT = Path(__file__).resolve().parent.parent
+
+
+def attributes(
+    problem: Problem,
+    stage: Stage,
+    *,
+    method: str | None = None,
+    parents: Mapping[str, Path] | None = None,
+    plan: object = None,
+) -> dict[str, str]:
+    """The provenance of a dataset that `stage` makes.
+
+    Args:
+        problem: the problem; as much of it as the stage depends on is stored in full.
+        stage: the stage.
+        method: the optimisation method, where the stage runs only one.
+        parents: files that the stage read, by role.
+        plan: what was decided and skipped; anything that JSON can hold.
+    """
+    return {
+        "problem": canonical_json(problem, stage, method),
+        "problem_hash": section_hash(problem, stage, method),
+        "parents": _json({name: file_hash(path) for name, path in (parents or {}).items()}),
+        "packages": _json(package_versions()),
+        "git_commit": git_commit(),
+        "plan": _json(plan if plan is not None else {}),
+    }
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes, in hex."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@lru_cache(maxsize=1)
+def package_versions() -> Mapping[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+@lru_cache(maxsize=1)
+def git_commit() -> str:
+    """The commit of the sources, or "unknown" outside a git checkout."""
+    command = ["git", "-C", str(_ROOT), "rev-parse", "--verify", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return done.stdout.strip()
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
