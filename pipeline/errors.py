@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 from os import PathLike, fspath
 
 _LONGEST_VALUE = 120
+_CHOOSE = "choose a folder that can be written to"
+_REFUSALS = {
+    errno.ENOSPC: ("the disk is full", "free some space, then run the same command again"),
+    errno.EDQUOT: ("the disk quota is used up", "free some space, then run the command again"),
+    errno.EFBIG: ("the file would be too large", "raise the limit of file sizes (ulimit -f)"),
+    errno.EROFS: ("the file system is read-only", _CHOOSE),
+    errno.EACCES: ("no permission", f"check who may use it, or {_CHOOSE}"),
+    errno.EPERM: ("no permission", f"check who may use it, or {_CHOOSE}"),
+}
 
 
 class UserError(Exception):
@@ -53,3 +63,10 @@ class UserError(Exception):
 
 def _shortened(text: str) -> str:
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+
+
+def refusal(path: str | PathLike[str], error: OSError) -> UserError:
+    """What it means to the user that the machine refused to use the file or folder `path`."""
+    otherwise = (error.strerror or str(error), "check the path, then run the same command again")
+    what, remedy = _REFUSALS.get(error.errno or 0, otherwise)
+    return UserError(what, file=path, remedy=remedy)

@@ -80,7 +80,7 @@ class QuantityError(ValueError):
 def _registry() -> UnitRegistry:
     from pint import UnitRegistry
 
-    return UnitRegistry(_DEFINITIONS.strip().splitlines())  # type: ignore[arg-type]
+    return UnitRegistry(_DEFINITIONS.strip().splitlines())
 
 
 def parse(text: object, dimension: Dimension) -> float:

@@ -1,6 +1,6 @@
 """The datasets between the stages: their schemas, and the only way to write and read them."""
 
-from pipeline.datasets.files import SchemaError, read, refusal, write
+from pipeline.datasets.files import SchemaError, read, write
 from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind, Variable
 
 __all__ = [
@@ -10,6 +10,5 @@ __all__ = [
     "SchemaError",
     "Variable",
     "read",
-    "refusal",
     "write",
 ]

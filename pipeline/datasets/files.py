@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,17 +11,9 @@ import xarray as xr
 
 from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind, Variable
 from pipeline.datasets.validation import faults
-from pipeline.errors import UserError
+from pipeline.errors import UserError, refusal
 
 _CHUNK = bytes(1 << 20)
-_REFUSALS = {
-    errno.ENOSPC: ("the disk is full", "free some space, then run the same command again"),
-    errno.EDQUOT: ("the disk quota is used up", "free some space, then run the command again"),
-    errno.EFBIG: ("the file would be too large", "raise the file size limit (ulimit -f)"),
-    errno.EROFS: ("the file system is read-only", "choose a folder that can be written to"),
-    errno.EACCES: ("no permission to write here", "choose a folder that can be written to"),
-    errno.EPERM: ("no permission to write here", "choose a folder that can be written to"),
-}
 
 
 class SchemaError(ValueError):
@@ -93,14 +84,6 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     for fault in faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
     return dataset
-
-
-def refusal(folder: Path, error: OSError) -> UserError:
-    """What a failed write means to the user, naming the folder."""
-    what, remedy = _REFUSALS.get(
-        error.errno or 0, (error.strerror or str(error), "check the folder, then run again")
-    )
-    return UserError(f"cannot write results: {what}", file=folder, remedy=remedy)
 
 
 def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> None:

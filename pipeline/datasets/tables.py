@@ -41,7 +41,7 @@ class Variable:
     coordinate: bool = False
 
 
-Table = Mapping[str, Variable]
+Table = dict[str, Variable]
 
 
 def _label(dims: tuple[str, ...], units: str, long_name: str, dtype: Type = "float64") -> Variable:

@@ -30,9 +30,8 @@ def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[Fault]:
             yield Fault("the variable is missing", name)
         else:
             yield from _variable_faults(dataset.variables[name], name, variable)
-    for name in dataset.variables:
-        if name not in table:
-            yield Fault(f"a {kind} dataset has no such variable", str(name))
+    for unknown in dataset.variables.keys() - table.keys():
+        yield Fault(f"a {kind} dataset has no such variable", str(unknown))
     for name, meaning in ATTRIBUTES[kind].items():
         if name not in dataset.attrs:
             yield Fault(f"the attribute is missing ({meaning})", name)

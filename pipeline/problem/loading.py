@@ -64,19 +64,20 @@ def preset_names(path: str | Path) -> tuple[str, ...]:
 
 
 def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
-    where = {"file": document.path, "line": document.line(("presets", name))}
+    def refused(what: str, key: str, remedy: str) -> UserError:
+        line = document.line(("presets", name))
+        return UserError(what, file=document.path, line=line, key=key, remedy=remedy)
+
     if not isinstance(presets, dict):
-        raise UserError("presets is not a mapping", key="presets", remedy="name: {...}", **where)
+        raise refused("presets are wanted here", "presets", "write `NAME:` and its keys below it")
     if name not in presets:
         known = ", ".join(map(str, presets)) or "none"
         near = get_close_matches(name, [str(key) for key in presets], n=1)
         hint = f"did you mean {near[0]!r}? " if near else ""
-        raise UserError(
-            f"no preset {name!r}", key="presets", remedy=f"{hint}presets here: {known}", **where
-        )
+        raise refused(f"no preset {name!r}", "presets", f"{hint}presets here: {known}")
     if not isinstance(presets[name], dict):
         remedy = "write the keys that it changes below it"
-        raise UserError("not a mapping", key=f"presets.{name}", remedy=remedy, **where)
+        raise refused("keys and values are wanted here", f"presets.{name}", remedy)
     return presets[name]
 
 
@@ -93,39 +94,48 @@ def _told(
     return _user_error(document, preset, data, keys, what, remedy)
 
 
+_WORDS = {
+    "missing": ("missing key", "add it"),
+    "union_tag_not_found": ("the key `kind` is missing", "add it"),
+    "union_tag_invalid": ("unknown kind", "give one of {expected_tags}"),
+    "literal_error": ("not one of the choices", "give {expected}"),
+    "model_type": ("keys and values are wanted here", "write them below it, indented"),
+    "dict_type": ("keys and values are wanted here", "write them below it, indented"),
+    "tuple_type": ("a list is wanted here", "write it as [first, second]"),
+    "finite_number": ("not a finite number", "give a finite number"),
+    "greater_than": ("too small", "give a number greater than {gt}"),
+    "greater_than_equal": ("too small", "give a number of at least {ge}"),
+    "less_than_equal": ("too large", "give a number of at most {le}"),
+    "too_short": ("too few items", "give at least {min_length}"),
+    "too_long": ("too many items", "give at most {max_length}"),
+    "int_type": ("not a whole number", "give a whole number"),
+    "float_type": ("not a number", "give a number"),
+    "float_parsing": ("not a number", "give a number"),
+    "string_type": ("not a text", "put it in quotes"),
+    "bool_type": ("neither true nor false", "give true or false"),
+    "bool_parsing": ("neither true nor false", "give true or false"),
+}
+
+
 def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
     """What is wrong, the remedy, and a key below the error's place if there is one."""
     context = error.get("ctx", {})
-    match error["type"]:
-        case "problem":
-            return context["what"], context["remedy"], context["key"]
-        case "missing":
-            return "missing key", "add it", None
-        case "union_tag_not_found":
-            return "missing key", f"give one of {context['discriminator']}", "kind"
-        case "union_tag_invalid":
-            return "unknown kind", f"give one of {context['expected_tags']}", "kind"
-        case "literal_error":
-            return "not one of the choices", f"give {context['expected']}", None
-        case "model_type" | "model_attributes_type" | "dict_type":
-            return "keys and values are wanted here", "write them below it, indented", None
-        case "finite_number":
-            return "not a finite number", "give a finite number", None
-    return error["msg"][0].lower() + error["msg"][1:], "correct the value", None
+    if error["type"] == "problem":
+        return context["what"], context["remedy"], context["key"]
+    what, remedy = _WORDS.get(error["type"], (error["msg"], "correct the value"))
+    return what, remedy.format_map(context), None
 
 
-def _real_keys(location: KeyPath, data: object, missing: bool) -> KeyPath:
+def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:
     """The location without the tags of unions, which are no keys of the file."""
     keys: list[str | int] = []
-    for index, part in enumerate(location):
+    for part in location:
         if (isinstance(data, Mapping) and part in data) or (
-            isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+            isinstance(data, list) and isinstance(part, int) and part < len(data)
         ):
-            data = data[part]
-        elif not (missing and index == len(location) - 1):
-            continue
-        keys.append(part)
-    return tuple(keys)
+            data = data[part]  # type: ignore[index]
+            keys.append(part)
+    return (*keys, location[-1]) if missing else tuple(keys)
 
 
 def _user_error(

@@ -64,7 +64,8 @@ class Material(Section):
         """
         law = self.damping
         if law.ratio is None:
-            assert law.translation is not None and law.rotation is not None
+            assert law.translation is not None
+            assert law.rotation is not None
             return law.translation, law.rotation
         mass = _UNROTATED_AREA * self.density * spacing**2
         inertia = _UNROTATED_MOMENT * self.density * spacing**4
@@ -222,7 +223,8 @@ class Problem(Section):
         """The time over which the loss is taken, in s."""
         if self.horizon.duration is not None:
             return self.horizon.duration
-        assert self.horizon.periods is not None and self.frequency is not None
+        assert self.horizon.periods is not None
+        assert self.frequency is not None
         return self.horizon.periods / self.frequency
 
     @property

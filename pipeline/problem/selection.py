@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -58,7 +58,7 @@ class ListedUnits(Section):
     units: Annotated[tuple[tuple[Index, Index], ...], Field(min_length=1)]
 
 
-def _selector_tag(value: Any) -> str:
+def _selector_tag(value: object) -> str:
     return "listed" if isinstance(value, dict | ListedUnits) else "named"
 
 
@@ -69,7 +69,7 @@ Selector = Annotated[
 ]
 
 
-def _centre_tag(value: Any) -> str:
+def _centre_tag(value: object) -> str:
     return "named" if isinstance(value, str) else "listed"
 
 
@@ -143,20 +143,16 @@ def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:
         return tuple(sorted({_listed(i, j, lattice) for i, j in selector.units}))
     if selector == "centre":
         return (_centre_unit(lattice),)
-    right, top = lattice.columns - 1, lattice.rows - 1
-    chosen = {
-        "corners": lambda i, j: i in (0, right) and j in (0, top),
-        "left": lambda i, j: i == 0,
-        "right": lambda i, j: i == right,
-        "bottom": lambda i, j: j == 0,
-        "top": lambda i, j: j == top,
-    }[selector]
-    return tuple(
-        lattice.unit(i, j)
-        for j in range(lattice.rows)
-        for i in range(lattice.columns)
-        if chosen(i, j)
-    )
+    columns, rows = range(lattice.columns), range(lattice.rows)
+    sides = {
+        "corners": (columns[:: max(columns[-1], 1)], rows[:: max(rows[-1], 1)]),
+        "left": (columns[:1], rows),
+        "right": (columns[-1:], rows),
+        "bottom": (columns, rows[:1]),
+        "top": (columns, rows[-1:]),
+    }
+    chosen_columns, chosen_rows = sides[selector]
+    return tuple(lattice.unit(i, j) for j in chosen_rows for i in chosen_columns)
 
 
 def _listed(i: int, j: int, lattice: Lattice) -> int:

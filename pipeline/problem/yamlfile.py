@@ -35,9 +35,9 @@ class Document:
 class _Loader(yaml.SafeLoader):
     """The safe loader, without aliases (which can expand without bound) and duplicate keys."""
 
-    def compose_node(self, parent: Any, index: Any) -> Any:
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
             raise yaml.MarkedYAMLError("aliases (*name) are not supported", problem_mark=mark)
         return super().compose_node(parent, index)
 
@@ -71,7 +71,7 @@ def read(path: Path) -> Document:
         raise UserError(f"not YAML: {error}", file=path, remedy="write plain YAML text") from error
     except RecursionError as error:
         raise UserError("nested too deeply", file=path, remedy="write it flatter") from error
-    if not isinstance(data, dict):
+    if node is None or not isinstance(data, dict):
         remedy = "write keys and values, such as `lattice:` and its keys below it"
         raise UserError("the file does not hold keys and values", file=path, remedy=remedy)
     return Document(path, data, dict(_lines(node, ())))
