@@ -52,13 +52,13 @@ lint: setup
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
-	$(BIN)/snakefmt --check --quiet $(WORKFLOW)
+	$(BIN)/snakefmt --check $(WORKFLOW)
 	$(BIN)/snakemake --lint
 
 format: setup
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
-	$(BIN)/snakefmt --quiet $(WORKFLOW)
+	$(BIN)/snakefmt $(WORKFLOW)
 
 bench: setup
 	$(BIN)/python -m pipeline.bench

@@ -1,23 +1,17 @@
 # From a problem file to a figure. `snakemake fig2` builds experiments/fig2 into results/fig2/,
 # `snakemake fig2@edge3` (or fig2_edge3) the same study with a preset. See profiles/default.
+import sys
+
 from snakemake.utils import min_version
 
 from pipeline.sources import source_hash
-from pipeline.workflow import designs, options, prepare_jobs, section, studies
+from pipeline.workflow import check_problems, check_room, designs
+from pipeline.workflow import options, prepare_jobs, section, studies
 
 min_version("9.20")
 
 
-container: "docker://python:3.13-bookworm"
-
-
-wildcard_constraints:
-    name=r"\w+",
-    preset=r"(@\w+)?",
-    method=r"\w+",
-    chunk=r"\d+",
-
-
+check_problems(sys.argv[1:])
 prepare_jobs()
 
 for study in studies():
@@ -30,6 +24,7 @@ for study in studies():
                 f"results/{study}/report/index.html",
 
 
+include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"

@@ -11,15 +11,13 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
 import psutil
-from snakemake.exceptions import WorkflowError
 
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
-from pipeline.workflow import RUN_MARK, problem_of, studies
+from pipeline.workflow import RUN_MARK, check_problems
 
 SNAKEMAKE = str(Path(sys.executable).with_name("snakemake"))
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
@@ -29,20 +27,13 @@ _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 def main(arguments: list[str]) -> None:
     """Checks the problem files of the targets, clears what a killed run left, runs snakemake."""
     os.chdir(ROOT)
+    check_problems(arguments)
     try:
-        _check(arguments)
         _clear_the_ground()
-    except (UserError, WorkflowError) as error:
+    except UserError as error:
         sys.exit(f"error: {error}")
     _end_with_parent()
     os.execv(SNAKEMAKE, [SNAKEMAKE, *arguments])
-
-
-def _check(arguments: Iterable[str]) -> None:
-    """Reads the problem file of every study asked for: its faults are told before all else."""
-    asked = [study for study in studies() if set(study.targets) & set(arguments)]
-    for study in asked:
-        problem_of(study)
 
 
 def _clear_the_ground() -> None:

@@ -9,19 +9,20 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import yaml
-from snakemake.exceptions import WorkflowError
 from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.problem import Problem, Stage, load, section_hash
 
+ROOM = 64 << 20  # bytes, somewhat more than a study takes
 RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job
 
 
@@ -74,6 +75,49 @@ def studies(root: Path = ROOT) -> list[Study]:
     return found
 
 
+def asked_for(words: Sequence[str]) -> list[Study]:
+    """The studies that the words of a command line name, by target or by a file of theirs.
+
+    A preset counts even if its problem file has none of that name: reading the problem tells so.
+    """
+    by_target = {target: study for study in studies() for target in study.targets}
+    names = {study.name for study in by_target.values()}
+    found = []
+    for word in words:
+        study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
+        if study.name in names:
+            found.append(study)
+    return found
+
+
+def check_problems(words: Sequence[str]) -> None:
+    """Ends the process with one clear message if a study that is asked for has a faulty problem.
+
+    Snakemake would only find no rule to make its files, and count those that exist as up to date.
+    """
+    try:
+        for study in asked_for(words) if words else studies()[:1]:
+            problem_of(study)
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
+def check_room(folder: str) -> None:
+    """Ends the process with one clear message if results cannot be written to the folder."""
+    path = Path(folder)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with NamedTemporaryFile(dir=path) as probe:
+            os.posix_fallocate(probe.fileno(), 0, ROOM)
+    except OSError as error:
+        told = UserError(
+            f"results cannot be written: {error.strerror}",
+            file=path.resolve(),
+            remedy=f"make the folder writable, with {ROOM >> 20} MiB of free space",
+        )
+        sys.exit(f"error: {told}")
+
+
 def study_of(wildcards: Wildcards) -> Study:
     """The study that a job works on, from its wildcards `name` and `preset`."""
     return Study.parse(f"{wildcards.name}{wildcards.preset}")
@@ -84,12 +128,9 @@ def problem_of(study: Study) -> Problem:
     """The problem of a study.
 
     Raises:
-        WorkflowError: the problem file is wrong; tells where and what to do.
+        UserError: the problem file is wrong; tells where and what to do.
     """
-    try:
-        return load(ROOT / study.problem, study.preset or None)
-    except UserError as error:
-        raise WorkflowError(str(error)) from error
+    return load(study.problem, study.preset or None)
 
 
 def options(wildcards: Wildcards) -> str:

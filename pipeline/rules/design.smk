@@ -11,6 +11,8 @@ rule design:
         study=options,
         problem=section("design"),
         source=source_hash("pipeline.design"),
+    message:
+        "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
     shell:
         "python -m pipeline.design {params.study} --method {wildcards.method}"
         " --out {output} --log {log}"
@@ -29,6 +31,8 @@ rule select:
         study=options,
         problem=section("design"),
         source=source_hash("pipeline.select"),
+    message:
+        "Choosing the better design of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.select {params.study} --designs {input.designs}"
         " --out {output} --log {log}"

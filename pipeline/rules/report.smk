@@ -21,6 +21,8 @@ rule report:
         folder=subpath(output.page, parent=True),
         problem=section("report"),
         source=source_hash("reports.build"),
+    message:
+        "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m reports.build {params.study} --design {input.design}"
         " --response {input.response} --sweep {input.sweep}"

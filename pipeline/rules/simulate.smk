@@ -11,6 +11,8 @@ rule simulate:
         study=options,
         problem=section("simulate"),
         source=source_hash("pipeline.simulate"),
+    message:
+        "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.simulate {params.study} --design {input.design}"
         " --out {output} --log {log}"

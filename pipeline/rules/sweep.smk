@@ -16,6 +16,8 @@ rule sweep:
         chunks=SWEEP_CHUNKS,
         problem=section("sweep"),
         source=source_hash("pipeline.sweep"),
+    message:
+        "Mapping robustness of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
         "python -m pipeline.sweep run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
@@ -32,5 +34,7 @@ rule gather_sweep:
     params:
         problem=section("sweep"),
         source=source_hash("pipeline.sweep"),
+    message:
+        "Joining the parts of the map of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.sweep gather --parts {input} --out {output} --log {log}"

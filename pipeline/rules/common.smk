@@ -1,0 +1,12 @@
+container: "docker://python:3.13-bookworm"
+
+
+wildcard_constraints:
+    name=r"\w+",
+    preset=r"(@\w+)?",
+    method=r"\w+",
+    chunk=r"\d+",
+
+
+onstart:
+    check_room("results")
