@@ -38,10 +38,10 @@ class Journal:
     """Append-only file of evaluations; use it as a context manager.
 
     Each record is a header (magic, length, CRC-32 of the payload) and a payload: a line of JSON
-    with the shapes, then design, loss, gradient and further numbers as little-endian doubles. A damaged
-    or incomplete tail is cut off at the last good record. A design that differs from the recorded
-    one in any bit means that the code or the machine has changed since: the rest of the journal is
-    then of no use, it is cut off with a warning, and the run continues by computing.
+    with the shapes, then design, loss, gradient and further numbers as little-endian doubles. A
+    damaged or incomplete tail is cut off at the last good record. A design that differs from the
+    recorded one in any bit means that the code or the machine has changed since: the rest of the
+    journal is then of no use, it is cut off with a warning, and the run continues by computing.
 
     Args:
         path: the file; its folder must exist.

@@ -1,0 +1,419 @@
+"""Compiled element loops: energy, gradient, tangent, and mixed derivatives of a whole network.
+
+Derived by hand from sim/energy.py and tested against its automatic derivatives. With d the current
+ligament vector, n and t its unit tangent and normal, L its length and gamma its shear angle,
+
+    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta kappa,
+
+and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a - r_a).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+compiled = njit(cache=True, nogil=True, error_model="numpy")
+"""Every kernel is compiled once, cached on disk, and runs without the interpreter's lock."""
+
+
+class Network(NamedTuple):
+    """Arrays of one structure as the kernels take them.
+
+    Attributes:
+        unit: (n_ligaments, 2) units that each ligament joins.
+        arm: (n_ligaments, 2, 2) arm of either end, mm.
+        vector: (n_ligaments, 2) reference ligament vector, mm.
+        void: (n_ligaments, 2) reference void angles, rad.
+        law: (n_ligaments, 3) axial, shear, bending stiffness.
+        contact: (n_ligaments, 3) contact stiffness, barrier and cutoff angle.
+        touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip contact.
+    """
+
+    unit: Ints
+    arm: Floats
+    vector: Floats
+    void: Floats
+    law: Floats
+    contact: Floats
+    touching: Ints
+
+
+@compiled
+def _trigonometry(motion, turn):
+    """Fills ``turn`` (n_units, 4): cos and sin of all rotations, then of their halves."""
+    for unit in range(turn.shape[0]):
+        half = 0.5 * motion[3 * unit + 2]
+        c, s = math.cos(half), math.sin(half)
+        turn[unit, 0] = (c - s) * (c + s)
+        turn[unit, 1] = 2.0 * s * c
+        turn[unit, 2] = c
+        turn[unit, 3] = s
+
+
+@compiled
+def _kinematics(motion, turn, net, k):
+    """Rotated arms of ligament k, its current vector, length, rest length and shear angle."""
+    a, b = net.unit[k, 0], net.unit[k, 1]
+    ca, sa, cb, sb = turn[a, 0], turn[a, 1], turn[b, 0], turn[b, 1]
+    pax = ca * net.arm[k, 0, 0] - sa * net.arm[k, 0, 1]
+    pay = sa * net.arm[k, 0, 0] + ca * net.arm[k, 0, 1]
+    pbx = cb * net.arm[k, 1, 0] - sb * net.arm[k, 1, 1]
+    pby = sb * net.arm[k, 1, 0] + cb * net.arm[k, 1, 1]
+    vx, vy = net.vector[k, 0], net.vector[k, 1]
+    dx = vx + (motion[3 * b] + pbx - net.arm[k, 1, 0]) - (motion[3 * a] + pax - net.arm[k, 0, 0])
+    dy = (
+        vy
+        + (motion[3 * b + 1] + pby - net.arm[k, 1, 1])
+        - (motion[3 * a + 1] + pay - net.arm[k, 0, 1])
+    )
+    ch = turn[a, 2] * turn[b, 2] - turn[a, 3] * turn[b, 3]
+    sh = turn[a, 3] * turn[b, 2] + turn[a, 2] * turn[b, 3]
+    ex, ey = ch * vx - sh * vy, sh * vx + ch * vy
+    shear = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
+    length = math.sqrt(dx * dx + dy * dy)
+    return pax, pay, pbx, pby, dx, dy, length, math.sqrt(vx * vx + vy * vy), shear
+
+
+@compiled
+def _forces(net, k, dx, dy, length, rest, shear, bend):
+    """dW/dd (2) and dW/dtheta of either unit at fixed d."""
+    nx, ny = dx / length, dy / length
+    tension = net.law[k, 0] * (length - rest)
+    torque = net.law[k, 1] * rest * rest * shear
+    gx = tension * nx - torque * ny / length
+    gy = tension * ny + torque * nx / length
+    moment = net.law[k, 2] * bend
+    return gx, gy, -0.5 * torque - moment, -0.5 * torque + moment
+
+
+@compiled
+def _contact(angle, stiffness, barrier, cutoff):
+    """Energy, slope and curvature of one void; infinite energy beyond the barrier."""
+    if angle >= cutoff:
+        return 0.0, 0.0, 0.0
+    width = cutoff - barrier
+    x = (angle - cutoff) / width
+    if x <= -1.0:
+        return np.inf, 0.0, 0.0
+    rest = 1.0 - x * x
+    scale = 0.5 * stiffness
+    return (
+        scale * width * width * x * x / rest,
+        scale * width * 2.0 * x / (rest * rest),
+        scale * (2.0 + 6.0 * x * x) / (rest * rest * rest),
+    )
+
+
+@compiled
+def gradient(motion, net, turn, out):
+    """Fills the energy gradient ``out`` (3 n_units,); returns strain and contact energy, N mm."""
+    _trigonometry(motion, turn)
+    out[:] = 0.0
+    strain_energy = 0.0
+    for k in range(net.unit.shape[0]):
+        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
+        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
+        bend = motion[b + 2] - motion[a + 2]
+        gx, gy, wa, wb = _forces(net, k, dx, dy, length, rest, shear, bend)
+        strain_energy += 0.5 * (
+            net.law[k, 0] * (length - rest) ** 2
+            + net.law[k, 1] * (rest * shear) ** 2
+            + net.law[k, 2] * bend * bend
+        )
+        out[a] -= gx
+        out[a + 1] -= gy
+        out[a + 2] += wa + gx * pay - gy * pax
+        out[b] += gx
+        out[b + 1] += gy
+        out[b + 2] += wb - gx * pby + gy * pbx
+    contact_energy = 0.0
+    for k in net.touching:
+        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
+        turned = motion[a] - motion[b]
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            energy, slope, _ = _contact(
+                net.void[k, side] + sign * turned,
+                net.contact[k, 0],
+                net.contact[k, 1],
+                net.contact[k, 2],
+            )
+            contact_energy += energy
+            out[a] += sign * slope
+            out[b] -= sign * slope
+    return strain_energy, contact_energy
+
+
+@compiled
+def ligament_energies(motion, net, turn, out):
+    """Fills the strain energy ``out`` (n_ligaments,) of every ligament, without contact, N mm."""
+    _trigonometry(motion, turn)
+    for k in range(net.unit.shape[0]):
+        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
+        _, _, _, _, _, _, length, rest, shear = _kinematics(motion, turn, net, k)
+        bend = motion[b + 2] - motion[a + 2]
+        out[k] = 0.5 * (
+            net.law[k, 0] * (length - rest) ** 2
+            + net.law[k, 1] * (rest * shear) ** 2
+            + net.law[k, 2] * bend * bend
+        )
+
+
+@compiled
+def _second(net, k, dx, dy, length, rest, shear):
+    """Second derivatives of W: d d (xx, xy, yy) and d theta (x, y); theta theta is constant."""
+    nx, ny = dx / length, dy / length
+    axial, torsion = net.law[k, 0], net.law[k, 1] * rest * rest
+    along = axial
+    across = axial * (length - rest) / length + torsion / (length * length)
+    mixed = -torsion * shear / (length * length)
+    hxx = along * nx * nx + across * ny * ny - 2.0 * mixed * nx * ny
+    hyy = along * ny * ny + across * nx * nx + 2.0 * mixed * nx * ny
+    hxy = (along - across) * nx * ny + mixed * (nx * nx - ny * ny)
+    return hxx, hxy, hyy, 0.5 * torsion * ny / length, -0.5 * torsion * nx / length
+
+
+@compiled
+def tangent(motion, net, turn, free, band):
+    """Adds the energy's Hessian among the free dofs to a lower band ``band[column, row - column]``.
+
+    ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
+    """
+    _trigonometry(motion, turn)
+    block = np.empty((6, 6))
+    place = np.empty(6, dtype=np.int64)
+    for k in range(net.unit.shape[0]):
+        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
+        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
+        bend = motion[b + 2] - motion[a + 2]
+        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
+        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+        torsion = 0.25 * net.law[k, 1] * rest * rest
+        bending = net.law[k, 2]
+        # dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx)
+        hax, hay = hxx * pay - hxy * pax, hxy * pay - hyy * pax
+        hbx, hby = -hxx * pby + hxy * pbx, -hxy * pby + hyy * pbx
+        block[0, 0] = hxx
+        block[1, 0] = hxy
+        block[1, 1] = hyy
+        block[2, 0] = -hax - mx
+        block[2, 1] = -hay - my
+        block[2, 2] = (
+            pay * hax
+            - pax * hay
+            + 2.0 * (mx * pay - my * pax)
+            + torsion
+            + bending
+            + gx * pax
+            + gy * pay
+        )
+        block[3, 0] = -hxx
+        block[3, 1] = -hxy
+        block[3, 2] = hax + mx
+        block[3, 3] = hxx
+        block[4, 0] = -hxy
+        block[4, 1] = -hyy
+        block[4, 2] = hay + my
+        block[4, 3] = hxy
+        block[4, 4] = hyy
+        block[5, 0] = -hbx - mx
+        block[5, 1] = -hby - my
+        block[5, 2] = (
+            pay * hbx
+            - pax * hby
+            + (mx * pay - my * pax)
+            + (-mx * pby + my * pbx)
+            + torsion
+            - bending
+        )
+        block[5, 3] = hbx + mx
+        block[5, 4] = hby + my
+        block[5, 5] = (
+            -pby * hbx
+            + pbx * hby
+            + 2.0 * (-mx * pby + my * pbx)
+            + torsion
+            + bending
+            - gx * pbx
+            - gy * pby
+        )
+        for m in range(3):
+            place[m] = free[a + m]
+            place[3 + m] = free[b + m]
+        for row in range(6):
+            i = place[row]
+            if i < 0:
+                continue
+            for column in range(row + 1):
+                j = place[column]
+                if j < 0:
+                    continue
+                if i >= j:
+                    band[j, i - j] += block[row, column]
+                else:
+                    band[i, j - i] += block[row, column]
+    for k in net.touching:
+        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
+        curvature = _contact_curvature(motion, net, k)
+        if curvature == 0.0:
+            continue
+        i, j = free[a], free[b]
+        if i >= 0:
+            band[i, 0] += curvature
+        if j >= 0:
+            band[j, 0] += curvature
+        if i >= 0 and j >= 0:
+            band[min(i, j), abs(i - j)] -= curvature
+
+
+@compiled
+def _contact_curvature(motion, net, k):
+    """Second derivative of both voids' contact energy in the relative rotation."""
+    turned = motion[3 * net.unit[k, 0] + 2] - motion[3 * net.unit[k, 1] + 2]
+    total = 0.0
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        _, _, curvature = _contact(
+            net.void[k, side] + sign * turned,
+            net.contact[k, 0],
+            net.contact[k, 1],
+            net.contact[k, 2],
+        )
+        total += curvature
+    return total
+
+
+@compiled
+def hessian_product(motion, net, turn, direction, out):
+    """Fills ``out`` (3 n_units,) with the Hessian times ``direction``, over all dofs."""
+    _trigonometry(motion, turn)
+    out[:] = 0.0
+    for k in range(net.unit.shape[0]):
+        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
+        la, lb = direction[a + 2], direction[b + 2]
+        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
+        bend = motion[b + 2] - motion[a + 2]
+        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
+        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+        torsion = 0.25 * net.law[k, 1] * rest * rest
+        bending = net.law[k, 2]
+        ex = direction[b] - direction[a] - pby * lb + pay * la
+        ey = direction[b + 1] - direction[a + 1] + pbx * lb - pax * la
+        fx = hxx * ex + hxy * ey + mx * (la + lb)
+        fy = hxy * ex + hyy * ey + my * (la + lb)
+        common = mx * ex + my * ey + torsion * (la + lb)
+        out[a] -= fx
+        out[a + 1] -= fy
+        out[a + 2] += (
+            fx * pay - fy * pax + common + bending * (la - lb) + (gx * pax + gy * pay) * la
+        )
+        out[b] += fx
+        out[b + 1] += fy
+        out[b + 2] += (
+            -fx * pby + fy * pbx + common + bending * (lb - la) - (gx * pbx + gy * pby) * lb
+        )
+    for k in net.touching:
+        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
+        moment = _contact_curvature(motion, net, k) * (direction[a] - direction[b])
+        out[a] += moment
+        out[b] -= moment
+
+
+class Sensitivity(NamedTuple):
+    """Derivatives with respect to a network's parameters, shaped as in ``Network``.
+
+    Attributes:
+        arm, vector, void, law: as there.
+        contact: (n_ligaments,) of the contact stiffness alone.
+    """
+
+    arm: Floats
+    vector: Floats
+    void: Floats
+    law: Floats
+    contact: Floats
+
+
+@compiled
+def mixed(motion, net, turn, direction, which, out):
+    """Adds d/dp of (``direction`` . dE/dmotion) to ``out`` for the ligaments in ``which``."""
+    _trigonometry(motion, turn)
+    for k in which:
+        ua, ub = net.unit[k, 0], net.unit[k, 1]
+        a, b = 3 * ua, 3 * ub
+        la, lb = direction[a + 2], direction[b + 2]
+        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
+        bend = motion[b + 2] - motion[a + 2]
+        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
+        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+        ex = direction[b] - direction[a] - pby * lb + pay * la
+        ey = direction[b + 1] - direction[a + 1] + pbx * lb - pax * la
+        fx = hxx * ex + hxy * ey + mx * (la + lb)
+        fy = hxy * ex + hyy * ey + my * (la + lb)
+        ca, sa, cb, sb = turn[ua, 0], turn[ua, 1], turn[ub, 0], turn[ub, 1]
+        # d moves by (I - R_a) dr_a and (R_b - I) dr_b; the arms also turn with the direction
+        hx, hy = fx + la * gy, fy - la * gx
+        out.arm[k, 0, 0] += fx - (ca * hx + sa * hy)
+        out.arm[k, 0, 1] += fy - (-sa * hx + ca * hy)
+        hx, hy = fx + lb * gy, fy - lb * gx
+        out.arm[k, 1, 0] += cb * hx + sb * hy - fx
+        out.arm[k, 1, 1] += -sb * hx + cb * hy - fy
+
+        nx, ny = dx / length, dy / length
+        stretching = nx * ex + ny * ey
+        shearing = (nx * ey - ny * ex) / length - 0.5 * (la + lb)
+        vx, vy = net.vector[k, 0], net.vector[k, 1]
+        by_rest = -net.law[k, 0] * stretching + 2.0 * net.law[k, 1] * rest * shear * shearing
+        by_direction = -net.law[k, 1] * shearing
+        out.vector[k, 0] += fx + by_rest * vx / rest - by_direction * vy
+        out.vector[k, 1] += fy + by_rest * vy / rest + by_direction * vx
+        out.law[k, 0] += (length - rest) * stretching
+        out.law[k, 1] += rest * rest * shear * shearing
+        out.law[k, 2] += bend * (lb - la)
+
+        turned, turning = motion[a + 2] - motion[b + 2], la - lb
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            stiffness = net.contact[k, 0]
+            angle = net.void[k, side] + sign * turned
+            if angle >= net.contact[k, 2]:
+                continue
+            _, slope, curvature = _contact(angle, stiffness, net.contact[k, 1], net.contact[k, 2])
+            out.void[k, side] += sign * curvature * turning
+            out.contact[k] += sign * slope / stiffness * turning
+
+
+@compiled
+def smallest_void(motion, net):
+    """Smallest distance of a void angle from its barrier (rad) and the ligament it belongs to."""
+    smallest, where = np.inf, -1
+    for k in range(net.unit.shape[0]):
+        turned = motion[3 * net.unit[k, 0] + 2] - motion[3 * net.unit[k, 1] + 2]
+        margin = min(net.void[k, 0] + turned, net.void[k, 1] - turned) - net.contact[k, 1]
+        if margin < smallest:
+            smallest, where = margin, k
+    return smallest, where
+
+
+@compiled
+def barrier_step(motion, net, step):
+    """Largest multiple of ``step`` (3 n_units,) before a void reaches its barrier; exact."""
+    largest = np.inf
+    for k in net.touching:
+        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
+        turned, turning = motion[a] - motion[b], step[a] - step[b]
+        if turning < 0.0:
+            room = net.void[k, 0] + turned - net.contact[k, 1]
+            largest = min(largest, room / -turning)
+        elif turning > 0.0:
+            room = net.void[k, 1] - turned - net.contact[k, 1]
+            largest = min(largest, room / turning)
+    return largest
