@@ -1,0 +1,89 @@
+"""A fact: one number of a report, beside the number that the paper quotes, and where it is from."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+ABSENT = "—"
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One line of a table of facts.
+
+    `value` is in `unit` ("1" if it has none, "%" for a share in hundredths); `ours` and `paper` are
+    the same numbers in words, `paper` a dash where it quotes none.
+    """
+
+    key: str
+    label: str
+    value: float
+    unit: str
+    ours: str
+    paper: str = ABSENT
+    note: str = ""
+    group: str = ""
+
+
+def number(
+    key: str,
+    label: str,
+    value: float,
+    unit: str = "1",
+    *,
+    digits: int = 4,
+    paper: str = ABSENT,
+    note: str = "",
+) -> Fact:
+    """Fact whose wording is the value to `digits` significant digits and its unit."""
+    return Fact(key, label, value, unit, worded(value, unit, digits), paper, note)
+
+
+def share(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
+    """Fact of a share given as a fraction of one, shown in per cent to a tenth."""
+    return Fact(key, label, 100.0 * value, "%", percent(value), paper, note)
+
+
+def grouped(group: str, facts: Iterable[Fact]) -> list[Fact]:
+    """The same facts under one heading."""
+    return [replace(fact, group=group) for fact in facts]
+
+
+def worded(value: float, unit: str, digits: int) -> str:
+    """Number and unit as they are printed; tiny rounding leftovers are zero."""
+    text = "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+    text = text.replace("-", "−")
+    return text + {"1": "", "deg": "°"}.get(unit, f" {unit}")
+
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def percent(value: float) -> str:
+    """Fraction of one as per cent to a tenth."""
+    return f"{100 * value:.1f} %".replace("-", "−")
+
+
+def write_json(facts: Sequence[Fact], path: Path) -> None:
+    """Facts as a list of objects, in the order of the table; a value that is not finite is null."""
+    records = [
+        asdict(fact) | {"value": fact.value if math.isfinite(fact.value) else None}
+        for fact in facts
+    ]
+    path.write_text(json.dumps(records, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+
+
+def write_csv(facts: Sequence[Fact], path: Path) -> None:
+    """Facts as a table, one a line."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, list(asdict(facts[0])), lineterminator="\n")
+        table.writeheader()
+        table.writerows(asdict(fact) for fact in facts)

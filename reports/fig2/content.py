@@ -1,0 +1,117 @@
+"""The page of Figure 2: its words and its animation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from reports import measures, style
+from reports.facts import Fact
+from reports.fig2.facts import MONITORED
+from reports.page import Page, Source, Table, source
+from reports.player import Axis, Clip, Disc, Field, payload, quantisation_error
+from reports.scene import Scene
+from reports.structure import DRIVEN, from_dataset, middle_of_top_edge
+
+HEADLINE = ("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max")
+FIGURE_FILES = ("fig2.pdf", "fig2.svg", "fig2.png")
+
+CAPTION = (
+    "<b>a</b> Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
+    "is the drive, the dashed circle bounds the cloak. "
+    "<b>b</b> Loss against evaluation: mean over the load angles (thick) and each angle (thin); "
+    "rejected evaluations are dots, infeasible ones pale, circles the best feasible designs. "
+    "<b>c</b> Snapshots over the last drive cycle at true size, coloured by |U|. "
+    "<b>d</b> Vertical displacement of the middle unit of the top edge; dots mark the snapshots. "
+    "<b>e</b> Loss over loading angle and frequency; stars mark the loads designed for."
+)
+
+
+def animation(scene: Scene, response: xr.Dataset) -> dict[str, Any]:
+    """The player's data: altered and cloaked structures under every load."""
+    clips = []
+    for name in ("altered", "cloaked"):
+        part = response.sel(structure=name)
+        structure = from_dataset(part, scene.spacing)
+        motion = part["displacement"].transpose("case", "time", "unit", "dof").values
+        colour, marker = style.STRUCTURE_COLOURS[name], middle_of_top_edge(structure)
+        clips.append(Clip(name.capitalize(), colour, structure, motion, marker))
+    angles = [f"α = {angle:g}°" for angle in response["direction"].values]
+    speeds = {"¼ of real time": 0.25, "⅛": 0.125, "½": 0.5, "real time": 1.0}
+    axis = Axis("t", "s", response["time"].values, 3, True, speeds)
+    discs = [Disc(*scene.middle, radius, style.CLOAKED) for radius in scene.radii]
+    data = payload(axis, angles, clips, _fields(scene, clips), discs)
+    start = angles[measures.nearest_case(response, MONITORED)]
+    return data | {"start": start, "pad": scene.spacing}
+
+
+def _fields(scene: Scene, clips: Sequence[Clip]) -> list[Field]:
+    others = clips[0].structure.support != DRIVEN
+    motion = np.concatenate([clip.motion[:, :, others] for clip in clips])
+    size = float(np.nanmax(np.linalg.norm(motion / scene.scale, axis=-1)))
+    rise, turn = (float(np.nanmax(np.abs(motion[..., k]))) for k in (1, 2))
+    scale = (scene.spacing, scene.spacing, 1.0)
+    degrees = 180.0 / np.pi
+    rise, turn = _round_up(rise), _round_up(degrees * turn)
+    return [
+        Field("norm", "|U|", "", 1.0, "magnitude", (0.0, _round_up(size)), scale),
+        Field("uy", "u_y", "mm", 1.0, "signed", (-rise, rise)),
+        Field("theta", "θ", "°", degrees, "signed", (-turn, turn)),
+    ]
+
+
+def _round_up(value: float) -> float:
+    """The next value of one significant digit, or two where the first is 1."""
+    if value <= 0:
+        return 1.0
+    step = 10.0 ** np.floor(np.log10(value))
+    step = step / 10.0 if value / step < 2.0 else step
+    return float(np.round(np.ceil(value / step - 1e-9) * step, 12))
+
+
+def build(
+    scene: Scene,
+    datasets: Mapping[str, xr.Dataset],
+    facts: Sequence[Fact],
+    tables: Sequence[Table],
+    svg: str,
+    draft: Sequence[str],
+) -> Page:
+    """The page; `datasets` are "design", "response" and "sweep"."""
+    player = animation(scene, datasets["response"])
+    by_key = {fact.key: fact for fact in facts}
+    shift, turn = quantisation_error(player)
+    frames = len(player["axis"]["values"]) * 3 // 16
+    problem = json.loads(datasets["design"].attrs["problem"])
+    return Page(
+        title=scene.title,
+        lead=(
+            f"{scene.columns} × {scene.rows} rotating units, driven at the centre with "
+            f"{scene.amplitude:g} mm at {scene.frequency:g} Hz, corners clamped. Figure 2 of "
+            "Bordiga et al., “Nonlinear mechanical metamaterial cloaks”, built from the datasets."
+        ),
+        figure_title="Figure 2. Shielding dynamic excitations",
+        caption=CAPTION,
+        svg=svg,
+        figure_files=FIGURE_FILES,
+        headline=[by_key[key] for key in HEADLINE],
+        facts=facts,
+        tables=tables,
+        player=player,
+        player_note=(
+            f"{frames} of {datasets['response'].sizes['time']} saved times, rounded to "
+            f"±{shift:.1g} mm and ±{turn:.1g} rad; between them the motion is interpolated. "
+            "The dot marks the unit of panel d."
+        ),
+        provenance=_provenance(datasets),
+        problem=json.dumps(problem, indent=1, sort_keys=True, ensure_ascii=False),
+        draft=draft,
+    )
+
+
+def _provenance(datasets: Mapping[str, xr.Dataset]) -> list[Source]:
+    return [source(f"{name}.nc", data) for name, data in datasets.items()]

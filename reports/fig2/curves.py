@@ -1,0 +1,160 @@
+"""Panels of Figure 2 that show curves: loss (b), motion of one unit (d), robustness map (e)."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import NDArray
+
+from reports import measures, style
+from reports.facts import percent
+from reports.fig2.facts import monitored, paper_loss
+from reports.fig2.structures import SnapshotRow
+from reports.scene import Scene
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-6
+"""Violation of a constraint (mm, rad) up to which an evaluation counts as feasible."""
+
+
+def loss_panel(axes: Axes, design: xr.Dataset) -> None:
+    """Panel (b): mean loss thick, each angle thin; what was rejected or infeasible is lighter."""
+    for method in design["method"].values:
+        history = design.sel({"method": method})
+        colour = style.METHOD_COLOURS.get(str(method), style.GREY)
+        _history(axes, history, colour, str(method).upper())
+    start = float(design["loss"].isel(method=0, evaluation=0))
+    target = paper_loss(start)
+    axes.axhline(target, color=style.GREY, lw=0.7, ls=(0, (4, 2)), zorder=1)
+    axes.set_yscale("log")
+    axes.set(xlabel="Evaluation", ylabel=r"Loss $J$", xlim=(0, None))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.set_ylim(0.55 * float(design["loss"].min()), None)
+    axes.annotate(
+        "paper’s −70 %",
+        (1.0, target),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, 1.5),
+        textcoords="offset points",
+        ha="right",
+        va="bottom",
+        fontsize=style.SMALL,
+        color=style.GREY,
+    )
+    axes.legend(loc="upper right", borderaxespad=0.0)
+
+
+def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
+    loss = history["loss"].values
+    step = np.arange(loss.size)
+    done = np.isfinite(loss)
+    accepted = done & (history["accepted"].values > 0)
+    good = accepted & (history["violation"].values <= FEASIBLE)
+    for curve in history["loss_case"].transpose("case", "evaluation").values:
+        axes.plot(step[accepted], curve[accepted], color=colour, lw=0.45, alpha=0.5, zorder=2)
+    axes.plot(step[accepted], loss[accepted], color=colour, lw=1.4, alpha=0.35, zorder=3)
+    feasible = np.where(good, loss, np.nan)[accepted]
+    axes.plot(step[accepted], feasible, color=colour, lw=1.4, label=name, zorder=4)
+    outside = done & ~good
+    axes.plot(step[outside], loss[outside], ".", color=colour, ms=2.4, mew=0, alpha=0.4, zorder=2)
+    at, best = int(history["best_evaluation"]), float(history["best_loss"])
+    axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
+    axes.annotate(
+        f"{best:.3f}",
+        (at, best),
+        xytext=(0, -4.5),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        fontsize=style.SMALL,
+        color=colour,
+    )
+
+
+def motion_panel(axes: Axes, scene: Scene, response: xr.Dataset, rows: list[SnapshotRow]) -> None:
+    """Panel (d): u_y of the middle unit of the top edge; peak-to-peak values and reduction."""
+    series = monitored(scene, response)
+    time = series["time"].values
+    span = measures.peak_to_peak(series, float(time[-1]))
+    axes.axhline(0.0, color=style.PALE, lw=0.5, zorder=1)
+    for k, name in enumerate(("altered", "cloaked")):
+        curve = series.sel(structure=name).values
+        colour = style.STRUCTURE_COLOURS[name]
+        axes.plot(time, curve, color=colour, lw=1.2, label=name.capitalize(), zorder=3 + k)
+        _span_arrow(
+            axes, time[-1] * (1.2 - 0.11 * k), curve, colour, float(span.sel(structure=name))
+        )
+    for row in rows:
+        curve = np.interp(row.time, time, series.sel(structure=row.name).values)
+        axes.plot(
+            row.time,
+            curve,
+            "o",
+            ms=2.8,
+            mfc=style.STRUCTURE_COLOURS[row.name],
+            mec="white",
+            mew=0.4,
+            zorder=6,
+        )
+    end = float(time[-1])
+    limit = 1.45 * float(np.abs(series).max())
+    axes.set(xlabel="Time $t$ (s)", ylabel="$u_y$ (mm)", xlim=(0, 1.27 * end), ylim=(-limit, limit))
+    axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, end + 1e-9, scene.period / 2))))
+    axes.spines["bottom"].set_bounds(0, end)
+    axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
+    axes.legend(loc="upper left", ncols=2, borderaxespad=0.0)
+    axes.text(
+        1.0,
+        1.0,
+        f"peak-to-peak −{percent(measures.reduction(span))}",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=style.TEXT,
+    )
+
+
+def _span_arrow(axes: Axes, at: float, curve: Array, colour: str, span: float) -> None:
+    """Bar from the lowest to the highest value of a curve, with its length."""
+    low, high = float(curve.min()), float(curve.max())
+    caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (at, high), (at, low), arrowprops=caps | {"color": colour, "lw": 0.8})
+    axes.annotate(
+        f"{span:.2f} mm",
+        (at, high),
+        xytext=(0, 1.5),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=style.SMALL,
+        color=colour,
+    )
+
+
+def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: Scene, sweep: xr.Dataset) -> None:
+    """Panel (e): loss over loading angle and frequency, stars at the loads designed for."""
+    loss = sweep["loss"].transpose("frequency", "direction")
+    angle, rate = sweep["direction"].values, sweep["frequency"].values
+    top = float(loss.max())
+    levels = MaxNLocator(9, steps=[1, 2, 2.5, 5, 10]).tick_values(float(loss.min()), top)
+    filled = axes.contourf(angle, rate, loss.values, levels, cmap=style.MAGNITUDE)
+    axes.contour(angle, rate, loss.values, levels, colors="white", linewidths=0.35)
+    failed = np.argwhere((sweep["status"].transpose("frequency", "direction") != "ok").values)
+    axes.plot(angle[failed[:, 1]], rate[failed[:, 0]], "x", color=style.INTACT, ms=3, mew=0.7)
+    loads = np.array(scene.directions)
+    rates = np.full(len(loads), scene.frequency)
+    axes.plot(
+        loads, rates, "*", ms=7, mfc=style.ALTERED, mec="white", mew=0.5, clip_on=False, zorder=10
+    )
+    axes.set(xlabel=r"Loading angle $\alpha$ (°)", ylabel="Frequency $f$ (Hz)")
+    axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, angle.max() + 1, 45))))
+    axes.yaxis.set_major_locator(FixedLocator(list(np.arange(rate.min(), rate.max() + 1, 2))))
+    axes.spines[["top", "right"]].set_visible(True)
+    figure.colorbar(filled, cax=bar).set_label(r"Loss $J$", labelpad=2.0)
+    bar.tick_params(length=1.5)

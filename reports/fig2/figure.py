@@ -1,0 +1,92 @@
+"""Figure 2 of the paper at a journal's two-column width, from the datasets of its study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from reports import style
+from reports.fig2.curves import loss_panel, map_panel, motion_panel
+from reports.fig2.structures import (
+    SnapshotRow,
+    problem_panel,
+    simulated_rows,
+    snapshots_panel,
+)
+from reports.scene import Scene
+from reports.structure import from_dataset
+
+TALLEST_SNAPSHOTS = 130.0
+"""Height in mm that the snapshots may take however many rows there are."""
+
+SNAPSHOT = 40.0
+"""Side of a snapshot in mm where there is room."""
+
+
+def build(
+    scene: Scene,
+    design: xr.Dataset,
+    response: xr.Dataset,
+    sweep: xr.Dataset,
+    recorded: Sequence[SnapshotRow] = (),
+    draft: bool = False,
+) -> Figure:
+    """The whole figure; rows of `recorded` snapshots stand above the simulated ones."""
+    simulated = simulated_rows(scene, response)
+    rows = [*recorded, *simulated]
+    snapshots = min(SNAPSHOT * len(rows), TALLEST_SNAPSHOTS)
+    top_c = 51.5
+    top_d = top_c + 8.5 + snapshots + 1.0
+    figure = style.page(top_d + 51.0)
+    _problem(figure, scene, design)
+    style.letter(figure, 123.0, 0.8, "b", "Optimisation")
+    loss_panel(style.place(figure, 133.5, 7.5, 43.5, 32.5), design)
+    style.letter(figure, 0.0, top_c, "c", "Response over one drive cycle, $α$ = 45°")
+    snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
+    style.letter(figure, 0.0, top_d, "d", "Middle unit of the top edge, $α$ = 45°")
+    motion_panel(style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0), scene, response, simulated)
+    style.letter(figure, 110.0, top_d, "e", "Robustness")
+    axes = style.place(figure, 119.5, top_d + 6.0, 43.5, 36.0)
+    map_panel(figure, axes, style.place(figure, 165.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
+    if draft:
+        mark_draft(figure)
+    return figure
+
+
+def _problem(figure: Figure, scene: Scene, design: xr.Dataset) -> None:
+    style.letter(figure, 0.0, 0.8, "a")
+    side = 40.0
+    radius = scene.radii[-1]
+    notes = {
+        "reference": f"{scene.columns} × {scene.rows} units, $s$ = {scene.spacing:g} mm",
+        "altered": f"$A$ = {scene.amplitude:g} mm, $f$ = {scene.frequency:g} Hz",
+        "cloaked": f"$R$ = {radius / scene.spacing:g}$s$ = {radius:g} mm",
+    }
+    for k, name in enumerate(("reference", "altered", "cloaked")):
+        vertices = "vertices" if name == "cloaked" else "vertices_initial"
+        axes = style.place(figure, k * (side + 0.6), 6.0, side, side)
+        problem_panel(axes, scene, from_dataset(design, scene.spacing, vertices), name)
+        axes.set_title(
+            name.capitalize(), color=style.STRUCTURE_COLOURS[name], fontsize=style.TITLE, pad=2.0
+        )
+        left = k * (side + 0.6) + side / 2
+        style.write(figure, left, 46.2, notes[name], ha="center", fontsize=style.SMALL)
+
+
+def mark_draft(figure: Figure) -> None:
+    """Says across the page that this is not the study itself."""
+    figure.text(
+        0.5,
+        0.5,
+        "DRAFT",
+        fontsize=110,
+        fontweight="bold",
+        color=style.ALTERED,
+        alpha=0.16,
+        rotation=45,
+        ha="center",
+        va="center",
+        zorder=100,
+    )

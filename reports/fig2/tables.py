@@ -1,0 +1,89 @@
+"""Data tables of Figure 2: what its curves and map show, as plain CSV."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from reports.page import Table
+from reports.scene import Scene
+from reports.structure import from_dataset, middle_of_top_edge
+
+Columns = dict[str, NDArray[Any]]
+
+
+def build(scene: Scene, design: xr.Dataset, response: xr.Dataset, sweep: xr.Dataset) -> list[Table]:
+    """All tables, in the order of the panels."""
+    return [
+        Table("design.csv", "vertices of the cloaked and of the initial design", vertices(design)),
+        Table("loss_history.csv", "loss against evaluation (panel b)", history(design)),
+        Table(
+            "top_edge.csv",
+            "motion of the middle unit of the top edge, every load case (panel d)",
+            top_edge(scene, response),
+        ),
+        Table("robustness.csv", "loss over loading angle and frequency (panel e)", robust(sweep)),
+    ]
+
+
+def vertices(design: xr.Dataset) -> Columns:
+    """One row a vertex, mm."""
+    shape = design["vertices"].transpose("unit", "vertex", "xy").values
+    initial = design["vertices_initial"].transpose("unit", "vertex", "xy").values
+    unit, vertex = np.nonzero(~np.isnan(shape[..., 0]))
+    return {
+        **{name: design[name].values[unit] for name in ("unit", "i", "j", "region")},
+        "vertex": vertex,
+        "x_mm": shape[unit, vertex, 0],
+        "y_mm": shape[unit, vertex, 1],
+        "x_initial_mm": initial[unit, vertex, 0],
+        "y_initial_mm": initial[unit, vertex, 1],
+    }
+
+
+def history(design: xr.Dataset) -> Columns:
+    """One row an evaluation."""
+    loss = design["loss"].transpose("method", "evaluation").values
+    cases = design["loss_case"].transpose("method", "evaluation", "case").values
+    method, evaluation = np.nonzero(np.isfinite(loss))
+    columns = {
+        "method": design["method"].values[method],
+        "evaluation": evaluation,
+        "J": loss[method, evaluation],
+    }
+    for k, angle in enumerate(design["direction"].values):
+        columns[f"J_{angle:g}deg"] = cases[method, evaluation, k]
+    for name in ("violation", "accepted"):
+        values = design[name].transpose("method", "evaluation").values
+        columns[name] = values[method, evaluation]
+    return columns
+
+
+def top_edge(scene: Scene, response: xr.Dataset) -> Columns:
+    """One row a time: ux, uy, theta of both structures under every load."""
+    unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
+    series = response["displacement"].isel(unit=unit)
+    columns = {"time_s": response["time"].values}
+    for name in response["structure"].values:
+        for case, angle in enumerate(response["direction"].values):
+            for dof, unit_name in (("ux", "mm"), ("uy", "mm"), ("theta", "rad")):
+                values = series.sel(structure=name, dof=dof).isel(case=case).values
+                columns[f"{name}_{angle:g}deg_{dof}_{unit_name}"] = values
+    return columns
+
+
+def robust(sweep: xr.Dataset) -> Columns:
+    """One row a point of the map."""
+    angle, rate = np.meshgrid(sweep["direction"], sweep["frequency"], indexing="ij")
+    columns = {"direction_deg": angle.ravel(), "frequency_Hz": rate.ravel()}
+    for column, name in (
+        ("J_cloaked", "loss"),
+        ("J_altered", "loss_altered"),
+        ("min_void_angle_rad", "min_void_angle"),
+        ("status", "status"),
+    ):
+        columns[column] = sweep[name].transpose("direction", "frequency").values.ravel()
+    return columns

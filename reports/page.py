@@ -1,0 +1,138 @@
+"""The page of a report: one HTML file that works from disk, without a network."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from reports.facts import Fact
+
+LARGEST_PAGE = 6_000_000
+"""Bytes that a page may have."""
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that lies beside the page as a CSV file and inside it as a download."""
+
+    name: str
+    text: str
+    columns: Mapping[str, NDArray[Any]]
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows without the heading."""
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def csv(self) -> bytes:
+        """The table as CSV: ten significant digits, empty where there is no value."""
+        lines = [",".join(self.columns)]
+        cells = ([_cell(value) for value in column] for column in self.columns.values())
+        lines += [",".join(row) for row in zip(*cells, strict=True)]
+        return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float | np.floating):
+        return "" if np.isnan(value) else f"{value:.10g}"
+    text = str(value)
+    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & set(',"\n') else text
+
+
+@dataclass(frozen=True)
+class Page:
+    """What a page shows. `caption` is HTML; `player` is reports.player's payload."""
+
+    title: str
+    lead: str
+    figure_title: str
+    caption: str
+    svg: str
+    figure_files: Sequence[str]
+    headline: Sequence[Fact]
+    facts: Sequence[Fact]
+    tables: Sequence[Table]
+    player: Mapping[str, Any]
+    player_note: str
+    provenance: Sequence[Source]
+    problem: str
+    draft: Sequence[str] = field(default_factory=tuple)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a part of the page is from: a dataset and its attributes."""
+
+    name: str
+    entries: Sequence[tuple[str, str]]
+
+
+def source(name: str, data: xr.Dataset) -> Source:
+    """Attributes of a dataset, except the problem, which the page shows once."""
+    kept = {str(key): value for key, value in data.attrs.items() if key != "problem"}
+    return Source(name, [(key, _plain(kept[key])) for key in sorted(kept)])
+
+
+def _plain(value: object) -> str:
+    """An attribute as text; JSON objects become lines of `key: value`."""
+    text = str(value)
+    if not text.startswith(("{", "[")):
+        return text
+    parsed = json.loads(text)
+    if isinstance(parsed, dict):
+        return "; ".join(f"{key}: {inner}" for key, inner in sorted(parsed.items()))
+    return "; ".join(str(item) for item in parsed)
+
+
+def render(page: Page) -> str:
+    """HTML of the page."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters["groupby_order"] = _in_order
+    values = dict(vars(page))
+    values["tables"] = [_link(table) for table in page.tables]
+    values["svg"] = _inline(page.svg)
+    # "</" would end the script element that holds the data.
+    values["player"] = json.dumps(page.player, ensure_ascii=False).replace("</", "<\\/")
+    return environment.get_template("page.html.j2").render(values)
+
+
+def _link(table: Table) -> dict[str, object]:
+    return {
+        "name": table.name,
+        "text": table.text,
+        "rows": table.n_rows,
+        "base64": base64.b64encode(table.csv).decode("ascii"),
+    }
+
+
+def _inline(svg: str) -> str:
+    """The SVG element without prologue and metadata, with coordinates to 0.001 pt."""
+    element = svg[svg.index("<svg") :]
+    element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
+    return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
+
+
+def _in_order(items: Iterable[Fact], attribute: str) -> list[dict[str, object]]:
+    """Items grouped by an attribute, groups in the order of their first member."""
+    groups: dict[str, list[Fact]] = {}
+    for item in items:
+        groups.setdefault(getattr(item, attribute), []).append(item)
+    return [{"name": name, "members": members} for name, members in groups.items()]

@@ -1,0 +1,185 @@
+"""Data of the page's animated player, for any motion of rigid units.
+
+The player (templates/player.js) shows one or several structures side by side, deformed at true
+size, and knows nothing of what moves them. Its data is one JSON object:
+
+    axis        {name, unit, values, digits, loops}: what the slider runs over. Time of a dynamic
+                study, or the load (a displacement, a strain) of a static one: `values` (n_frames,)
+                may be unevenly spaced, frames between them are interpolated linearly.
+    speeds      [{label, rate}]: axis units per second of playback; the first is the default.
+    cases       [label]: what the case menu offers (load angles, amplitudes, one entry for none).
+    structures  [{name, colour, centroid (n_units, 2), arm (n_vertices, 2), owner (n_vertices,),
+                ligaments (n_ligaments, 2) vertex numbers, clamped, driven, marker}]
+                with polygons contiguous in `arm`, mm from their centroid; marker: a unit or null.
+    motion      [structure][case] -> {step: [3], data}: `data` (n_frames, n_units, 3) int16;
+                displacement = step * data in mm, mm, rad; -32768 stands for "no data".
+    fields      [{key, label, unit, factor, scale (3,), map, limits}]: what may colour the units.
+                key "norm" is |u / scale|, else ux, uy or theta; shown times `factor`.
+    maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}] in mm.
+
+Arrays are base64 of little-endian float32, int32, int16 or uint8, decoded without a library.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import Colormap
+from numpy.typing import NDArray
+
+from reports import style
+from reports.structure import CLAMPED, DRIVEN, Structure, deformed
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 200
+"""Steps between frames that a page carries; more are thinned."""
+LARGEST_MOTION = 3_000_000
+"""Bytes that the quantised motion of all structures and cases may take before base64."""
+
+NO_DATA = -32768
+LARGEST_LEVEL = 32767
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What the slider runs over: values (n_frames,) in `unit`, shown with `digits` decimals."""
+
+    name: str
+    unit: str
+    values: Array
+    digits: int
+    loops: bool
+    speeds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Clip:
+    """One structure with its motion (n_cases, n_frames, n_units, 3) in mm, mm, rad."""
+
+    name: str
+    colour: str
+    structure: Structure
+    motion: Array
+    marker: int | None = None
+
+
+@dataclass(frozen=True)
+class Field:
+    """A scalar that colours the units; `limits` in the unit shown, after `factor`."""
+
+    key: str
+    label: str
+    unit: str
+    factor: float
+    colours: str
+    limits: tuple[float, float]
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Disc:
+    """A dashed circle, mm."""
+
+    x: float
+    y: float
+    radius: float
+    colour: str
+
+
+def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
+    """Frames, evenly strided, that fit the page at `n_values` int16 numbers a frame."""
+    room = max(1, min(MOST_STEPS, LARGEST_MOTION // (2 * n_values) - 1))
+    stride = max(1, -(-(n_frames - 1) // room))
+    return np.arange(0, n_frames, stride)
+
+
+def payload(
+    axis: Axis,
+    cases: Sequence[str],
+    clips: Sequence[Clip],
+    fields: Sequence[Field],
+    discs: Sequence[Disc] = (),
+) -> dict[str, Any]:
+    """The player's data as an object ready for JSON; frames are thinned to fit the page."""
+    n_values = sum(clip.motion[:, 0].size for clip in clips)
+    frames = kept_frames(len(axis.values), n_values)
+    return {
+        "axis": {
+            "name": axis.name,
+            "unit": axis.unit,
+            "digits": axis.digits,
+            "loops": axis.loops,
+            "values": encoded(axis.values[frames], "<f4"),
+        },
+        "speeds": [{"label": label, "rate": rate} for label, rate in axis.speeds.items()],
+        "cases": list(cases),
+        "structures": [_structure(clip) for clip in clips],
+        "motion": [[_quantised(case[frames]) for case in clip.motion] for clip in clips],
+        "fields": [_field(field) for field in fields],
+        "maps": {name: _levels(COLOUR_MAPS[name]) for name in sorted(COLOUR_MAPS)},
+        "circles": [vars(disc) for disc in discs],
+    }
+
+
+COLOUR_MAPS: dict[str, Colormap] = {"magnitude": style.MAGNITUDE, "signed": style.SIGNED}
+
+
+def encoded(values: NDArray[Any], dtype: str) -> str:
+    """Base64 of an array in C order, in the little-endian type `dtype`."""
+    return base64.b64encode(np.ascontiguousarray(values, dtype=dtype).tobytes()).decode("ascii")
+
+
+def quantisation_error(data: Mapping[str, Any]) -> tuple[float, float]:
+    """Largest rounding error of the motion in mm and in rad: half a step."""
+    steps = np.array([case["step"] for clip in data["motion"] for case in clip])
+    return 0.5 * float(steps[:, :2].max()), 0.5 * float(steps[:, 2].max())
+
+
+def _quantised(motion: Array) -> dict[str, Any]:
+    known = np.isfinite(motion)
+    largest = np.abs(np.where(known, motion, 0.0)).max(axis=(0, 1))
+    step = largest / LARGEST_LEVEL
+    divisor = np.where(step > 0, step, 1.0)
+    levels = np.where(known, np.rint(np.where(known, motion, 0.0) / divisor), NO_DATA)
+    return {"step": [float(value) for value in step], "data": encoded(levels, "<i2")}
+
+
+def _structure(clip: Clip) -> dict[str, Any]:
+    structure = clip.structure
+    present = ~np.isnan(structure.vertices[..., 0])
+    number = np.cumsum(present).reshape(present.shape) - 1
+    arm = (deformed(structure) - structure.centroid[:, None])[present]
+    ends = number[structure.ligament_unit, structure.ligament_vertex]
+    return {
+        "name": clip.name,
+        "colour": clip.colour,
+        "centroid": encoded(structure.centroid, "<f4"),
+        "arm": encoded(arm, "<f4"),
+        "owner": encoded(np.nonzero(present)[0], "<i4"),
+        "ligaments": encoded(ends, "<i4"),
+        "clamped": np.flatnonzero(structure.support == CLAMPED).tolist(),
+        "driven": np.flatnonzero(structure.support == DRIVEN).tolist(),
+        "marker": clip.marker,
+    }
+
+
+def _field(field: Field) -> dict[str, Any]:
+    return {
+        "key": field.key,
+        "label": field.label,
+        "unit": field.unit,
+        "factor": field.factor,
+        "scale": list(field.scale),
+        "map": field.colours,
+        "limits": list(field.limits),
+    }
+
+
+def _levels(colours: Colormap) -> str:
+    rgba = colours(np.linspace(0.0, 1.0, 256))
+    return encoded(np.rint(255 * rgba[:, :3]), "<u1")

@@ -1,0 +1,175 @@
+"""One plotting style for every figure: millimetres, fonts, colours, reproducible files.
+
+Figures are laid out in millimetres from the top-left corner of the page, so a panel has the size
+that it will have in print. Colour maps are straight in lightness and even in OKLab (Ottosson
+2020), hence readable in grey and with any colour vision. Saved files carry no date.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TWO_COLUMNS = 178.0
+"""Width of a journal's two columns, mm."""
+
+MM_PER_INCH = 25.4
+POINTS_PER_MM = 72.0 / MM_PER_INCH
+
+INTACT, ALTERED, CLOAKED = "#1a1a1a", "#e07b00", "#6f3fa0"
+STRUCTURE_COLOURS = {"intact": INTACT, "reference": INTACT, "altered": ALTERED, "cloaked": CLOAKED}
+METHOD_COLOURS = {"sqp": CLOAKED, "mma": "#1d7f78"}
+GREY, PALE = "#6b6f75", "#d4d7db"
+
+TEXT, SMALL, TITLE, PANEL = 7.0, 6.0, 7.5, 9.0
+"""Font sizes in points: labels, ticks and notes, titles, panel letters."""
+
+RC: dict[Any, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "mathtext.fontset": "dejavusans",
+    "font.size": TEXT,
+    "axes.titlesize": TITLE,
+    "axes.labelsize": TEXT,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "axes.linewidth": 0.5,
+    "axes.labelpad": 2.0,
+    "axes.edgecolor": INTACT,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.minor.width": 0.35,
+    "ytick.minor.width": 0.35,
+    "xtick.major.size": 2.2,
+    "ytick.major.size": 2.2,
+    "xtick.minor.size": 1.3,
+    "ytick.minor.size": 1.3,
+    "xtick.major.pad": 1.8,
+    "ytick.major.pad": 1.8,
+    "lines.linewidth": 1.0,
+    "lines.solid_capstyle": "round",
+    "patch.linewidth": 0.4,
+    "hatch.linewidth": 0.4,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.handletextpad": 0.5,
+    "legend.borderaxespad": 0.2,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "pdf.fonttype": 42,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "cloak",
+    "path.simplify": False,
+}
+
+_METADATA: dict[str, dict[str, str | None]] = {
+    "pdf": {"Creator": "cloak", "Producer": None, "CreationDate": None},
+    "svg": {"Creator": "cloak", "Date": None},
+    "png": {"Software": None},
+}
+
+_TO_LMS = np.array(
+    [
+        [0.4122214708, 0.5363325363, 0.0514459929],
+        [0.2119034982, 0.6806995451, 0.1073969566],
+        [0.0883024619, 0.2817188376, 0.6299787005],
+    ]
+)
+_TO_LAB = np.array(
+    [
+        [0.2104542553, 0.7936177850, -0.0040720468],
+        [1.9779984951, -2.4285922050, 0.4505937099],
+        [0.0259040371, 0.7827717662, -0.8086757660],
+    ]
+)
+
+
+def oklab(rgb: Array) -> Array:
+    """OKLab coordinates (..., 3) of sRGB colours (..., 3) in [0, 1]."""
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return np.cbrt(linear @ _TO_LMS.T) @ _TO_LAB.T
+
+
+def srgb(lab: Array) -> Array:
+    """SRGB colours (..., 3), clipped to [0, 1], of OKLab coordinates (..., 3)."""
+    linear = ((lab @ np.linalg.inv(_TO_LAB).T) ** 3) @ np.linalg.inv(_TO_LMS).T
+    linear = np.clip(linear, 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def colour_map(name: str, anchors: Sequence[str], levels: int = 256) -> ListedColormap:
+    """Colour map through `anchors` with equal OKLab distance between neighbouring levels."""
+    corners = oklab(np.array([to_rgb(anchor) for anchor in anchors]))
+    lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
+    at = np.linspace(0.0, 1.0, levels)
+    path = np.column_stack([np.interp(at, way, corners[:, k]) for k in range(3)])
+    return ListedColormap(srgb(path), name=name)
+
+
+MAGNITUDE = colour_map("magnitude", ["#eceff1", "#8cc4d2", "#2f86b4", "#17427f", "#0c1538"])
+"""From rest (pale) to large (dark): |U|, J and other sizes."""
+
+SIGNED = colour_map("signed", ["#0d3b70", "#5b9fce", "#efefee", "#d4845a", "#74240f"])
+"""Symmetric about zero (pale): u_x, u_y, theta."""
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Matplotlib's settings of this style, on top of its defaults, whatever the user's own are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(RC)
+        yield
+
+
+def page(height: float, width: float = TWO_COLUMNS) -> Figure:
+    """Empty figure of width x height mm."""
+    return Figure(figsize=(width / MM_PER_INCH, height / MM_PER_INCH))
+
+
+def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
+    """Axes whose frame lies `left`, `top` mm from the page's top-left corner."""
+    inches_wide, inches_high = figure.get_size_inches()
+    page_width, page_height = inches_wide * MM_PER_INCH, inches_high * MM_PER_INCH
+    bottom = page_height - top - height
+    return figure.add_axes(
+        (left / page_width, bottom / page_height, width / page_width, height / page_height)
+    )
+
+
+def write(figure: Figure, left: float, top: float, text: str, **style: str | float) -> None:
+    """Text whose top-left corner lies `left`, `top` mm from the page's top-left corner."""
+    inches_wide, inches_high = figure.get_size_inches()
+    settings: dict[str, Any] = {"ha": "left", "va": "top"} | style
+    x, y = left / (inches_wide * MM_PER_INCH), 1 - top / (inches_high * MM_PER_INCH)
+    figure.text(x, y, text, **settings)
+
+
+def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:
+    """Bold panel letter, and its title beside it."""
+    write(figure, left, top, name, fontsize=PANEL, fontweight="bold")
+    write(figure, left + 4.2, top + 0.45, title, fontsize=TITLE)
+
+
+def save(figure: Figure, stem: Path, dpi: int = 300) -> list[Path]:
+    """Write stem.pdf, stem.svg and stem.png; the same figure gives the same bytes."""
+    paths = []
+    for suffix, metadata in _METADATA.items():
+        path = stem.with_suffix(f".{suffix}")
+        figure.savefig(path, format=suffix, dpi=dpi, metadata=metadata)
+        paths.append(path)
+    return paths
