@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from sim.lattice import Floats, Ints
-from sim.optimise.qp import shortest_step
+from sim.optimise.qp import reachable, shortest_step
 
-ACTIVE = 1e-4
-"""A constraint (mm) or bound nearer than this to its limit may carry a multiplier."""
+MULTIPLIER = 1e-7
+"""Smallest multiplier, relative to the steepest slope, that is not rounding."""
 
 
 @dataclass(frozen=True)
@@ -19,10 +19,11 @@ class Stationarity:
     """Optimality of a design.
 
     Attributes:
-        residual: largest entry of the steepest admissible descent, relative to ``scale``; 0 at an
-            optimum.
-        active: ids of the constraints at their limits.
-        multipliers: (n_active,) their least-squares multipliers, >= 0.
+        residual: largest entry of the step (mm) that takes the design, pushed down the gradient by up
+            to 1 mm, back to its linearised constraints; 0 at an optimum, 1 where nothing is in the
+            way of the steepest slope.
+        active: ids of the constraints that carry a multiplier.
+        multipliers: (n_active,) theirs.
     """
 
     residual: float
@@ -39,10 +40,10 @@ def stationarity(
     upper: Floats,
     scale: float,
 ) -> Stationarity:
-    """Projects the steepest descent on the cone of admissible directions.
+    """Projected-gradient criterion |P(x - gradient / scale) - x|, zero exactly at KKT points.
 
-    Its length is the KKT residual min |gradient - jacobian^T multipliers| over multipliers >= 0 of
-    the active constraints and bounds (Moreau decomposition).
+    P is the projection on the linearised constraints and the bounds. At an optimum its multipliers
+    are those of the problem; elsewhere they are estimates.
 
     Args:
         gradient: (n,) of the loss.
@@ -53,13 +54,11 @@ def stationarity(
         upper: (n,) bounds.
         scale: slope that counts as steep, such as the largest entry of the first gradient.
     """
-    active = np.flatnonzero(values <= ACTIVE)
-    free_down = np.where(x - lower > ACTIVE, -np.inf, 0.0)
-    free_up = np.where(upper - x > ACTIVE, np.inf, 0.0)
-    found = shortest_step(
-        -gradient / scale, jacobian[active], np.zeros(len(active)), free_down, free_up
-    )
+    slope = gradient / scale
+    rows = reachable(values, jacobian, 2 * float(np.abs(slope).max(initial=0.0)))
+    found = shortest_step(-slope, jacobian[rows], -values[rows], lower - x, upper - x)
     if found is None:
-        steepest = float(np.abs(gradient).max()) / scale
-        return Stationarity(steepest, active, np.zeros(len(active)))
-    return Stationarity(float(np.abs(found.step).max()), active, scale * found.multipliers)
+        return Stationarity(float(np.abs(slope).max()), rows[:0], np.zeros(0))
+    priced = found.multipliers > MULTIPLIER
+    multipliers = scale * found.multipliers[priced]
+    return Stationarity(float(np.abs(found.step).max(initial=0.0)), rows[priced], multipliers)

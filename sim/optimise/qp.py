@@ -81,4 +81,5 @@ def _solution(solver: piqp.DenseSolver | piqp.SparseSolver, count: int) -> Quadr
 
 def reachable(values: Floats, jacobian: sp.csr_array, reach: float) -> np.ndarray:
     """Rows of a linearised constraint that some step of at most ``reach`` could violate."""
-    return np.flatnonzero(values < reach * np.asarray(abs(jacobian).sum(axis=1)).ravel())
+    steepest = np.asarray(abs(jacobian).sum(axis=1)).ravel()
+    return np.flatnonzero((steepest > 0) & (values < reach * steepest))

@@ -174,7 +174,8 @@ class Descent:
         place = project(self.problem, point.x + found.step, radius)
         if place is None:
             return None
-        predicted = self.model.reduction(point.gradient, place.x - point.x)
+        # The model of the Lagrangian already counts what the projection will cost.
+        predicted = self.model.reduction(point.gradient, found.step)
         return Trial(place, predicted, rows, found.multipliers) if predicted > 0 else None
 
     def _judge(self, trial: Trial, outcome: Point) -> bool:
