@@ -1,7 +1,7 @@
-"""Builds the report of Figure 2: PDF, SVG, PNG, page, facts and tables.
+"""Builds the report of a study: figure (PDF, SVG, PNG), page, facts and data tables.
 
-The files are made in a folder beside the wanted one and moved in one by one when all of them are
-whole, so that a reader never meets half a report. The same datasets give the same bytes.
+The files are made in a folder beside the wanted one and moved in when all of them are whole, so
+that a reader never meets half a report. The same datasets give the same bytes.
 """
 
 from __future__ import annotations
@@ -11,67 +11,94 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import xarray as xr
+from pipeline import cli
+from pipeline.errors import refusal
 
-from reports import facts as fact_files
-from reports import page, scene, style
-from reports.fig2 import content, figure, tables
-from reports.fig2 import facts as fig2_facts
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from reports.study import Study
+
+DATASETS = ("design", "response", "sweep")
 
 
-def write_report(datasets: Mapping[str, xr.Dataset], folder: Path) -> list[Path]:
-    """Write all files of the report into an existing `folder`; returns their paths."""
-    design, response, sweep = (datasets[name] for name in ("design", "response", "sweep"))
-    described = scene.of(design)
-    draft = scene.draft_reasons(described, response, sweep)
+def publish(study: Study, folder: Path) -> list[Path]:
+    """Make the report aside and move its files into `folder`, the page last.
+
+    Raises:
+        UserError: the folder is full, read-only or not ours.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with _aside(folder) as aside:
+            return [_moved(path, folder) for path in write_report(study, aside)]
+    except OSError as error:
+        raise refusal(folder, error) from error
+
+
+def write_report(study: Study, folder: Path) -> list[Path]:
+    """Write all files of the report into an existing `folder`; returns their paths, page last."""
+    from reports import facts as fact_files
+    from reports import page, style
+    from reports.fig2 import content, facts, figure, tables
+
     with style.styled():
-        drawing = figure.build(described, design, response, sweep, draft=bool(draft))
-        paths = style.save(drawing, folder / "fig2")
-    facts = fig2_facts.collect(described, design, response, sweep)
-    fact_files.write_json(facts, folder / "facts.json")
-    fact_files.write_csv(facts, folder / "facts.csv")
-    data_tables = tables.build(described, design, response, sweep)
-    for table in data_tables:
+        paths = style.save(figure.build(study), folder / study.name)
+    known = facts.collect(study)
+    fact_files.write_json(known, folder / "facts.json")
+    fact_files.write_csv(known, folder / "facts.csv")
+    data = tables.build(study)
+    for table in data:
         (folder / table.name).write_bytes(table.csv)
-    svg = (folder / "fig2.svg").read_text(encoding="utf-8")
-    html = page.render(content.build(described, datasets, facts, data_tables, svg, draft))
+    svg = (folder / f"{study.name}.svg").read_text(encoding="utf-8")
+    html = page.render(content.build(study, known, data, svg, [path.name for path in paths]))
     (folder / "index.html").write_text(html, encoding="utf-8")
-    names = ["facts.json", "facts.csv", *(table.name for table in data_tables), "index.html"]
+    names = ["facts.json", "facts.csv", *(table.name for table in data), "index.html"]
     return [*paths, *(folder / name for name in names)]
 
 
-def publish(datasets: Mapping[str, xr.Dataset], folder: Path) -> list[Path]:
-    """Write the report aside and move its files into `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+@contextmanager
+def _aside(folder: Path) -> Iterator[Path]:
+    """A new folder beside `folder`, gone at the end."""
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
     try:
-        for path in write_report(datasets, aside):
-            with path.open("rb") as file:
-                os.fsync(file.fileno())
-            path.replace(folder / path.name)
+        yield aside
     finally:
         shutil.rmtree(aside)
-    return sorted(folder.iterdir())
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Command line; see --help."""
-    parser = argparse.ArgumentParser(prog="python -m reports.build", description=__doc__)
-    parser.add_argument("--problem", type=Path, required=True, help="the study's problem.yaml")
-    for name in ("design", "response", "sweep"):
-        parser.add_argument(f"--{name}", type=Path, required=True, help=f"{name}.nc")
-    parser.add_argument("--out-dir", type=Path, required=True, help="folder of the report")
-    given = parser.parse_args(arguments)
-    datasets = {}
-    for name in ("design", "response", "sweep"):
-        with xr.open_dataset(getattr(given, name)) as opened:
-            datasets[name] = opened.load()
-    for path in publish(datasets, given.out_dir):
-        sys.stdout.write(f"{path}\n")
-    return 0
+def _moved(path: Path, folder: Path) -> Path:
+    """The file in `folder`, safe on the disk before it shows under its name."""
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+    return path.replace(folder / path.name)
+
+
+def _work(args: argparse.Namespace) -> None:
+    from reports import study
+
+    publish(
+        study.load(args.problem, args.preset, *(getattr(args, name) for name in DATASETS)),
+        args.out_dir,
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Build the report; returns the exit code."""
+    parser = cli.parser("reports.build", str(__doc__))
+    for name in DATASETS:
+        parser.add_argument(
+            f"--{name}", type=Path, required=True, metavar="NC", help=f"the {name} dataset"
+        )
+    parser.add_argument(
+        "--out-dir", type=Path, required=True, metavar="FOLDER", help="the report's folder"
+    )
+    return cli.run(_work, parser, argv)
 
 
 if __name__ == "__main__":

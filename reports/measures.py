@@ -7,7 +7,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from reports.scene import Scene
-from reports.structure import CLOAK, SOURCE, Structure
+from reports.structure import CLOAK, SOURCE, SURROUNDINGS, Structure
 
 Array = NDArray[np.float64]
 
@@ -82,6 +82,15 @@ def _best_fit(polygon: Array, other: Array) -> Array:
         for start in range(len(second))
     ]
     return min(tries, key=lambda distances: float(distances.sum()))
+
+
+def rim(structure: Structure) -> NDArray[np.bool_]:
+    """Cloak units (n_units,) that a ligament joins to a unit of the surroundings."""
+    region = structure.region[structure.ligament_unit]
+    across = (region == CLOAK) & (region[:, ::-1] == SURROUNDINGS)
+    found = np.zeros(structure.n_units, bool)
+    found[structure.ligament_unit[across]] = True
+    return found
 
 
 def porosity(structure: Structure, spacing: float, inside: NDArray[np.bool_]) -> float:

@@ -3,11 +3,13 @@
 The player (templates/player.js) shows one or several structures side by side, deformed at true
 size, and knows nothing of what moves them. Its data is one JSON object:
 
-    axis        {name, unit, values, digits, loops}: what the slider runs over. Time of a dynamic
-                study, or the load (a displacement, a strain) of a static one: `values` (n_frames,)
-                may be unevenly spaced, frames between them are interpolated linearly.
+    axis        {name, unit, values, digits, loops, shown, saved}: what the slider runs over. Time
+                of a dynamic study, or the load (a displacement, a strain) of a static one:
+                `values` (n_frames,) may be unevenly spaced, between them the motion is
+                interpolated linearly; `shown` of `saved` frames are there.
     speeds      [{label, rate}]: axis units per second of playback; the first is the default.
-    cases       [label]: what the case menu offers (load angles, amplitudes, one entry for none).
+    cases       [label]: what the load menu offers (angles, amplitudes; one entry: no menu);
+    start       the case shown first.
     structures  [{name, colour, centroid (n_units, 2), arm (n_vertices, 2), owner (n_vertices,),
                 ligaments (n_ligaments, 2) vertex numbers, clamped, driven, marker}]
                 with polygons contiguous in `arm`, mm from their centroid; marker: a unit or null.
@@ -15,7 +17,8 @@ size, and knows nothing of what moves them. Its data is one JSON object:
                 displacement = step * data in mm, mm, rad; -32768 stands for "no data".
     fields      [{key, label, unit, factor, scale (3,), map, limits}]: what may colour the units.
                 key "norm" is |u / scale|, else ux, uy or theta; shown times `factor`.
-    maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}] in mm.
+    maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}], pad: side of the squares
+                under clamped units; all in mm.
 
 Arrays are base64 of little-endian float32, int32, int16 or uint8, decoded without a library.
 """
@@ -92,10 +95,10 @@ class Disc:
 
 
 def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
-    """Frames, evenly strided, that fit the page at `n_values` int16 numbers a frame."""
-    room = max(1, min(MOST_STEPS, LARGEST_MOTION // (2 * n_values) - 1))
+    """Frames that fit the page at `n_values` int16 numbers each: every k-th, and the last."""
+    room = max(1, min(MOST_STEPS, LARGEST_MOTION // (2 * n_values) - 2))
     stride = max(1, -(-(n_frames - 1) // room))
-    return np.arange(0, n_frames, stride)
+    return np.union1d(np.arange(0, n_frames, stride), n_frames - 1)
 
 
 def payload(
@@ -104,6 +107,8 @@ def payload(
     clips: Sequence[Clip],
     fields: Sequence[Field],
     discs: Sequence[Disc] = (),
+    start: int = 0,
+    pad: float = 0.0,
 ) -> dict[str, Any]:
     """The player's data as an object ready for JSON; frames are thinned to fit the page."""
     n_values = sum(clip.motion[:, 0].size for clip in clips)
@@ -114,10 +119,14 @@ def payload(
             "unit": axis.unit,
             "digits": axis.digits,
             "loops": axis.loops,
+            "shown": len(frames),
+            "saved": len(axis.values),
             "values": encoded(axis.values[frames], "<f4"),
         },
         "speeds": [{"label": label, "rate": rate} for label, rate in axis.speeds.items()],
         "cases": list(cases),
+        "start": start,
+        "pad": pad,
         "structures": [_structure(clip) for clip in clips],
         "motion": [[_quantised(case[frames]) for case in clip.motion] for clip in clips],
         "fields": [_field(field) for field in fields],

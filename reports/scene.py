@@ -1,14 +1,16 @@
-"""What the figures need to know of a study's problem, read from the datasets themselves."""
+"""What the figures need to know of a problem, in their own units: mm, s, Hz and degrees."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+
+from pipeline.errors import UserError
+from pipeline.problem import Problem
+from pipeline.problem.drives import Harmonic, RampHarmonic
 
 Array = NDArray[np.float64]
 
@@ -18,7 +20,8 @@ class Scene:
     """A harmonically driven lattice.
 
     Lengths in mm, times in s, frequencies in Hz, directions in degrees. The loss is taken over
-    `horizon`; `radii` bound the cloak; `middle` is the lattice's centre.
+    `horizon`, with `weights` of the load cases; `radii` bound the cloak; `middle` is the lattice's
+    centre.
     """
 
     title: str
@@ -28,10 +31,10 @@ class Scene:
     amplitude: float
     frequency: float
     directions: tuple[float, ...]
+    weights: tuple[float, ...]
     horizon: float
     radii: tuple[float, ...]
     middle: tuple[float, float]
-    accuracy: str
 
     @property
     def period(self) -> float:
@@ -43,55 +46,70 @@ class Scene:
         """Divisors (3,) that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
         return np.array([self.spacing, self.spacing, 1.0])
 
+    def mean(self, values: xr.DataArray) -> xr.DataArray:
+        """Weighted mean over the load cases of values (..., case)."""
+        weights = xr.DataArray(np.array(self.weights), dims="case")
+        mean: xr.DataArray = (values * weights).sum("case") / float(np.sum(self.weights))
+        return mean
 
-def of(data: xr.Dataset) -> Scene:
-    """Scene described by the `problem` attribute of a dataset."""
-    problem = json.loads(data.attrs["problem"])
-    lattice, drive = problem["lattice"], problem["drive"]
-    spacing = float(lattice["spacing"])
-    sides = (lattice["columns"], lattice["rows"])
+
+def of(problem: Problem) -> Scene:
+    """Scene of a problem.
+
+    Raises:
+        UserError: the drive is not harmonic, so there are no cycles to show.
+    """
+    drive, lattice = problem.drive, problem.lattice
+    if not isinstance(drive, Harmonic | RampHarmonic):
+        raise UserError(
+            "this report is of a harmonic drive",
+            key="drive.kind",
+            value=drive.kind,
+            remedy="give kind: harmonic, or take the datasets without this report",
+        )
+    _, inner, outer = problem.cloak.bounds
     return Scene(
-        title=problem["title"],
-        columns=int(lattice["columns"]),
-        rows=int(lattice["rows"]),
-        spacing=spacing,
-        amplitude=float(drive["amplitude"]),
-        frequency=float(drive["frequency"]),
-        directions=tuple(round(float(np.degrees(angle)), 9) for angle in drive["directions"]),
-        horizon=_horizon(problem["horizon"], float(drive["frequency"])),
-        radii=_radii(problem["cloak"]),
-        middle=(0.5 * (sides[0] - 1) * spacing, 0.5 * (sides[1] - 1) * spacing),
-        accuracy=str(problem.get("solver", {}).get("accuracy", "default")),
+        title=problem.title,
+        columns=lattice.columns,
+        rows=lattice.rows,
+        spacing=lattice.spacing,
+        amplitude=drive.amplitude,
+        frequency=drive.frequency,
+        directions=tuple(round(float(np.degrees(angle)), 9) for angle in drive.directions),
+        weights=drive.case_weights,
+        horizon=problem.horizon_time,
+        radii=tuple(radius for radius in (inner, outer) if radius > 0),
+        middle=lattice.centre_site,
     )
-
-
-def _horizon(horizon: dict[str, Any], frequency: float) -> float:
-    if horizon.get("periods") is not None:
-        return float(horizon["periods"]) / frequency
-    return float(horizon["duration"])
-
-
-def _radii(cloak: dict[str, Any]) -> tuple[float, ...]:
-    if cloak.get("disc") is not None:
-        return (float(cloak["disc"]["radius"]),)
-    return (float(cloak["ring"]["inner"]), float(cloak["ring"]["outer"]))
-
-
-def draft_reasons(scene: Scene, response: xr.Dataset, sweep: xr.Dataset) -> list[str]:
-    """Why this is a quick look and not Figure 2 of the paper; empty if it is the full study."""
-    checks = {
-        f"{scene.columns}×{scene.rows} units instead of 15×15": scene.columns * scene.rows < 225,
-        f"{response.sizes['case']} load cases instead of 4": response.sizes["case"] < 4,
-        (
-            f"map of {sweep.sizes['direction']}×{sweep.sizes['frequency']} points instead of 13×15"
-        ): sweep.sizes["direction"] < 13 or sweep.sizes["frequency"] < 15,
-        "accuracy: draft": scene.accuracy == "draft",
-        f"{cycles(scene, response):.3g} drive cycles instead of 4": cycles(scene, response) < 3.99,
-    }
-    return [reason for reason, holds in checks.items() if holds]
 
 
 def cycles(scene: Scene, response: xr.Dataset) -> float:
     """Number of drive cycles that a response covers."""
     time = response["time"].values
     return float((time[-1] - time[0]) * scene.frequency)
+
+
+def draft_reasons(problem: Problem, study: Problem) -> list[str]:
+    """Where `problem`, a preset of `study`, is less than that; empty if it is of full size."""
+    reduced = [
+        f"{ours:g} {what} instead of {full:g}"
+        for (what, ours), full in zip(_sizes(problem).items(), _sizes(study).values(), strict=True)
+        if ours < full
+    ]
+    if problem.solver.accuracy == "draft":
+        reduced.append("accuracy of the solver: draft")
+    return reduced
+
+
+def _sizes(problem: Problem) -> dict[str, float]:
+    drive, sweep = problem.drive, problem.sweep
+    directions = drive.directions if isinstance(drive, Harmonic | RampHarmonic) else ()
+    sqp = problem.optimiser.methods.sqp
+    return {
+        "units": problem.lattice.columns * problem.lattice.rows,
+        "load angles": len(directions),
+        "evaluations of the design": sqp.evaluations if sqp else 0,
+        "drive cycles": problem.response.cycles if problem.response else 0,
+        "angles in the map": sweep.direction.points if sweep else 0,
+        "frequencies in the map": sweep.frequency.points if sweep else 0,
+    }

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from pipeline.problem import canonical_json, content_hash
 from reports import measures, style
 from reports.facts import Fact
 from reports.fig2.facts import MONITORED
@@ -16,9 +18,9 @@ from reports.page import Page, Source, Table, source
 from reports.player import Axis, Clip, Disc, Field, payload, quantisation_error
 from reports.scene import Scene
 from reports.structure import DRIVEN, from_dataset, middle_of_top_edge
+from reports.study import Study
 
 HEADLINE = ("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max")
-FIGURE_FILES = ("fig2.pdf", "fig2.svg", "fig2.png")
 
 CAPTION = (
     "<b>a</b> Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
@@ -44,9 +46,9 @@ def animation(scene: Scene, response: xr.Dataset) -> dict[str, Any]:
     speeds = {"¼ of real time": 0.25, "⅛": 0.125, "½": 0.5, "real time": 1.0}
     axis = Axis("t", "s", response["time"].values, 3, True, speeds)
     discs = [Disc(*scene.middle, radius, style.CLOAKED) for radius in scene.radii]
-    data = payload(axis, angles, clips, _fields(scene, clips), discs)
-    start = angles[measures.nearest_case(response, MONITORED)]
-    return data | {"start": start, "pad": scene.spacing}
+    start = measures.nearest_case(response, MONITORED)
+    fields = _fields(scene, clips)
+    return payload(axis, angles, clips, fields, discs, start=start, pad=scene.spacing)
 
 
 def _fields(scene: Scene, clips: Sequence[Clip]) -> list[Field]:
@@ -74,44 +76,56 @@ def _round_up(value: float) -> float:
 
 
 def build(
-    scene: Scene,
-    datasets: Mapping[str, xr.Dataset],
+    study: Study,
     facts: Sequence[Fact],
     tables: Sequence[Table],
     svg: str,
-    draft: Sequence[str],
+    figure_files: Sequence[str],
 ) -> Page:
-    """The page; `datasets` are "design", "response" and "sweep"."""
-    player = animation(scene, datasets["response"])
+    """The page of a study, of which everything else has been made."""
+    scene = study.scene
+    player = animation(scene, study.response)
     by_key = {fact.key: fact for fact in facts}
-    shift, turn = quantisation_error(player)
-    frames = len(player["axis"]["values"]) * 3 // 16
-    problem = json.loads(datasets["design"].attrs["problem"])
     return Page(
         title=scene.title,
         lead=(
             f"{scene.columns} × {scene.rows} rotating units, driven at the centre with "
-            f"{scene.amplitude:g} mm at {scene.frequency:g} Hz, corners clamped. Figure 2 of "
+            f"{scene.amplitude:g} mm at {scene.frequency:g} Hz, corners clamped: Figure 2 of "
             "Bordiga et al., “Nonlinear mechanical metamaterial cloaks”, built from the datasets."
         ),
-        figure_title="Figure 2. Shielding dynamic excitations",
+        figure_title="Shielding dynamic excitations",
         caption=CAPTION,
         svg=svg,
-        figure_files=FIGURE_FILES,
+        figure_files=figure_files,
         headline=[by_key[key] for key in HEADLINE],
         facts=facts,
         tables=tables,
         player=player,
-        player_note=(
-            f"{frames} of {datasets['response'].sizes['time']} saved times, rounded to "
-            f"±{shift:.1g} mm and ±{turn:.1g} rad; between them the motion is interpolated. "
-            "The dot marks the unit of panel d."
+        player_note=_player_note(player),
+        provenance=_provenance(study),
+        problem=json.dumps(
+            json.loads(canonical_json(study.problem)), indent=1, sort_keys=True, ensure_ascii=False
         ),
-        provenance=_provenance(datasets),
-        problem=json.dumps(problem, indent=1, sort_keys=True, ensure_ascii=False),
-        draft=draft,
+        draft=study.draft,
     )
 
 
-def _provenance(datasets: Mapping[str, xr.Dataset]) -> list[Source]:
-    return [source(f"{name}.nc", data) for name, data in datasets.items()]
+def _player_note(player: Mapping[str, Any]) -> str:
+    shift, turn = quantisation_error(player)
+    shown, saved = player["axis"]["shown"], player["axis"]["saved"]
+    return (
+        f"{shown} of {saved} saved times, rounded to ±{shift:.1g} mm and "
+        f"±{turn:.1g} rad; between them the motion is interpolated. The dot marks the unit of "
+        "panel d."
+    )
+
+
+def _provenance(study: Study) -> list[Source]:
+    packages = {name: version(name) for name in ("jinja2", "matplotlib", "numpy", "xarray")}
+    made = {
+        "problem_hash": content_hash(study.problem),
+        "datasets": json.dumps(study.files),
+        "packages": json.dumps(packages),
+    }
+    own = source("this page", xr.Dataset(attrs=made))
+    return [own, *(source(f"{name}.nc", data) for name, data in study.datasets.items())]

@@ -14,7 +14,8 @@ import xarray as xr
 from reports import measures
 from reports.facts import Fact, grouped, number, percent, share, worded
 from reports.scene import Scene, cycles
-from reports.structure import CLOAK, Structure, from_dataset, middle_of_top_edge
+from reports.structure import CLOAK, from_dataset, middle_of_top_edge
+from reports.study import Study
 
 MONITORED = 45.0
 """Direction in degrees of the load at which the paper shows the motion of one unit."""
@@ -23,10 +24,9 @@ PAPER_REDUCTION = 0.7
 """The paper's mean reduction of |U|, "approximately 70 %"."""
 
 
-def collect(
-    scene: Scene, design: xr.Dataset, response: xr.Dataset, sweep: xr.Dataset
-) -> list[Fact]:
+def collect(study: Study) -> list[Fact]:
     """All facts of Figure 2, under headings."""
+    scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
     return [
         *grouped("Scene", scene_facts(scene, design)),
         *grouped("Shielding", loss_facts(scene, response)),
@@ -69,25 +69,25 @@ def loss_facts(scene: Scene, response: xr.Dataset) -> Iterator[Fact]:
         ("", "Mean |U| reduced by", scene.horizon, "≈ 70 %"),
         ("_all", "Mean |U| reduced by, all cycles", everything, "—"),
     ):
-        mean = measures.mean_magnitude(response, scene, until).mean("case")
+        mean = scene.mean(measures.mean_magnitude(response, scene, until))
         note = f"mean over the region of interest, all load cases and {until:g} s"
         yield share(f"mean_reduction{suffix}", label, measures.reduction(mean), paper, note)
     note = f"time integral over {scene.horizon:g} s"
-    start, end = (mean_loss(response, "loss", name) for name in ("altered", "cloaked"))
+    start, end = (mean_loss(scene, response, "loss", name) for name in ("altered", "cloaked"))
     yield number("loss_start", "Loss J, altered", start, note=note)
     paper = f"≈ {paper_loss(start):.2g}"
     note += "; the paper's is inferred from its 70 %, (1 − 0.7)² of ours at the start"
     yield number("loss_end", "Loss J, cloaked", end, paper=paper, note=note)
     for key, name in (("start", "altered"), ("end", "cloaked")):
-        value = mean_loss(response, "loss_samples", name)
+        value = mean_loss(scene, response, "loss_samples", name)
         label = f"Loss J, {name}, mean of samples"
         note = "the authors' mean over the saved samples of the same time"
         yield number(f"loss_samples_{key}", label, value, note=note)
 
 
-def mean_loss(response: xr.Dataset, variable: str, structure: str) -> float:
+def mean_loss(scene: Scene, response: xr.Dataset, variable: str, structure: str) -> float:
     """Mean loss of a structure over its load cases."""
-    return float(response[variable].sel(structure=structure).mean("case"))
+    return float(scene.mean(response[variable].sel(structure=structure)))
 
 
 def paper_loss(start: float) -> float:
@@ -133,19 +133,16 @@ def shape_facts(scene: Scene, design: xr.Dataset) -> Iterator[Fact]:
         paper="symmetric",
         note=note,
     )
-    for key, where, low, high, paper in (
-        ("centre", "inner half", 0.0, 0.5, "high"),
-        ("rim", "outermost quarter", 0.75, 1.0, "low"),
+    away = np.linalg.norm(structure.site - np.array(scene.middle), axis=1)
+    for key, where, inside, paper in (
+        ("centre", "inner half of the cloak", away < 0.5 * scene.radii[-1], "high"),
+        ("rim", "cloak's outermost units", measures.rim(structure), "low"),
     ):
-        before, after = (ring_porosity(scene, each, low, high) for each in (initial, structure))
-        note = f"units at {low:g} to {high:g} of its radius; {percent(before)} initially"
-        yield share(f"porosity_{key}", f"Porosity of the cloak, {where}", after, paper, note)
-
-
-def ring_porosity(scene: Scene, structure: Structure, low: float, high: float) -> float:
-    """Porosity of the lattice cells between two fractions of the cloak's radius."""
-    away = np.linalg.norm(structure.site - np.array(scene.middle), axis=1) / scene.radii[-1]
-    return measures.porosity(structure, scene.spacing, (away >= low) & (away < high))
+        before, after = (
+            measures.porosity(each, scene.spacing, inside) for each in (initial, structure)
+        )
+        note = f"open share of the cells of {int(inside.sum())} units; {percent(before)} initially"
+        yield share(f"porosity_{key}", f"Porosity, {where}", after, paper, note)
 
 
 def motion_facts(scene: Scene, response: xr.Dataset) -> Iterator[Fact]:

@@ -17,6 +17,7 @@ from reports.fig2.structures import (
 )
 from reports.scene import Scene
 from reports.structure import from_dataset
+from reports.study import Study
 
 TALLEST_SNAPSHOTS = 130.0
 """Height in mm that the snapshots may take however many rows there are."""
@@ -25,15 +26,9 @@ SNAPSHOT = 40.0
 """Side of a snapshot in mm where there is room."""
 
 
-def build(
-    scene: Scene,
-    design: xr.Dataset,
-    response: xr.Dataset,
-    sweep: xr.Dataset,
-    recorded: Sequence[SnapshotRow] = (),
-    draft: bool = False,
-) -> Figure:
+def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     """The whole figure; rows of `recorded` snapshots stand above the simulated ones."""
+    scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
     simulated = simulated_rows(scene, response)
     rows = [*recorded, *simulated]
     snapshots = min(SNAPSHOT * len(rows), TALLEST_SNAPSHOTS)
@@ -50,7 +45,7 @@ def build(
     style.letter(figure, 110.0, top_d, "e", "Robustness")
     axes = style.place(figure, 119.5, top_d + 6.0, 43.5, 36.0)
     map_panel(figure, axes, style.place(figure, 165.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
-    if draft:
+    if study.draft:
         mark_draft(figure)
     return figure
 

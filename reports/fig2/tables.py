@@ -11,19 +11,21 @@ from numpy.typing import NDArray
 from reports.page import Table
 from reports.scene import Scene
 from reports.structure import from_dataset, middle_of_top_edge
+from reports.study import Study
 
 Columns = dict[str, NDArray[Any]]
 
 
-def build(scene: Scene, design: xr.Dataset, response: xr.Dataset, sweep: xr.Dataset) -> list[Table]:
+def build(study: Study) -> list[Table]:
     """All tables, in the order of the panels."""
+    design, response, sweep = study.design, study.response, study.sweep
     return [
         Table("design.csv", "vertices of the cloaked and of the initial design", vertices(design)),
         Table("loss_history.csv", "loss against evaluation (panel b)", history(design)),
         Table(
             "top_edge.csv",
             "motion of the middle unit of the top edge, every load case (panel d)",
-            top_edge(scene, response),
+            top_edge(study.scene, response),
         ),
         Table("robustness.csv", "loss over loading angle and frequency (panel e)", robust(sweep)),
     ]

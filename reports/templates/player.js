@@ -25,8 +25,8 @@
   const NO_DATA = -32768;
   const first = axis.values[0];
   const last = axis.values[axis.values.length - 1];
-  const state = { at: first, playing: false, shape: 0, field: 0, rate: data.speeds[0].rate };
-  state.shape = Math.max(0, data.cases.findIndex((label) => label === data.start));
+  const state = { at: first, playing: false, load: data.start, field: 0,
+    rate: data.speeds[0].rate };
 
   const make = (tag, properties = {}, parent = null) => {
     const node = Object.assign(document.createElement(tag), properties);
@@ -48,7 +48,7 @@
   };
 
   const displacement = (index, at) => {
-    const { step, data: levels } = motion[index][state.shape];
+    const { step, data: levels } = motion[index][state.load];
     const count = structures[index].centroid.length / 2;
     const { low, high, part } = bracket(at);
     const out = new Float32Array(3 * count);
@@ -124,7 +124,7 @@
     return select;
   };
   if (data.cases.length > 1) {
-    menu("Load", data.cases, state.shape, (index) => { state.shape = index; }).id = "player-case";
+    menu("Load", data.cases, state.load, (index) => { state.load = index; }).id = "player-case";
   }
   menu("Colour", data.fields.map((field) => field.label), 0,
     (index) => { state.field = index; paintBar(); }).id = "player-field";
@@ -255,7 +255,7 @@
     canvases.forEach((canvas, index) => {
       draw(canvas, index);
       canvas.setAttribute("aria-label",
-        `${structures[index].name} structure, ${data.cases[state.shape]}, ${words}`);
+        `${structures[index].name} structure, ${data.cases[state.load]}, ${words}`);
     });
     slider.value = Math.round((10000 * (state.at - first)) / (last - first || 1));
     slider.setAttribute("aria-valuetext", words);
