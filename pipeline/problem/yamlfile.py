@@ -38,17 +38,24 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError("aliases (*name) are not supported", problem_mark=mark)
+            raise yaml.MarkedYAMLError(
+                problem="aliases (*name) are not supported", problem_mark=mark
+            )
         return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise _fault("a key must be one word", key)
             if key.value in seen:
-                what = f"the key {key.value!r} is given twice"
-                raise yaml.MarkedYAMLError(what, problem_mark=key.start_mark)
-            seen.add(str(key.value))
+                raise _fault(f"the key {key.value!r} is given twice", key)
+            seen.add(key.value)
         return super().construct_mapping(node, deep)
+
+
+def _fault(what: str, node: yaml.Node) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=what, problem_mark=node.start_mark)
 
 
 def read(path: Path) -> Document:
@@ -98,12 +105,10 @@ def _syntax_error(path: Path, error: yaml.MarkedYAMLError) -> UserError:
     mark = error.problem_mark or error.context_mark
     told = ", ".join(part for part in (error.context, error.problem) if part)
     return UserError(
-        f"not valid YAML: {told}" if error.problem else told,
+        f"not valid YAML: {told}",
         file=path,
         line=None if mark is None else mark.line + 1,
-        remedy="correct the text there or just above (colons, indentation, quotes)"
-        if error.problem
-        else "keep one of them, written out",
+        remedy="correct the text there or just above (colons, indentation, quotes, repetitions)",
     )
 
 

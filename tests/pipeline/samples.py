@@ -1,0 +1,54 @@
+"""Random datasets that obey their tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from pipeline.datasets import TABLES, Kind, Variable
+
+SIZES = {
+    "unit": 49,
+    "vertex": 4,
+    "xy": 2,
+    "ligament": 84,
+    "end": 2,
+    "method": 2,
+    "evaluation": 5,
+    "case": 4,
+    "variable": 80,
+    "constraint": 5,
+    "structure": 2,
+    "time": 11,
+    "dof": 3,
+    "direction": 3,
+    "frequency": 3,
+}
+
+
+def sample(kind: Kind, seed: int = 0) -> xr.Dataset:
+    """A dataset of `kind` without units, names and provenance, as a stage would hand it over."""
+    random = np.random.default_rng(seed)
+    filled = {
+        name: (variable.dims, _values(name, variable, random))
+        for name, variable in TABLES[kind].items()
+    }
+    labels = {name for name, variable in TABLES[kind].items() if variable.coordinate}
+    dataset = xr.Dataset(
+        {name: value for name, value in filled.items() if name not in labels},
+        {name: filled[name] for name in labels},
+    )
+    return dataset.assign_attrs(shipped_method="sqp") if kind == "design" else dataset
+
+
+def _values(name: str, variable: Variable, random: np.random.Generator) -> np.ndarray:
+    shape = tuple(SIZES[dim] for dim in variable.dims)
+    if variable.values:
+        return np.array(variable.values)
+    if name == "method":
+        return np.array(["sqp", "mma"])
+    if variable.dtype == "str":
+        return np.array(["überschritten", "ok"])[random.integers(2, size=shape)]
+    if variable.dtype == "float64":
+        return random.normal(size=shape)
+    return random.integers(2, size=shape)

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline import provenance
+from pipeline.problem import from_canonical, load, section_hash
+
+
+def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
+    problem = load(fig2)
+    told = provenance.attributes(
+        problem, "simulate", parents={"design": fig2}, plan={"skipped": ["reference"]}
+    )
+    assert all(isinstance(value, str) for value in told.values())
+    assert told["problem_hash"] == section_hash(problem, "simulate")
+    assert from_canonical(told["problem"]).response == problem.response
+    assert json.loads(told["parents"]) == {"design": provenance.file_hash(fig2)}
+    assert json.loads(told["plan"]) == {"skipped": ["reference"]}
+    assert json.loads(told["packages"])["numpy"]
+    assert provenance.attributes(problem, "simulate")["plan"] == "{}"
+
+
+def test_a_method_stores_its_own_part(fig2: Path) -> None:
+    told = provenance.attributes(load(fig2), "design", method="mma")
+    assert list(from_canonical(told["problem"]).optimiser.methods.chosen) == ["mma"]
+
+
+def test_the_commit_is_unknown_outside_a_checkout(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    provenance.git_commit.cache_clear()
+    assert provenance.git_commit() == "unknown"
+    provenance.git_commit.cache_clear()
+
+
+def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "PACKAGES", ("no-such-package",))
+    provenance.package_versions.cache_clear()
+    assert provenance.package_versions()["no-such-package"] == "absent"
+    provenance.package_versions.cache_clear()

@@ -1,0 +1,65 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+import yaml
+
+from pipeline import schema
+
+Problem = dict[str, Any]
+
+
+@pytest.fixture
+def content(fig2: Path) -> Problem:
+    """What fig2's problem file holds."""
+    content: Problem = yaml.safe_load(fig2.read_bytes())
+    return content
+
+
+@pytest.fixture(scope="module")
+def validator() -> jsonschema.Draft202012Validator:
+    """A validator of problem files."""
+    jsonschema.Draft202012Validator.check_schema(schema.schema())
+    return jsonschema.Draft202012Validator(schema.schema())
+
+
+def test_the_committed_schema_is_up_to_date(fig2: Path) -> None:
+    committed = fig2.parents[1] / schema.DEFAULT.name
+    assert committed.read_text(encoding="utf-8") == schema.text(), "run python -m pipeline.schema"
+
+
+def test_the_command_writes_it(tmp_path: Path) -> None:
+    assert schema.main(["--out", str(tmp_path / "schema.json")]) == 0
+    assert json.loads((tmp_path / "schema.json").read_bytes()) == schema.schema()
+
+
+def test_fig2_obeys_it(validator: jsonschema.Draft202012Validator, content: Problem) -> None:
+    assert validator.is_valid(content)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("lattice", "spacng"), "15 mm"),
+        (("lattice", "spacing"), 15),
+        (("lattice", "spacing"), "wide"),
+        (("drive", "kind"), "harmonics"),
+        (("presets", "quick", "latice"), {}),
+        (("presets", "quick", "lattice", "columns"), "7"),
+    ],
+)
+def test_mistakes_break_it(
+    keys: tuple[str, ...],
+    value: object,
+    validator: jsonschema.Draft202012Validator,
+    content: Problem,
+) -> None:
+    section = content
+    for key in keys[:-1]:
+        section = section[key]
+    section[keys[-1]] = value
+    assert not validator.is_valid(content)
