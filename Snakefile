@@ -11,7 +11,8 @@ from pipeline.workflow import options, prepare_jobs, section, studies
 min_version("9.20")
 
 
-check_problems(sys.argv[1:])
+if workflow.is_main_process:
+    check_problems(sys.argv[1:])
 prepare_jobs()
 
 for study in studies():

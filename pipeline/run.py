@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import ctypes
 import os
+import shutil
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -19,7 +19,6 @@ from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.workflow import RUN_MARK, check_problems
 
-SNAKEMAKE = str(Path(sys.executable).with_name("snakemake"))
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
@@ -33,7 +32,8 @@ def main(arguments: list[str]) -> None:
     except UserError as error:
         sys.exit(f"error: {error}")
     _end_with_parent()
-    os.execv(SNAKEMAKE, [SNAKEMAKE, *arguments])
+    snakemake = str(Path(sys.executable).with_name("snakemake"))
+    os.execv(snakemake, [snakemake, *arguments])
 
 
 def _clear_the_ground() -> None:
@@ -55,8 +55,7 @@ def _clear_the_ground() -> None:
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
     for process in stubborn:
         process.kill()
-    if any(ROOT.glob(".snakemake/locks/*")):
-        subprocess.run([SNAKEMAKE, "--unlock", "--quiet", "all"], check=True)
+    shutil.rmtree(ROOT / ".snakemake/locks", ignore_errors=True)
 
 
 def _others() -> list[psutil.Process]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -75,7 +75,7 @@ def studies(root: Path = ROOT) -> list[Study]:
     return found
 
 
-def asked_for(words: Sequence[str]) -> list[Study]:
+def asked_for(words: Collection[str]) -> list[Study]:
     """The studies that the words of a command line name, by target or by a file of theirs.
 
     A preset counts even if its problem file has none of that name: reading the problem tells so.
@@ -90,13 +90,15 @@ def asked_for(words: Sequence[str]) -> list[Study]:
     return found
 
 
-def check_problems(words: Sequence[str]) -> None:
+def check_problems(words: Collection[str]) -> None:
     """Ends the process with one clear message if a study that is asked for has a faulty problem.
+
+    Where no study is named, the first one is meant: it is the default target.
 
     Snakemake would only find no rule to make its files, and count those that exist as up to date.
     """
     try:
-        for study in asked_for(words) if words else studies()[:1]:
+        for study in asked_for(words) or studies()[:1]:
             problem_of(study)
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -1,0 +1,98 @@
+"""A copy of the repository whose stages only pretend: the workflow without the work."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from pipeline.environment import ROOT
+
+STAGES = (
+    "pipeline/design",
+    "pipeline/select",
+    "pipeline/simulate",
+    "pipeline/sweep",
+    "reports/build",
+)
+
+
+@dataclass
+class Sandbox:
+    """A copied repository to run snakemake in."""
+
+    root: Path
+    stage_seconds: float = 0.0
+
+    @property
+    def problem(self) -> Path:
+        return self.root / "experiments/fig2/problem.yaml"
+
+    def edit(self, old: str, new: str) -> None:
+        text = self.problem.read_text()
+        assert old in text
+        self.problem.write_text(text.replace(old, new, 1))
+
+    def command(self, *words: str) -> list[str]:
+        return [str(Path(sys.executable).with_name("snakemake")), "--cores", "2", *words]
+
+    def environment(self) -> dict[str, str]:
+        return os.environ | {"STAGE_SECONDS": str(self.stage_seconds)}
+
+    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return self._ended(self.command(*words))
+
+    def resume(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return self._ended([sys.executable, "-m", "pipeline.run", *words])
+
+    def planned(self, *words: str) -> Counter[str]:
+        """How often each rule would run."""
+        ended = self.run("--dry-run", *words)
+        assert ended.returncode == 0, ended.stderr
+        table = ended.stdout.partition("\n---")[2].partition("\ntotal")[0].splitlines()[1:]
+        return Counter({rule: int(count) for rule, count in map(str.split, table)})
+
+    def _ended(self, command: list[str]) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command,
+            cwd=self.root,
+            env=self.environment(),
+            text=True,
+            capture_output=True,
+            check=False,
+        )
+
+
+@pytest.fixture
+def sandbox(tmp_path: Path) -> Sandbox:
+    """A repository in which nothing has run."""
+    return _copied(tmp_path / "repository")
+
+
+@pytest.fixture(scope="session")
+def built_once(tmp_path_factory: pytest.TempPathFactory) -> Sandbox:
+    sandbox = _copied(tmp_path_factory.mktemp("built") / "repository")
+    ended = sandbox.run("fig2")
+    assert ended.returncode == 0, ended.stderr
+    return sandbox
+
+
+@pytest.fixture
+def built(built_once: Sandbox, tmp_path: Path) -> Sandbox:
+    """A repository in which fig2 was built."""
+    return Sandbox(shutil.copytree(built_once.root, tmp_path / "repository"))
+
+
+def _copied(root: Path) -> Sandbox:
+    for folder in ("experiments", "pipeline", "profiles", "reports", "sim"):
+        shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "Snakefile", root)
+    for stage in STAGES:
+        shutil.copy(Path(__file__).with_name("stage.py"), root / f"{stage}.py")
+    return Sandbox(root)

@@ -1,0 +1,112 @@
+"""What the workflow plans, what it reruns after an edit, and what it says to a faulty problem."""
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.environment import ROOT
+from pipeline.workflow import check_room
+from tests.workflow.conftest import Sandbox
+
+STUDY = {
+    "design": 2,
+    "select": 1,
+    "simulate": 1,
+    "sweep": 4,
+    "gather_sweep": 1,
+    "report": 1,
+    "fig2": 1,
+}
+
+
+def only(*rules: str) -> dict[str, int]:
+    return {rule: STUDY[rule] for rule in (*rules, "fig2")}
+
+
+def test_study_from_nothing(sandbox: Sandbox) -> None:
+    assert sandbox.planned("fig2") == STUDY
+
+
+@pytest.mark.parametrize("target", ["fig2@quick", "fig2_quick"])
+def test_preset_has_its_own_target_and_folder(sandbox: Sandbox, target: str) -> None:
+    ended = sandbox.run(target)
+    assert ended.returncode == 0, ended.stderr
+    results = sandbox.root / "results/fig2@quick"
+    assert (results / "report/fig2.pdf").exists()
+    assert "--preset quick" in (results / "response.nc").read_text()
+
+
+def test_second_run_has_nothing_to_do(built: Sandbox) -> None:
+    os.utime(built.problem)
+    assert "Nothing to be done" in built.run("fig2").stderr
+
+
+def test_planning_imports_nothing_heavy() -> None:
+    script = (
+        "import sys; from pipeline import sources, workflow;"
+        "workflow.check_problems(['fig2']); print(*sys.modules)"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, text=True, capture_output=True, check=True
+    )
+    assert not {"jax", "matplotlib", "numba", "xarray"} & set(ended.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rerun"),
+    [
+        ("points: 15", "points: 14", only("sweep", "gather_sweep", "report")),
+        ("cycles: 4", "cycles: 3", only("simulate", "report")),
+        ("title: Shielding", "title: Hiding", only("report")),
+        ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
+        ("amplitude: 4.5 mm", "amplitude: 4.4 mm", STUDY),
+        ("amplitude: 4.5 mm", "amplitude: 0.45 cm", {}),
+        ("# Figure 2", "# The second figure", {}),
+    ],
+)
+def test_edited_key_reruns_what_depends_on_it(
+    built: Sandbox, old: str, new: str, rerun: dict[str, int]
+) -> None:
+    built.edit(old, new)
+    assert built.planned("fig2") == rerun
+
+
+def test_edited_source_reruns_what_imports_it(built: Sandbox) -> None:
+    module = built.root / "reports/build.py"
+    module.write_text(module.read_text() + "\n")
+    assert built.planned("fig2") == only("report")
+
+
+def test_faulty_problem_is_one_message_even_if_results_exist(built: Sandbox) -> None:
+    built.edit("axial_stiffness: 120 N/mm", "axial_stiffness: -120 N/mm")
+    for ended in (built.run("fig2"), built.resume("fig2"), built.run()):
+        assert ended.returncode != 0
+        assert "experiments/fig2/problem.yaml, line" in ended.stderr
+        assert "material.axial_stiffness" in ended.stderr
+        assert "Traceback" not in ended.stderr
+
+
+def test_unknown_preset_is_one_message(sandbox: Sandbox) -> None:
+    ended = sandbox.run("fig2@edge4")
+    assert ended.returncode != 0
+    assert "did you mean 'edge3'?" in ended.stderr
+
+
+def test_folder_that_cannot_be_made_is_one_message(tmp_path: Path) -> None:
+    (tmp_path / "results").write_text("a file in the place of the folder")
+    with pytest.raises(SystemExit, match=r"error: results cannot be written[^|]*remedy"):
+        check_room(str(tmp_path / "results"))
+
+
+def test_full_disk_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    with pytest.raises(SystemExit, match="No space left on device"):
+        check_room(str(tmp_path))
+    assert not list(tmp_path.iterdir())
