@@ -109,7 +109,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
         "units": problem.lattice.columns * problem.lattice.rows,
         "load angles": len(directions),
         "evaluations of the design": sqp.evaluations if sqp else 0,
-        "drive cycles": problem.response.cycles if problem.response else 0,
+        "drive cycles": problem.response.cycles,
         "angles in the map": sweep.direction.points if sweep else 0,
         "frequencies in the map": sweep.frequency.points if sweep else 0,
     }

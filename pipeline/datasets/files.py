@@ -41,7 +41,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
     for fault in faults(described, kind):
         told = "" if fault.value is None else f": {fault.value}"
         raise SchemaError(f"{kind} dataset, {fault.name}: {fault.what}{told}")
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    aside = path.with_name(f".{path.name}.part")  # one name: a killed write leaves no second one
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         _to_netcdf(described, aside, kind)
@@ -49,10 +49,9 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
         read(aside, kind)
         aside.replace(path)
         _sync(path.parent)
-    except OSError as error:
-        raise refusal(path.parent, error) from error
-    except RuntimeError as error:  # how netCDF4 tells that a write failed, without saying why
-        if (cause := _probe(aside, dataset.nbytes)) is None:
+    except (OSError, RuntimeError) as error:  # netCDF4 seldom says why a write failed
+        cause = _probe(aside, dataset.nbytes) or error
+        if not isinstance(cause, OSError):
             raise
         raise refusal(path.parent, cause) from error
     finally:

@@ -169,6 +169,17 @@ def _symmetry(problem: Problem) -> Findings:
         yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
 
 
+def _sweep(problem: Problem) -> Findings:
+    if problem.sweep is None:
+        return
+    for name, axis in (
+        ("direction", problem.sweep.direction),
+        ("frequency", problem.sweep.frequency),
+    ):
+        if axis.points > 1 and axis.stop <= axis.start:
+            yield Finding("the axis does not ascend", ("sweep", name, "to"), "end above `from`")
+
+
 def _optimiser(problem: Problem) -> Findings:
     optimiser = problem.optimiser
     if not optimiser.methods.chosen:
@@ -187,5 +198,6 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _regions,
     _start_is_feasible,
     _symmetry,
+    _sweep,
     _optimiser,
 )

@@ -22,6 +22,7 @@ from pipeline.problem.quantities import (
     Positive,
     Ratio,
     RotaryDamping,
+    Samples,
     Stiffness,
     fault,
 )
@@ -100,7 +101,7 @@ class Horizon(Section):
 
     periods: Positive | None = None
     duration: Duration | None = None
-    samples: Count = 200
+    samples: Samples = 200
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -167,7 +168,7 @@ class Response(Section):
     """How much of the response the report shows."""
 
     cycles: Positive = 4.0
-    samples: Annotated[int, Field(ge=2, strict=True)] = 401
+    samples: Samples = 401
 
 
 class DirectionAxis(Section):
@@ -210,7 +211,7 @@ class Problem(Section):
     constraints: Constraints = Constraints()
     optimiser: Optimiser
     solver: Solver = Solver()
-    response: Response | None = None
+    response: Response = Response()
     sweep: Sweep | None = None
 
     @property

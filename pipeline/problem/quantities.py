@@ -71,3 +71,4 @@ RotaryDamping = Annotated[
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Ratio = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=1, strict=True)]
+Samples = Annotated[int, Field(ge=2, strict=True)]

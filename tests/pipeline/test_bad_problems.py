@@ -188,6 +188,8 @@ ROWS = "  rows: 15\n"
             "optimiser.trust_radius",
             "at or below 3 mm",
         ),
+        ("to: 180 deg", "to: 0 deg", "does not ascend", "sweep.direction.to", "above `from`"),
+        ("samples: 200", "samples: 1", "too small", "horizon.samples", "at least 2"),
         ("convex: true", "convex: maybe", "neither true nor false", "constraints.convex", "true"),
         ("title: Shielding", "title: 3 #", "not a text", "title", "quotes"),
     ],
