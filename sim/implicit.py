@@ -34,7 +34,7 @@ from sim.tableau import ESDIRK3, Tableau
 
 MAX_SPLITS = 40
 MAX_ITERATIONS = 30
-REFACTOR_ABOVE = 0.3
+REFACTOR_ABOVE = 0.5
 KEEP_FROM_BARRIER = 0.9
 
 CONVERGED, STALLED, INDEFINITE = 0, 1, 2
@@ -311,8 +311,8 @@ class ImplicitSolver:
         asked: (n_asked,) times of the output, s.
         tolerance: of the stage velocities, mm/s.
         threads: cases solved side by side.
-        touching: ligaments in which contact is computed, None for all. If the voids of another come to the
-            cutoff, the case is solved again with all.
+        turn_allowance: contact is skipped in ligaments whose units can turn by this much against each other
+            before it acts, rad. If one comes that far after all, the case is solved again with all.
         tableau: the method.
     """
 
@@ -321,17 +321,20 @@ class ImplicitSolver:
     asked: Floats
     tolerance: float = 1e-4
     threads: int = 1
-    touching: Ints | None = None
+    turn_allowance: float = np.inf
     tableau: Tableau = ESDIRK3
+
+    def touching(self, values: Parameters) -> Ints:
+        """Ligaments in which contact is computed."""
+        return np.flatnonzero(
+            values.void.min(axis=1) < self.topology.cutoff + self.turn_allowance
+        )
 
     def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
-        touching = np.arange(len(values.void)) if self.touching is None else self.touching
+        touching = self.touching(values)
         record = self._march(values, drive, touching)
-        motion = record.u[:, 0].reshape(-1, self.topology.n_units, 3)
-        closest = self.topology.smallest_void_angles(values.void, motion).min(axis=0)
-        closest[touching] = np.inf
-        if closest.min() < self.topology.cutoff:
+        if self._untouched_voids_close(values, record):
             record = self._march(values, drive, np.arange(len(values.void)))
         value, slope = grid.hermite_matrices(record.times, self.asked)
         states = np.concatenate([record.u[:, 0], record.v[:, 0]])
@@ -339,6 +342,13 @@ class ImplicitSolver:
         held = self.topology.held
         displacement[:, held] = drive.values(held, self.asked)
         return displacement, velocity, record
+
+    def _untouched_voids_close(self, values: Parameters, record: Record) -> bool:
+        """Whether a void whose contact was skipped came to the cutoff in any stage."""
+        stages = record.u[:-1].reshape(-1, self.topology.n_units, 3)
+        closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
+        closest[record.touching] = np.inf
+        return bool(closest.min() < self.topology.cutoff)
 
     def _march(self, values: Parameters, drive: Drive, touching: Ints) -> Record:
         top = self.topology

@@ -1,0 +1,72 @@
+"""Mimicking functions: how far a response is from its target, per load case, in JAX."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from sim.energy import LigamentLaw, ligament_energy
+from sim.kernels import Floats, Ints
+from sim.model import Parameters
+
+
+class DisplacementMimicking(NamedTuple):
+    """Weighted sum over samples and units of |U - U_target|^2, U = (ux/s, uy/s, theta) (paper, Eq. 1).
+
+    Attributes:
+        units: (n,) region of interest.
+        spacing: s, mm.
+        weights: (n_asked,) quadrature weights.
+        target: (n_cases, n_asked, n, 3) displacement to mimic, or None for rest.
+    """
+
+    units: Ints
+    spacing: float
+    weights: Floats
+    target: Array | None = None
+
+    def __call__(self, displacement: Array, parameters: Parameters) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        motion = displacement[:, :, self.units]
+        if self.target is not None:
+            motion = motion - self.target
+        normalised = motion / jnp.array([self.spacing, self.spacing, 1.0])
+        return jnp.einsum("ctud,ctud,t->c", normalised, normalised, self.weights)
+
+
+class StrainEnergyMimicking(NamedTuple):
+    """Weighted sum over samples of the region's strain energy, contact excluded, N mm (paper, Eq. 2, at rest).
+
+    Attributes:
+        ligaments: (n,) ligaments that touch the region.
+        ligament_units: (n, 2) units that they join.
+        weights: (n_asked,) quadrature weights.
+    """
+
+    ligaments: Ints
+    ligament_units: Ints
+    weights: Floats
+
+    def __call__(self, displacement: Array, parameters: Parameters) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        energies = strain_energies(displacement, parameters, self.ligaments, self.ligament_units)
+        return jnp.einsum("ctl,t->c", energies, self.weights)
+
+
+def strain_energies(
+    displacement: Array, parameters: Parameters, ligaments: Ints, ligament_units: Ints
+) -> Array:
+    """Strain energy (..., n) of the chosen ligaments in states (..., n_units, 3), N mm."""
+    first, second = (displacement[..., ligament_units[:, end], :] for end in range(2))
+    arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]
+    law = LigamentLaw(*parameters.law[ligaments].T)
+    of_all = jax.vmap(ligament_energy, in_axes=(0, 0, 0, 0, 0, 0))
+
+    def of_state(a: Array, b: Array) -> Array:
+        return of_all(a, b, arm[:, 0], arm[:, 1], vector, law)
+
+    flat = jax.vmap(of_state)(first.reshape(-1, *first.shape[-2:]), second.reshape(-1, *second.shape[-2:]))
+    return flat.reshape(first.shape[:-1])

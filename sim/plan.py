@@ -1,0 +1,234 @@
+"""What a scene needs and what it may skip: decided once, printed, and stored with every result."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse.linalg as spla
+
+from sim import grid
+from sim.band import factorise, solve
+from sim.dynamics import Solver
+from sim.explicit import ExplicitSolver, highest_frequency
+from sim.geometry import shape
+from sim.implicit import ImplicitSolver
+from sim.kernels import Floats, Ints, compiled, tangent
+from sim.model import Parameters, parameters
+from sim.scene import Accuracy, Scene
+from sim.splitting import BLANES_MOAN
+from sim.statics import StaticSolver
+from sim.symmetry import QUARTER_TURN, equal_directions, is_invariant, unit_image
+
+TURN_ALLOWANCE = np.deg2rad(30.0)
+"""Relative rotation that a ligament's units may make before its contact is no longer skipped."""
+
+SLOW = 0.75
+"""Drives below this fraction of the lowest eigenfrequency excite no waves worth resolving."""
+
+STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
+CONTACT_STIFFENING = 1.7
+"""Highest eigenfrequency in contact over that at rest (4.7 -> 7.9 kHz for the paper's lattices)."""
+
+
+@dataclass(frozen=True)
+class GridRule:
+    """A graded grid: first step (s), growth, and steps for one period of the drive."""
+
+    first: float
+    growth: float
+    per_period: int
+    tolerance: float
+
+
+GRIDS: dict[Accuracy, GridRule] = {
+    "draft": GridRule(2e-3, 1.3, 12, 1e-2),
+    "default": GridRule(5e-4, 1.2, 20, 1e-3),
+    "tight": GridRule(1e-4, 1.05, 80, 1e-5),
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Decisions for one scene.
+
+    Attributes:
+        integrator: how the response is computed.
+        solver: ready to use.
+        case_of: (n_cases,) the simulated case that each load case takes its loss from.
+        decisions: one line for each thing decided.
+        skipped: one line for each thing left out.
+    """
+
+    integrator: Literal["static", "implicit", "explicit"]
+    solver: Solver
+    case_of: Ints
+    decisions: tuple[str, ...]
+    skipped: tuple[str, ...]
+
+    @property
+    def simulated(self) -> Ints:
+        """Cases that are simulated, ascending."""
+        return np.unique(self.case_of)
+
+    def describe(self) -> str:
+        """The plan in words, a line a decision."""
+        return "\n".join((*self.decisions, *(f"skipped: {line}" for line in self.skipped)))
+
+    def record(self) -> dict[str, Any]:
+        """The plan as plain data, to be stored."""
+        return {
+            "integrator": self.integrator,
+            "decisions": list(self.decisions),
+            "skipped": list(self.skipped),
+        }
+
+
+def make_plan(
+    scene: Scene, vertices: Floats | None = None, asked: Floats | None = None, threads: int = 1
+) -> Plan:
+    """Decides how to simulate a scene.
+
+    Args:
+        scene: the scene.
+        vertices: (n_vertices, 2) the structure, mm; None for a plan that serves an optimisation from the
+            initial one.
+        asked: (n_asked,) output times, s; None for the loss's own samples.
+        threads: cases to solve side by side.
+    """
+    structure = scene.lattice.vertices if vertices is None else vertices
+    values = concrete_parameters(scene, structure)
+    times = sample_times(scene) if asked is None else asked
+    decisions: list[str] = []
+    skipped = ["simulation of the unloaded reference: it is zero"]
+
+    case_of = _equal_cases(scene, structure)
+    if len(np.unique(case_of)) < len(case_of):
+        skipped.append(
+            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned by 90 deg"
+        )
+    n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
+    if n_designed < n_ligaments:
+        skipped.append(
+            f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the design"
+            " does not move them"
+        )
+    solver: Solver
+    if scene.static:
+        integrator: Literal["static", "implicit", "explicit"] = "static"
+        solver = StaticSolver(scene.topology, times, threads=threads)
+        skipped.append("inertia and damping: the scene is static")
+    else:
+        integrator = _choose(scene, values, decisions)
+        end = float(times[-1])
+        if integrator == "implicit":
+            solver = _implicit(scene, end, times, threads)
+            decisions.append(f"grid: {len(solver.times) - 1} graded steps over {end:.6g} s, frozen")
+            skipped.append(_contact_line(values, solver))
+        else:
+            solver = _explicit(scene, values, end, times, threads)
+            decisions.append(f"grid: {solver.n_steps} equal steps over {end:.6g} s")
+    decisions.insert(0, f"integrator: {integrator}")
+    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
+
+
+def sample_times(scene: Scene) -> Floats:
+    """Times (scene.samples,) over which the loss is integrated."""
+    return np.linspace(0.0, scene.duration, scene.samples)
+
+
+def concrete_parameters(scene: Scene, vertices: Floats) -> Parameters:
+    """Parameters of a structure as NumPy arrays."""
+    made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.material)
+    return Parameters(*(np.asarray(part) for part in made))
+
+
+def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
+    every = np.arange(len(scene.motions))
+    directions = [getattr(motion, "direction", None) for motion in scene.motions]
+    if scene.symmetry != "C4" or any(direction is None for direction in directions):
+        return every
+    image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
+    clamped_units = np.unique(scene.clamped // 3)
+    whole_units = len(clamped_units) * 3 == len(scene.clamped)
+    if image is None or not whole_units:
+        return every
+    if not is_invariant(image, clamped_units, scene.driven, scene.region):
+        return every
+    return equal_directions(np.asarray(directions, dtype=float))
+
+
+def _choose(
+    scene: Scene, values: Parameters, decisions: list[str]
+) -> Literal["implicit", "explicit"]:
+    if scene.integrator != "auto":
+        decisions.append("integrator as asked for")
+        return scene.integrator
+    if scene.accuracy == "tight":
+        decisions.append("explicit: a tight tolerance needs every frequency resolved")
+        return "explicit"
+    if scene.frequency is None:
+        decisions.append("implicit: the drive has no frequency of its own")
+        return "implicit"
+    lowest = lowest_frequency(scene, values) / (2 * np.pi)
+    slow = scene.frequency < SLOW * lowest
+    decisions.append(
+        f"{'implicit' if slow else 'explicit'}: drive at {scene.frequency:.4g} Hz, lowest eigenfrequency"
+        f" {lowest:.4g} Hz"
+    )
+    return "implicit" if slow else "explicit"
+
+
+def _implicit(scene: Scene, end: float, times: Floats, threads: int) -> ImplicitSolver:
+    rule = GRIDS[scene.accuracy]
+    period = end / 2 if scene.frequency is None else 1 / scene.frequency
+    largest = period / rule.per_period
+    steps = grid.graded(end, min(rule.first, largest), rule.growth, largest)
+    return ImplicitSolver(
+        scene.topology, steps, times, rule.tolerance, threads, turn_allowance=TURN_ALLOWANCE
+    )
+
+
+def _contact_line(values: Parameters, solver: ImplicitSolver) -> str:
+    n_touching = len(solver.touching(values))
+    return (
+        f"contact of {len(values.void) - n_touching} of {len(values.void)} ligaments at the start: their voids"
+        " are wide open (checked after each solve)"
+    )
+
+
+def _explicit(
+    scene: Scene, values: Parameters, end: float, times: Floats, threads: int
+) -> ExplicitSolver:
+    highest = CONTACT_STIFFENING * highest_frequency(scene.topology, values)
+    largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / highest
+    return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)
+
+
+@compiled
+def _stiffness(motion, net, turn, free, band):
+    band[:] = 0.0
+    tangent(motion, net, turn, free, band)
+
+
+def lowest_frequency(scene: Scene, values: Parameters) -> float:
+    """Lowest angular eigenfrequency of the free dofs at rest, rad/s; zero if the rest is not stable."""
+    top = scene.topology
+    number, width = top.numbering
+    band = np.zeros((top.n_free, width + 1))
+    rest = np.zeros(top.n_dofs)
+    _stiffness(rest, top.network(values), np.empty((top.n_units, 4)), number, band)
+    if not factorise(band):
+        return 0.0
+    root = np.sqrt(values.mass.ravel()[top.free_dofs])
+
+    def product(x: Floats) -> Floats:
+        right = np.ravel(x) * root
+        solve(band, right)
+        return right * root
+
+    operator = spla.LinearOperator((top.n_free, top.n_free), matvec=product, dtype=float)
+    start = np.random.default_rng(0).normal(size=top.n_free)
+    largest = spla.eigsh(operator, k=1, which="LM", v0=start, tol=1e-3, return_eigenvectors=False)
+    return float(1 / np.sqrt(largest[0]))

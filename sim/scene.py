@@ -1,0 +1,89 @@
+"""A design problem posed: structure, drives, what counts and what may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from sim.design import DesignSpace, Symmetry, design_space
+from sim.dynamics import Drive
+from sim.kernels import Floats, Ints
+from sim.lattice import Lattice
+from sim.loads import Motion
+from sim.model import Material, Topology, topology
+
+Accuracy = Literal["draft", "default", "tight"]
+Integrator = Literal["auto", "implicit", "explicit"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that a simulation and its loss depend on but the design vector.
+
+    Attributes:
+        lattice: the initial structure.
+        material: constants.
+        barrier, cutoff: contact angles, rad.
+        clamped: (n,) ids (3 unit + dof) of dofs that rest.
+        driven: (n,) units that follow the drive, all three dofs.
+        motions: the drive of each load case.
+        weights: (n_cases,) of the cases in the loss, sum 1.
+        duration: s; the length of the load path in a static scene.
+        frequency: highest frequency of the drive, Hz; None if it has none.
+        static: whether inertia plays no part.
+        cloak: units to redesign.
+        region: units of interest.
+        objective: what is compared with rest.
+        samples: number of samples that the loss is integrated over.
+        symmetry: imposed on the design.
+        accuracy, integrator: as asked for.
+    """
+
+    lattice: Lattice
+    material: Material
+    barrier: float
+    cutoff: float
+    clamped: Ints
+    driven: Ints
+    motions: tuple[Motion, ...]
+    weights: Floats
+    duration: float
+    frequency: float | None
+    static: bool
+    cloak: Ints
+    region: Ints
+    objective: Literal["displacement", "strain_energy"] = "displacement"
+    samples: int = 201
+    symmetry: Symmetry = "none"
+    accuracy: Accuracy = "default"
+    integrator: Integrator = "auto"
+
+    @cached_property
+    def space(self) -> DesignSpace:
+        """Shifts of the cloak's vertices; those of the driven units stay."""
+        return design_space(self.lattice, self.cloak, self.driven, self.symmetry)
+
+    @cached_property
+    def drives(self) -> tuple[Drive, ...]:
+        """The cases as the solvers take them."""
+        return tuple(Drive(self.driven, motion) for motion in self.motions)
+
+    @cached_property
+    def held(self) -> Ints:
+        """Ids of all prescribed dofs, ascending."""
+        driven = (3 * self.driven[:, None] + np.arange(3)).ravel()
+        return np.union1d(self.clamped, driven)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """The fixed structure; differentiable by what the design can change."""
+        moved = np.unique(self.lattice.unit[self.space.free_vertices])
+        return topology(self.lattice, self.held, self.barrier, self.cutoff, moved)
+
+    @cached_property
+    def region_ligaments(self) -> Ints:
+        """Ligaments that touch the region of interest."""
+        return np.flatnonzero(np.isin(self.lattice.ligament_units, self.region).any(axis=1))
