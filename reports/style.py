@@ -112,18 +112,28 @@ def srgb(lab: Array) -> Array:
 
 def colour_map(name: str, anchors: Sequence[str], levels: int = 256) -> ListedColormap:
     """Colour map through `anchors` with equal OKLab distance between neighbouring levels."""
+    return ListedColormap(_even_path(anchors, levels), name=name)
+
+
+def two_sided(name: str, low: Sequence[str], high: Sequence[str]) -> ListedColormap:
+    """Colour map of two even halves that meet in the first anchor of both."""
+    halves = [_even_path(anchors, 129) for anchors in (low, high)]
+    return ListedColormap(np.concatenate([halves[0][:0:-1], halves[1][1:]]), name=name)
+
+
+def _even_path(anchors: Sequence[str], levels: int) -> Array:
     corners = oklab(np.array([to_rgb(anchor) for anchor in anchors]))
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()
     at = np.linspace(0.0, 1.0, levels)
     path = np.column_stack([np.interp(at, way, corners[:, k]) for k in range(3)])
-    return ListedColormap(srgb(path), name=name)
+    return srgb(path)
 
 
 MAGNITUDE = colour_map("magnitude", ["#eceff1", "#8cc4d2", "#2f86b4", "#17427f", "#0c1538"])
 """From rest (pale) to large (dark): |U|, J and other sizes."""
 
-SIGNED = colour_map("signed", ["#0d3b70", "#5b9fce", "#efefee", "#d4845a", "#74240f"])
+SIGNED = two_sided("signed", ["#efefee", "#5b9fce", "#0d3b70"], ["#efefee", "#d9895f", "#6d1d0b"])
 """Symmetric about zero (pale): u_x, u_y, theta."""
 
 

@@ -35,7 +35,8 @@ def loss_panel(axes: Axes, design: xr.Dataset) -> None:
     axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.set_ylim(0.55 * float(design["loss"].min()), None)
+    axes.set_ylim(0.55 * min(target, float(design["loss"].min())), None)
+    axes.xaxis.set_major_locator(MaxNLocator(5, integer=True))
     axes.annotate(
         "paper’s −70 %",
         (1.0, target),

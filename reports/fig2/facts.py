@@ -106,8 +106,9 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         note = (
             f"best feasible after {int(history['best_evaluation'])}, 90 % of the way after {soon}"
         )
-        paper = "≈ 150 (MMA)" if ours else "—"
-        yield number(f"evaluations_{method}", f"Evaluations, {name}", count, paper=paper, note=note)
+        yield number(
+            f"evaluations_{method}", f"Evaluations, {name}", count, paper="≈ 150", note=note
+        )
         note = "shipped" if ours else "not shipped"
         yield number(f"best_{method}", f"Best feasible J, {name}", best, note=note)
         residual = float(history["kkt_residual"])

@@ -65,18 +65,17 @@ def problem_panel(axes: Axes, scene: Scene, structure: Structure, name: str) -> 
         outline(axes, middle, scene.radii, style.CLOAKED)
     if name == "altered":
         _direction(axes, scene)
-    drive_arrows(
-        axes, middle, MONITORED, (0.75 * scene.spacing, 2.6 * scene.spacing), style.ALTERED
-    )
+    reach = (0.75 * scene.spacing, 0.16 * scene.columns * scene.spacing + 0.2 * scene.spacing)
+    drive_arrows(axes, middle, MONITORED, reach, style.ALTERED)
 
 
 def _direction(axes: Axes, scene: Scene) -> None:
     """The loading angle, between the x axis and the drive."""
     x, y = scene.middle
     halo: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.0, foreground="white")]
-    radius = 3.0 * scene.spacing
+    radius = 0.2 * scene.columns * scene.spacing
     line = axes.plot(
-        [x + 0.3 * radius, x + 1.15 * radius], [y, y], color=style.INTACT, lw=0.6, zorder=6
+        [x + 0.75 * scene.spacing, x + 1.15 * radius], [y, y], color=style.INTACT, lw=0.6, zorder=6
     )[0]
     arc = Arc((x, y), 1.7 * radius, 1.7 * radius, theta1=0, theta2=MONITORED, lw=0.6, zorder=6)
     axes.add_patch(arc)

@@ -1,0 +1,26 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports.build import publish
+from reports.study import Study
+from tests.reports import synthetic
+
+
+@pytest.fixture(scope="session")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    return synthetic.written(tmp_path_factory.mktemp("fig2"))
+
+
+@pytest.fixture(scope="session")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    return synthetic.written(tmp_path_factory.mktemp("quick"), "quick")
+
+
+@pytest.fixture(scope="session")
+def report(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    publish(study, folder)
+    return folder

@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports import build
+from reports.study import Study
+from tests.reports import synthetic
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def command(paths: tuple[Path, Path, Path], out: Path, preset: str | None) -> list[str]:
+    names = zip(build.DATASETS, paths, strict=True)
+    given = [word for name, path in names for word in (f"--{name}", str(path))]
+    chosen = [] if preset is None else ["--preset", preset]
+    return ["--problem", str(synthetic.PROBLEM), *chosen, *given, "--out-dir", str(out)]
+
+
+def test_report_is_complete(report: Path) -> None:
+    assert sorted(contents(report)) == [
+        "design.csv", "facts.csv", "facts.json", "fig2.pdf", "fig2.png", "fig2.svg",
+        "index.html", "loss_history.csv", "robustness.csv", "top_edge.csv",
+    ]  # fmt: skip
+
+
+def test_rebuilding_gives_the_same_bytes(study: Study, report: Path, tmp_path: Path) -> None:
+    build.publish(study, tmp_path / "again")
+    assert contents(tmp_path / "again") == contents(report)
+
+
+def test_command_line(tmp_path: Path) -> None:
+    paths = synthetic.write(tmp_path, "quick")
+    out = tmp_path / "report"
+    assert build.main(command(paths, out, "quick")) == 0
+    assert (out / "index.html").is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "design.nc", "report", "response.nc", "sweep.nc"
+    ]  # fmt: skip
+
+
+def test_datasets_of_another_problem_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    paths = synthetic.write(tmp_path, "quick")
+    assert build.main(command(paths, tmp_path / "report", None)) == 2
+    told = capfd.readouterr().err
+    assert "the dataset was made from another problem" in told
+    assert "design.nc" in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "report").exists()
+
+
+def test_a_build_that_fails_leaves_the_old_report(
+    quick: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "report"
+    build.publish(quick, folder)
+    before = contents(folder)
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "index.html")
+
+    monkeypatch.setattr("reports.facts.write_csv", full)
+    with pytest.raises(Exception, match="space"):
+        build.publish(quick, folder)
+    assert contents(folder) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_help_needs_no_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        build.main(["--help"])
+    assert end.value.code == 0
+    assert "--out-dir" in capsys.readouterr().out

@@ -1,0 +1,121 @@
+from __future__ import annotations
+
+import dataclasses
+import io
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+from reports import style
+from reports.fig2 import figure
+from reports.fig2.structures import simulated_rows
+from reports.study import Study
+
+
+def drawn(study: Study, recorded: int = 0) -> Figure:
+    rows = simulated_rows(study.scene, study.response)
+    with style.styled():
+        made = figure.build(study, [dataclasses.replace(rows[0], source="experiment")] * recorded)
+        FigureCanvasAgg(made).print_raw(io.BytesIO())  # type: ignore[no-untyped-call]
+    return made
+
+
+def texts(made: Figure) -> list[Text]:
+    found = made.findobj(lambda artist: isinstance(artist, Text) and artist.get_visible())
+    return [text for text in found if isinstance(text, Text) and text.get_text().strip()]
+
+
+def shown(made: Figure) -> list[tuple[str, Bbox]]:
+    """Texts with their extents in pixels, but for ticks beyond the axes or of hidden axes."""
+    clipped = {
+        id(tick.label1)
+        for axes in made.axes
+        for axis in (axes.xaxis, axes.yaxis)
+        for tick in axis.get_major_ticks() + axis.get_minor_ticks()
+        if not (axes.axison and _within(tick.get_loc(), axis.get_view_interval()))
+    }
+    kept = [text for text in texts(made) if id(text) not in clipped and text.get_text() != "DRAFT"]
+    return [(text.get_text(), text.get_window_extent()) for text in kept]
+
+
+def _within(value: float, limits: tuple[float, float]) -> bool:
+    low, high = np.sort(limits)
+    slack = 1e-9 * (high - low)
+    return bool(low - slack <= value <= high + slack)
+
+
+@pytest.fixture(scope="module")
+def whole(study: Study) -> Figure:
+    return drawn(study)
+
+
+@pytest.mark.parametrize("preset", ["study", "quick"])
+def test_no_text_is_cut_or_overlaps(preset: str, request: pytest.FixtureRequest) -> None:
+    made = drawn(request.getfixturevalue(preset))
+    page = made.bbox
+    boxes = shown(made)
+    for text, box in boxes:
+        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= page.x1 and box.y1 <= page.y1
+        assert inside, text
+    for (first, a), (second, b) in combinations(boxes, 2):
+        assert not a.overlaps(b.shrunk(0.9, 0.9)), (first, second)
+
+
+def test_type_is_legible_at_two_columns(whole: Figure) -> None:
+    width, height = whole.get_size_inches() * style.MM_PER_INCH
+    assert width == pytest.approx(178.0)
+    assert height < 235.0
+    assert {text.get_fontsize() for text in texts(whole)} <= {6.0, 7.0, 7.5, 9.0}
+
+
+def test_panels_are_lettered(whole: Figure) -> None:
+    words = {text.get_text() for text in texts(whole)}
+    assert set("abcde") <= words
+    assert "DRAFT" not in words
+
+
+def test_axes_name_their_units(whole: Figure) -> None:
+    labels = {axes.get_xlabel() for axes in whole.axes} | {axes.get_ylabel() for axes in whole.axes}
+    assert {"Time $t$ (s)", "$u_y$ (mm)", "Frequency $f$ (Hz)", "Evaluation"} <= labels
+    assert r"Loading angle $\alpha$ (°)" in labels
+
+
+def test_snapshots_are_near_the_peaks_of_one_cycle(study: Study) -> None:
+    altered, cloaked = simulated_rows(study.scene, study.response)
+    np.testing.assert_allclose(altered.time, [1.525, 1.65, 1.775, 1.9], atol=1e-9)
+    np.testing.assert_array_equal(altered.time, cloaked.time)
+    assert altered.displacement.shape == (4, 225, 3)
+
+
+def test_recorded_rows_take_their_place(study: Study, whole: Figure) -> None:
+    more = drawn(study, recorded=2)
+    assert len(more.axes) == len(whole.axes) + 8
+    assert more.get_size_inches()[1] > whole.get_size_inches()[1]
+    assert more.get_size_inches()[1] * style.MM_PER_INCH < 250.0
+
+
+def test_a_draft_says_so(quick: Study) -> None:
+    assert "DRAFT" in {text.get_text() for text in texts(drawn(quick))}
+    assert "49 units instead of 225" in quick.draft
+    assert "accuracy of the solver: draft" in quick.draft
+
+
+def test_values_on_the_figure_are_computed(whole: Figure) -> None:
+    words = {text.get_text() for text in texts(whole)}
+    assert "peak-to-peak −88.0 %" in words
+    assert {"0.82 mm", "0.10 mm"} <= words
+
+
+def test_failed_points_of_the_map_are_crossed_out(study: Study) -> None:
+    sweep = study.sweep.copy(deep=True)
+    sweep["loss"][3, 4] = np.nan
+    sweep["status"] = sweep["status"].astype(object)
+    sweep["status"][3, 4] = "no convergence at t = 0.1 s"
+    made = drawn(dataclasses.replace(study, sweep=sweep))
+    crosses = [line for axes in made.axes for line in axes.lines if line.get_marker() == "x"]
+    np.testing.assert_allclose(np.asarray(crosses[0].get_xydata()), [[45.0, 6.0]])

@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.colors import Normalize
+
+from reports import measures, structure, style
+from reports.structure import Structure
+from reports.study import Study
+
+SQUARE = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
+TRIANGLE = np.array([[10.0, 0.0], [13.0, 0.0], [10.0, 3.0], [np.nan, np.nan]])
+
+
+@pytest.fixture
+def pair() -> Structure:
+    return Structure(
+        vertices=np.stack([SQUARE, TRIANGLE]),
+        site=np.array([[1.0, 1.0], [11.0, 1.0]]),
+        ligament_unit=np.array([[0, 1]]),
+        ligament_vertex=np.array([[1, 0]]),
+        region=np.array([structure.SURROUNDINGS, structure.CLOAK]),
+        support=np.array([structure.CLAMPED, structure.FREE]),
+    )
+
+
+def test_centroids_of_padded_polygons(pair: Structure) -> None:
+    np.testing.assert_allclose(pair.centroid, [[1, 1], [11, 1]], atol=1e-12)
+    np.testing.assert_allclose(measures.polygon_areas(pair.vertices), [4, 4.5])
+
+
+def test_a_unit_turns_about_its_centroid(pair: Structure) -> None:
+    displacement = np.array([[0.5, -0.25, np.pi / 2], [0.0, 0.0, 0.0]])
+    moved = structure.deformed(pair, displacement)
+    np.testing.assert_allclose(
+        moved[0], [[2.5, -0.25], [2.5, 1.75], [0.5, 1.75], [0.5, -0.25]], atol=1e-12
+    )
+    np.testing.assert_array_equal(moved[1], TRIANGLE)
+
+
+def test_void_units_are_not_drawn_and_values_follow(pair: Structure) -> None:
+    holed = Structure(**{**vars(pair), "region": np.array([structure.VOID, structure.CLOAK])})
+    axes = style.place(style.page(50.0), 5, 5, 40, 40)
+    drawn = structure.draw(
+        axes, holed, values=np.array([1.0, 2.0]), colour_map=style.MAGNITUDE, norm=Normalize(0, 2)
+    )
+    assert len(drawn.get_paths()) == 1
+    values = drawn.get_array()
+    assert values is not None
+    np.testing.assert_array_equal(values, [2.0])
+    assert np.shape(drawn.get_paths()[0].vertices) == (4, 2)  # three corners, closed
+
+
+def test_middle_of_the_top_edge(study: Study) -> None:
+    full = structure.from_dataset(study.design, study.scene.spacing)
+    assert structure.middle_of_top_edge(full) == 7 + 15 * 14
+
+
+def test_middle_of_an_even_edge_is_the_left_one_of_two() -> None:
+    site = np.array([[i, j] for j in range(2) for i in range(4)], float) * 15.0
+    empty = np.zeros((8, 0), int)
+    plain = Structure(np.zeros((8, 4, 2)), site, empty, empty, np.zeros(8, int), np.zeros(8, int))
+    assert structure.middle_of_top_edge(plain) == 5
