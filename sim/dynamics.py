@@ -57,6 +57,10 @@ class Solver(Protocol):
     topology: Topology
     threads: int
 
+    def refined(self) -> Solver:
+        """A more accurate one of the same kind, to estimate the error by."""
+        ...
+
     def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Any]:
         """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
 

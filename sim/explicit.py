@@ -10,7 +10,7 @@ segment, so memory grows with the square root of the number of steps.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse.linalg as spla
@@ -216,6 +216,10 @@ class ExplicitSolver:
     threads: int = 1
     touching: Ints | None = None
     splitting: Splitting = BLANES_MOAN
+
+    def refined(self) -> ExplicitSolver:
+        """The same with twice the steps, to estimate the error by."""
+        return replace(self, n_steps=2 * self.n_steps)
 
     def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""

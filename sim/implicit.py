@@ -10,7 +10,7 @@ while it contracts. The adjoint refactors at every stage, so that it is the deri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -323,6 +323,10 @@ class ImplicitSolver:
     threads: int = 1
     turn_allowance: float = np.inf
     tableau: Tableau = ESDIRK3
+
+    def refined(self) -> ImplicitSolver:
+        """The same with every step cut in two, to estimate the error by."""
+        return replace(self, times=grid.halved(self.times))
 
     def touching(self, values: Parameters) -> Ints:
         """Ligaments in which contact is computed."""

@@ -103,7 +103,9 @@ def make_plan(
     decisions: list[str] = []
     skipped = ["simulation of the unloaded reference: it is zero"]
 
-    case_of = _equal_cases(scene, structure)
+    stays_symmetric = vertices is not None or scene.symmetry == "C4"
+    every_case = np.arange(len(scene.motions))
+    case_of = _equal_cases(scene, structure) if stays_symmetric else every_case
     if len(np.unique(case_of)) < len(case_of):
         skipped.append(
             f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned by 90 deg"
@@ -147,7 +149,7 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> Parameters:
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
     every = np.arange(len(scene.motions))
     directions = [getattr(motion, "direction", None) for motion in scene.motions]
-    if scene.symmetry != "C4" or any(direction is None for direction in directions):
+    if any(direction is None for direction in directions):
         return every
     image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
     clamped_units = np.unique(scene.clamped // 3)

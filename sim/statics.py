@@ -7,7 +7,7 @@ shifted until it is positive definite, so that the path ends in minima and leave
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -247,6 +247,10 @@ class StaticSolver:
     absolute: float = 1e-11
     threads: int = 1
     touching: Ints | None = None
+
+    def refined(self) -> StaticSolver:
+        """The same to a hundred times tighter a tolerance, to estimate the error by."""
+        return replace(self, relative=self.relative / 100)
 
     def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""

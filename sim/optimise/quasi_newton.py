@@ -6,6 +6,8 @@ import numpy as np
 
 from sim.lattice import Floats
 
+import os
+EASE = float(os.environ.get('EASE','1'))
 DAMPING = 0.2
 """Smallest curvature along a step, relative to the model's, that an update may leave."""
 
@@ -31,7 +33,7 @@ class QuasiNewton:
             return
         along = float(step @ change)
         if not self._learned and along > 0:
-            self.matrix = np.eye(len(step)) * (along / float(step @ step))
+            self.matrix = np.eye(len(step)) * (EASE * along / float(step @ step))
             self._learned = True
         image = self.matrix @ step
         model = float(step @ image)

@@ -18,6 +18,8 @@ from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
 
+import os
+RESET=os.environ.get("RESET","0")=="1"; NORESTART=os.environ.get("NORESTART","1")=="1"
 ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
 """Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
 
@@ -78,14 +80,17 @@ def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
         raise point
     residual = problem.stationarity(point).residual
     problem.record(place, point, True, options.radius, residual)
-    reason = Descent(problem, point, options).run()
+    descent = Descent(problem, point, options)
+    reason = descent.run()
     random = np.random.default_rng(options.seed)
     for _ in range(options.kicks):
         if problem.finished is not None:
             break
         kicked = _kick(problem, options, random)
         if kicked is not None:
-            reason = Descent(problem, kicked, options).run()
+            if RESET: descent = Descent(problem, kicked, options)
+            else: descent.go_on_from(kicked)
+            reason = descent.run()
     return problem.result(problem.finished or reason)
 
 
@@ -118,12 +123,19 @@ class Descent:
             if self.residual <= self.options.residual:
                 return "stationary"
             if self._stalled():
-                if self.point.loss > restarted_at * (1 - self.options.progress):
+                if NORESTART or self.point.loss > restarted_at * (1 - self.options.progress):
                     return "no further progress"
                 restarted_at = self.point.loss
                 self._forget()
             self._step()
         return self.problem.finished
+
+    def go_on_from(self, point: Point) -> None:
+        """Moves elsewhere, keeping what the model has learned."""
+        self.point = point
+        self.residual = self.problem.stationarity(point).residual
+        self.radius = self.options.radius
+        self.losses = [point.loss]
 
     def _forget(self) -> None:
         """Starts the model and the radius afresh."""

@@ -1,0 +1,184 @@
+"""Stage: optimises the cloak of a problem by one method and writes the design with its history."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline import cli, problem
+from pipeline.errors import UserError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from sim.optimise import Evaluation, Result
+    from sim.plan import Plan
+    from sim.scene import Scene
+
+LOG = logging.getLogger(__name__)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.design",
+        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from which the same"
+        " command resumes after any kind of end.",
+    )
+    made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads the problem, optimises, writes the design.
+
+    Raises:
+        UserError: a fault of the problem, no feasible start, or a start that cannot be simulated.
+    """
+    from pipeline import datasets, provenance
+    from pipeline.scenes import scene_of
+    from sim.plan import make_plan
+
+    asked = problem.load(args.problem, args.preset)
+    scene = scene_of(asked, args.problem.parent)
+    plan = make_plan(scene, threads=args.threads)
+    LOG.info("%s", plan.describe())
+    result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent)
+    LOG.info("stopped: %s", result.reason)
+    made = design_dataset(asked, scene, result)
+    origin = provenance.attributes(asked, "design", method=args.method, plan=plan.record())
+    datasets.write(made, args.out, "design_method", origin)
+
+
+def optimise(
+    asked: Problem, scene: Scene, plan: Plan, method: str, source: Path, results: Path
+) -> Result:
+    """Runs the optimiser with a journal in ``results`` and a progress bar."""
+    from pipeline.sources import source_hash
+    from sim.constraints import Constraints
+    from sim.errors import SimulationError
+    from sim.evaluation import evaluator
+    from sim.optimise import InfeasibleStartError, Journal, JournalInUseError, minimise
+
+    budget = asked.optimiser.methods.chosen.get(method)
+    if budget is None:
+        raise UserError(
+            f"the problem does not ask for the method {method}",
+            file=source,
+            key="optimiser.methods",
+            remedy=f"add optimiser.methods.{method}.evaluations",
+        )
+    key = problem.section_hash(asked, "design", method)
+    folder = results / ".journal" / key[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    space = scene.space
+    import numpy as np
+
+    from pipeline.scenes import limits_of
+
+    with cli.progress(budget.evaluations, f"design by {method}") as bar:
+
+        def show(evaluation: Evaluation) -> None:
+            bar.update(loss=evaluation.loss, violation=evaluation.violation)
+
+        try:
+            with Journal(folder / f"{method}.journal", f"{key} {source_hash('pipeline.design')}") as journal:
+                return minimise(
+                    method,  # type: ignore[arg-type]
+                    journal.wrap(evaluator(scene, plan)),
+                    Constraints(space, limits_of(asked)),
+                    np.zeros(space.n_variables),
+                    options=_options(asked, method),
+                    callback=show,
+                )
+        except (InfeasibleStartError, SimulationError, JournalInUseError) as error:
+            raise UserError(str(error), file=source) from error
+
+
+def _options(asked: Problem, method: str):  # noqa: ANN202  (a union of imported option types)
+    from sim.optimise import MmaOptions, SqpOptions
+
+    wanted = asked.optimiser
+    evaluations = wanted.methods.chosen[method].evaluations
+    if method == "mma":
+        return MmaOptions(evaluations=evaluations)
+    return SqpOptions(
+        evaluations=evaluations,
+        radius=wanted.trust_radius,
+        radius_max=wanted.trust_radius_max,
+        kick=wanted.kick,
+        seed=wanted.seed,
+    )
+
+
+def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
+    """The dataset ``design_method`` of an optimisation."""
+    import numpy as np
+    import xarray as xr
+
+    from pipeline.scenes import limits_of
+    from pipeline.structures import network_variables, unit_coordinates
+    from sim.clearance import overlapping_pairs, smallest_gap
+    from sim.constraints import KIND_NAMES, margins
+    from sim.geometry import shape
+
+    lattice, history = scene.lattice, result.evaluations
+    vertices = np.asarray(scene.space.vertices(result.x))
+    found = margins(lattice, vertices, limits_of(asked))
+    cases = len(scene.motions)
+    nothing = np.full(cases, np.nan)
+    variables = {
+        **network_variables(asked, scene),
+        "vertices": (("unit", "vertex", "xy"), lattice.padded(vertices)),
+        "vertices_initial": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
+        "centroid": (("unit", "xy"), np.asarray(shape(lattice, vertices).centroid)),
+        "constraint_margin": (
+            ("constraint",),
+            [found[kind].value if kind in found else np.nan for kind in KIND_NAMES],
+        ),
+        "smallest_gap": ((), smallest_gap(lattice, vertices).distance),
+        "overlaps": ((), len(overlapping_pairs(lattice, vertices))),
+        "loss": (("evaluation",), [e.loss for e in history]),
+        "loss_case": (
+            ("evaluation", "case"),
+            np.stack([e.aux if e.failure is None else nothing for e in history]),
+        ),
+        "violation": (("evaluation",), [e.violation for e in history]),
+        "accepted": (("evaluation",), [int(e.accepted) for e in history]),
+        "design_vector": (("evaluation", "variable"), np.stack([e.x for e in history])),
+        "best_evaluation": ((), result.best),
+        "best_loss": ((), result.loss),
+        "kkt_residual": ((), result.stationarity.residual),
+    }
+    coordinates = {
+        **unit_coordinates(lattice),
+        "direction": (("case",), np.rad2deg(case_directions(asked))),
+        "evaluation": (("evaluation",), np.arange(len(history))),
+        "constraint": (("constraint",), list(KIND_NAMES)),
+        "constraint_units": (
+            ("constraint",),
+            ["mm" if kind in ("edge_length", "gap") else "rad" for kind in KIND_NAMES],
+        ),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def case_directions(asked: Problem) -> list[float]:
+    """Direction of each load case in rad; zero for a measured drive."""
+    return list(getattr(asked.drive, "directions", (0.0,)))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,149 @@
+"""From a problem to the scene that sim/ simulates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import problem as problems
+from pipeline.errors import UserError
+from pipeline.problem import Problem
+from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp, TimeSeries
+from sim import loads
+from sim.constraints import Limits
+from sim.lattice import Lattice, quads
+from sim.model import Material
+from sim.scene import Scene
+
+DOFS = ("ux", "uy", "theta")
+TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
+
+
+def lattice_of(problem: Problem) -> Lattice:
+    """The initial network of a problem."""
+    wanted = problem.lattice
+    return quads(
+        wanted.columns, wanted.rows, wanted.spacing, wanted.ligament_length, wanted.bias_angle
+    )
+
+
+def scene_of(problem: Problem, folder: Path, motions: tuple[loads.Motion, ...] | None = None) -> Scene:
+    """The scene of a problem whose files lie in ``folder``.
+
+    Args:
+        problem: the problem.
+        folder: where the problem's own files (a measured drive) are.
+        motions: drives to use in place of the problem's load cases.
+
+    Raises:
+        UserError: the file of a measured drive cannot be read.
+    """
+    made = motions_of(problem, folder) if motions is None else motions
+    weights = problem.drive.case_weights if motions is None else np.full(len(made), 1 / len(made))
+    samples = problem.horizon.samples
+    return Scene(
+        lattice=lattice_of(problem),
+        material=_material(problem),
+        barrier=problem.contact.barrier_angle,
+        cutoff=problem.contact.cutoff_angle,
+        clamped=clamped_dofs(problem),
+        driven=driven_units(problem),
+        motions=made,
+        weights=np.asarray(weights),
+        duration=problem.horizon_time,
+        frequency=problem.frequency,
+        static=isinstance(problem.drive, LinearRamp | TanhRamp),
+        cloak=np.array(problems.cloak_units(problem), dtype=np.int64),
+        region=np.array(problems.interest_units(problem), dtype=np.int64),
+        objective=problem.objective.kind,
+        samples=samples + 1 - samples % 2,
+        symmetry=problem.optimiser.symmetry,
+        accuracy=problem.solver.accuracy,
+        integrator=problem.solver.integrator,
+    )
+
+
+def limits_of(problem: Problem) -> Limits:
+    """What a design must keep to so that it can be made."""
+    asked = problem.constraints
+    return Limits(
+        edge_length=asked.edge_length,
+        block_angle=asked.block_angle,
+        convex=asked.convex,
+        void_angle=asked.void_angle,
+        gap=asked.gap,
+    )
+
+
+def clamped_dofs(problem: Problem) -> NDArray[np.int64]:
+    """Ids (3 unit + dof) of the dofs that the supports hold, ascending."""
+    ids = {
+        3 * unit + DOFS.index(dof)
+        for support in problem.supports
+        for unit in problems.selected_units(support.units, problem.lattice)
+        for dof in support.clamp
+    }
+    return np.array(sorted(ids), dtype=np.int64)
+
+
+def driven_units(problem: Problem) -> NDArray[np.int64]:
+    """Ids of the units that follow the drive."""
+    return np.array(problems.selected_units(problem.drive.units, problem.lattice), dtype=np.int64)
+
+
+def _material(problem: Problem) -> Material:
+    given = problem.material
+    translation, rotation = problem.damping_coefficients
+    return Material(
+        density=given.density,
+        axial=given.axial_stiffness,
+        shear=given.shear_stiffness,
+        bending=given.bending_stiffness,
+        contact=problem.contact.stiffness,
+        damping_translation=translation,
+        damping_rotation=rotation,
+    )
+
+
+def motions_of(problem: Problem, folder: Path) -> tuple[loads.Motion, ...]:
+    """The drive of every load case."""
+    drive = problem.drive
+    match drive:
+        case TimeSeries():
+            return (_measured(folder / drive.file),)
+        case RampHarmonic():
+            return tuple(
+                loads.Harmonic(drive.amplitude, drive.frequency, a, drive.rise_time, drive.delay)
+                for a in drive.directions
+            )
+        case Harmonic():
+            return tuple(
+                loads.Harmonic(drive.amplitude, drive.frequency, a) for a in drive.directions
+            )
+        case TanhRamp():
+            return tuple(
+                loads.TanhRamp(drive.amplitude, drive.duration, a) for a in drive.directions
+            )
+        case LinearRamp():
+            return tuple(
+                loads.LinearRamp(drive.amplitude, drive.duration, a) for a in drive.directions
+            )
+
+
+def _measured(path: Path) -> loads.TimeSeries:
+    """A measured motion: a CSV with the columns TIME_SERIES_COLUMNS, times ascending."""
+    remedy = "write a CSV with the header " + ", ".join(TIME_SERIES_COLUMNS)
+    try:
+        header, *_ = path.read_text(encoding="utf-8").splitlines() or [""]
+        if tuple(name.strip() for name in header.split(",")) != TIME_SERIES_COLUMNS:
+            raise UserError("the columns of a measured drive are wrong", file=path, value=header, remedy=remedy)
+        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise UserError(f"the measured drive cannot be read: {error}", file=path, remedy=remedy) from error
+    if table.shape[1:] != (4,) or not np.isfinite(table).all() or (np.diff(table[:, 0]) <= 0).any():
+        raise UserError(
+            "the measured drive needs finite values at ascending times", file=path, remedy=remedy
+        )
+    return loads.TimeSeries(table[:, 0], table[:, 1:])

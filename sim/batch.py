@@ -1,0 +1,67 @@
+"""Many independent cases in one call: spread over cores, memory flat, failures kept with their reason."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from sim.dynamics import Drive, Solver
+from sim.errors import SimulationError
+from sim.kernels import Floats
+from sim.model import Parameters
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One structure under one drive, and the solver to use."""
+
+    values: Parameters
+    drive: Drive
+    solver: Solver
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[R]):
+    """What came of a case: the measure's value, or why there is none."""
+
+    value: R | None
+    failure: str | None = None
+
+
+Measure = Callable[[Case, Floats, Floats], R]
+"""Reduces a case's displacement and velocity (n_asked, n_units, 3) to what is kept of it."""
+
+
+def run_batch(
+    cases: Iterable[Case], measure: Measure[R], threads: int = 1
+) -> Iterator[Outcome[R]]:
+    """Yields the outcome of every case, in order, while others are still computed.
+
+    Cases are taken from the iterable as cores fall free, at most two per thread ahead, and only what
+    ``measure`` returns is kept of them. A case whose simulation fails yields its reason.
+    """
+    if threads == 1:
+        yield from (_outcome(case, measure) for case in cases)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        ahead: deque[Future[Outcome[R]]] = deque()
+        for case in cases:
+            ahead.append(pool.submit(_outcome, case, measure))
+            if len(ahead) >= 2 * threads:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+
+
+def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
+    shape = (-1, case.solver.topology.n_units, 3)
+    try:
+        displacement, velocity, _ = case.solver.forward(case.values, case.drive)
+    except SimulationError as error:
+        return Outcome(None, str(error))
+    return Outcome(measure(case, displacement.reshape(shape), velocity.reshape(shape)))
