@@ -13,6 +13,7 @@ from typing import Any
 import jinja2
 import numpy as np
 import xarray as xr
+from markupsafe import Markup, escape
 from numpy.typing import NDArray
 
 from reports.facts import Fact
@@ -58,6 +59,7 @@ class Page:
 
     title: str
     lead: str
+    credit: str
     figure_title: str
     caption: str
     svg: str
@@ -69,6 +71,7 @@ class Page:
     player_note: str
     provenance: Sequence[Source]
     problem: str
+    skipped: Sequence[str]
     draft: Sequence[str] = field(default_factory=tuple)
 
 
@@ -83,18 +86,17 @@ class Source:
 def source(name: str, data: xr.Dataset) -> Source:
     """Attributes of a dataset, except the problem, which the page shows once."""
     kept = {str(key): value for key, value in data.attrs.items() if key != "problem"}
-    return Source(name, [(key, _plain(kept[key])) for key in sorted(kept)])
+    return Source(name, [entry for key in sorted(kept) for entry in _entries(key, kept[key])])
 
 
-def _plain(value: object) -> str:
-    """An attribute as text; JSON objects become lines of `key: value`."""
-    text = str(value)
-    if not text.startswith(("{", "[")):
-        return text
-    parsed = json.loads(text)
-    if isinstance(parsed, dict):
-        return "; ".join(f"{key}: {inner}" for key, inner in sorted(parsed.items()))
-    return "; ".join(str(item) for item in parsed)
+def _entries(key: str, value: object) -> list[tuple[str, str]]:
+    """An attribute as lines of text; JSON in it is unfolded, one line a leaf or a list."""
+    if isinstance(value, str) and value.startswith(("{", "[")):
+        value = json.loads(value)
+    if isinstance(value, dict):
+        return [line for name in sorted(value) for line in _entries(f"{key}: {name}", value[name])]
+    items = value if isinstance(value, list) else [value]
+    return [(key, "; ".join(str(item) for item in items))]
 
 
 def render(page: Page) -> str:
@@ -106,6 +108,7 @@ def render(page: Page) -> str:
         keep_trailing_newline=True,
     )
     environment.filters["groupby_order"] = _in_order
+    environment.filters["symbols"] = _symbols
     values = dict(vars(page))
     values["tables"] = [_link(table) for table in page.tables]
     values["svg"] = _inline(page.svg)
@@ -128,6 +131,11 @@ def _inline(svg: str) -> str:
     element = svg[svg.index("<svg") :]
     element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
     return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
+
+
+def _symbols(text: str) -> Markup:
+    """Escaped text in which u_y has its index."""
+    return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
 
 
 def _in_order(items: Iterable[Fact], attribute: str) -> list[dict[str, object]]:

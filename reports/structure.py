@@ -80,9 +80,13 @@ def polygon_centroids(vertices: Array) -> Array:
 
 
 def deformed(structure: Structure, displacement: Array | None = None) -> Array:
-    """Vertices (n_units, n_vertices, 2) mm after `displacement` (n_units, 3) in mm, mm, rad."""
+    """Vertices (n_units, n_vertices, 2) mm after `displacement` (n_units, 3) in mm, mm, rad.
+
+    Units whose displacement is NaN (not known) stay at rest.
+    """
     if displacement is None:
         return structure.vertices
+    displacement = np.nan_to_num(displacement)
     centroid = structure.centroid
     arm = structure.vertices - centroid[:, None]
     cosine, sine = np.cos(displacement[:, 2, None]), np.sin(displacement[:, 2, None])

@@ -15,7 +15,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.colors import Colormap, ListedColormap, to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -110,15 +110,17 @@ def srgb(lab: Array) -> Array:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
-def colour_map(name: str, anchors: Sequence[str], levels: int = 256) -> ListedColormap:
+def colour_map(name: str, anchors: Sequence[str], levels: int = 256) -> Colormap:
     """Colour map through `anchors` with equal OKLab distance between neighbouring levels."""
-    return ListedColormap(_even_path(anchors, levels), name=name)
+    return ListedColormap(_even_path(anchors, levels), name=name).with_extremes(bad="white")
 
 
-def two_sided(name: str, low: Sequence[str], high: Sequence[str]) -> ListedColormap:
+def two_sided(name: str, low: Sequence[str], high: Sequence[str]) -> Colormap:
     """Colour map of two even halves that meet in the first anchor of both."""
     halves = [_even_path(anchors, 129) for anchors in (low, high)]
-    return ListedColormap(np.concatenate([halves[0][:0:-1], halves[1][1:]]), name=name)
+    return ListedColormap(
+        np.concatenate([halves[0][:0:-1], halves[1][1:]]), name=name
+    ).with_extremes(bad="white")
 
 
 def _even_path(anchors: Sequence[str], levels: int) -> Array:

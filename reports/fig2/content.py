@@ -88,10 +88,10 @@ def build(
     by_key = {fact.key: fact for fact in facts}
     return Page(
         title=scene.title,
-        lead=(
-            f"{scene.columns} × {scene.rows} rotating units, driven at the centre with "
-            f"{scene.amplitude:g} mm at {scene.frequency:g} Hz, corners clamped: Figure 2 of "
-            "Bordiga et al., “Nonlinear mechanical metamaterial cloaks”, built from the datasets."
+        lead=study.problem.doc.strip(),
+        credit=(
+            "After Figure 2 of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”; every "
+            "number here is computed from the datasets."
         ),
         figure_title="Shielding dynamic excitations",
         caption=CAPTION,
@@ -106,6 +106,7 @@ def build(
         problem=json.dumps(
             json.loads(canonical_json(study.problem)), indent=1, sort_keys=True, ensure_ascii=False
         ),
+        skipped=_skipped(study.response),
         draft=study.draft,
     )
 
@@ -118,6 +119,20 @@ def _player_note(player: Mapping[str, Any]) -> str:
         f"±{turn:.1g} rad; between them the motion is interpolated. The dot marks the unit of "
         "panel d."
     )
+
+
+def _skipped(response: xr.Dataset) -> list[str]:
+    """What the simulation left out, each with the structures that it holds for."""
+    plans = json.loads(response.attrs["plan"])
+    names: dict[str, list[str]] = {}
+    for structure, plan in plans.items():
+        for text in plan["skipped"]:
+            names.setdefault(text, []).append(structure)
+    everywhere = len(plans)
+    return [
+        text if len(found) == everywhere else f"{text} ({', '.join(found)})"
+        for text, found in names.items()
+    ]
 
 
 def _provenance(study: Study) -> list[Source]:

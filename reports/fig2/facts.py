@@ -180,8 +180,10 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     worst = loss.where(loss == loss.max(), drop=True)
     angle, rate = float(worst["direction"][0]), float(worst["frequency"][0])
     note = f"at α = {angle:g}°, f = {rate:g} Hz"
-    yield number("map_max", "Largest J", float(loss.max()), digits=3, paper="< 0.35", note=note)
-    yield number("map_min", "Smallest J", float(loss.min()), digits=3)
+    yield number(
+        "map_max", "Largest J over the map", float(loss.max()), digits=3, paper="< 0.35", note=note
+    )
+    yield number("map_min", "Smallest J over the map", float(loss.min()), digits=3)
     note = "1 − √(J / J of the altered structure) at the worst point"
     yield share(
         "map_reduction", "RMS |U| reduced at least by", 1 - float(np.sqrt(ratio.max())), note=note

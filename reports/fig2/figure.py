@@ -27,10 +27,11 @@ SNAPSHOT = 40.0
 
 
 def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
-    """The whole figure; rows of `recorded` snapshots stand above the simulated ones."""
+    """The whole figure; `recorded` snapshots stand above the simulated ones of their structure."""
     scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
     simulated = simulated_rows(scene, response)
-    rows = [*recorded, *simulated]
+    names = [row.name for row in simulated]
+    rows = sorted([*recorded, *simulated], key=lambda row: names.index(row.name))
     snapshots = min(SNAPSHOT * len(rows), TALLEST_SNAPSHOTS)
     top_c = 51.5
     top_d = top_c + 8.5 + snapshots + 1.0
@@ -42,7 +43,8 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
     style.letter(figure, 0.0, top_d, "d", "Middle unit of the top edge, $α$ = 45°")
     motion_panel(style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0), scene, response, simulated)
-    style.letter(figure, 110.0, top_d, "e", "Robustness")
+    most = f"largest $J$ = {float(sweep['loss'].max()):.3f}"
+    style.letter(figure, 110.0, top_d, "e", f"Robustness, {most}")
     axes = style.place(figure, 119.5, top_d + 6.0, 43.5, 36.0)
     map_panel(figure, axes, style.place(figure, 165.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
     if study.draft:

@@ -85,7 +85,9 @@ def test_page_tells_where_it_is_from(html: str, study: Study) -> None:
         assert digest in html
     for data in study.datasets.values():
         assert data.attrs["problem_hash"] in html
-    assert "skipped: [" in html
+    assert "<li>simulation of the unloaded reference: it is zero</li>" in html
+    assert "<li>2 of 4 load cases (altered)</li>" in html
+    assert "<dt>plan: cloaked: integrator</dt><dd>implicit</dd>" in html
     assert "&#34;spacing&#34;: 15.0" in html
 
 
