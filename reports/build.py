@@ -47,19 +47,19 @@ def write_report(study: Study, folder: Path) -> list[Path]:
     from reports import page, style
     from reports.fig2 import content, facts, figure, tables
 
-    with style.styled():
-        paths = style.save(figure.build(study), folder / study.name)
     known = facts.collect(study)
     fact_files.write_json(known, folder / "facts.json")
     fact_files.write_csv(known, folder / "facts.csv")
     data = tables.build(study)
     for table in data:
         (folder / table.name).write_bytes(table.csv)
+    with style.styled():
+        drawn = style.save(figure.build(study), folder / study.name)
     svg = (folder / f"{study.name}.svg").read_text(encoding="utf-8")
-    html = page.render(content.build(study, known, data, svg, [path.name for path in paths]))
+    html = page.render(content.build(study, known, data, svg, [path.name for path in drawn]))
     (folder / "index.html").write_text(html, encoding="utf-8")
     names = ["facts.json", "facts.csv", *(table.name for table in data), "index.html"]
-    return [*paths, *(folder / name for name in names)]
+    return [*drawn, *(folder / name for name in names)]
 
 
 @contextmanager

@@ -48,7 +48,7 @@ def loss_panel(axes: Axes, design: xr.Dataset) -> None:
         fontsize=style.SMALL,
         color=style.GREY,
     )
-    axes.legend(loc="upper right", borderaxespad=0.0)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.01), ncols=2, columnspacing=1.2)
 
 
 def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:

@@ -38,15 +38,15 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     figure = style.page(top_d + 51.0)
     _problem(figure, scene, design)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
-    loss_panel(style.place(figure, 133.5, 7.5, 43.5, 32.5), design)
+    loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design)
     style.letter(figure, 0.0, top_c, "c", "Response over one drive cycle, $α$ = 45°")
     snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
     style.letter(figure, 0.0, top_d, "d", "Middle unit of the top edge, $α$ = 45°")
     motion_panel(style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0), scene, response, simulated)
     most = f"largest $J$ = {float(sweep['loss'].max()):.3f}"
-    style.letter(figure, 110.0, top_d, "e", f"Robustness, {most}")
-    axes = style.place(figure, 119.5, top_d + 6.0, 43.5, 36.0)
-    map_panel(figure, axes, style.place(figure, 165.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
+    style.letter(figure, 109.0, top_d, "e", f"Robustness, {most}")
+    axes = style.place(figure, 118.5, top_d + 6.0, 43.0, 36.0)
+    map_panel(figure, axes, style.place(figure, 163.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
     if study.draft:
         mark_draft(figure)
     return figure

@@ -20,6 +20,13 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Study:
 
 
 @pytest.fixture(scope="session")
+def quick_report(quick: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("quick_report")
+    publish(quick, folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
 def report(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     publish(study, folder)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.errors import UserError
 from reports import build
 from reports.study import Study
 from tests.reports import synthetic
@@ -55,20 +56,18 @@ def test_datasets_of_another_problem_are_refused(
 
 
 def test_a_build_that_fails_leaves_the_old_report(
-    quick: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    quick: Study, quick_report: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "report"
-    build.publish(quick, folder)
-    before = contents(folder)
+    before, beside = contents(quick_report), sorted(quick_report.parent.iterdir())
 
     def full(*_: object) -> None:
-        raise OSError(28, "No space left on device", "index.html")
+        raise OSError(28, "No space left on device", "facts.json")
 
-    monkeypatch.setattr("reports.facts.write_csv", full)
-    with pytest.raises(Exception, match="space"):
-        build.publish(quick, folder)
-    assert contents(folder) == before
-    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+    monkeypatch.setattr("reports.facts.write_json", full)
+    with pytest.raises(UserError, match="the disk is full"):
+        build.publish(quick, quick_report)
+    assert contents(quick_report) == before
+    assert sorted(quick_report.parent.iterdir()) == beside
 
 
 def test_help_needs_no_libraries(capsys: pytest.CaptureFixture[str]) -> None:

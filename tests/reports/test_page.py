@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from reports import page
-from reports.build import publish
+from reports.fig2 import content, facts
 from reports.page import Table
 from reports.study import Study
 
@@ -97,21 +97,19 @@ def test_page_shows_paper_and_ours(html: str) -> None:
     assert "DRAFT" not in html
 
 
-def test_a_draft_says_so(quick: Study, tmp_path: Path) -> None:
-    publish(quick, tmp_path)
-    html = (tmp_path / "index.html").read_text(encoding="utf-8")
+def test_a_draft_says_so(quick_report: Path) -> None:
+    html = (quick_report / "index.html").read_text(encoding="utf-8")
     assert "DRAFT" in html
     assert "49 units instead of 225" in html
 
 
-def test_words_of_a_problem_are_escaped(quick: Study, tmp_path: Path) -> None:
+def test_words_of_a_problem_are_escaped(quick: Study) -> None:
     hostile = dataclasses.replace(
         quick,
         scene=dataclasses.replace(quick.scene, title="</script><b>&"),
         problem=quick.problem.model_copy(update={"doc": "</script><b>"}),
     )
-    publish(hostile, tmp_path)
-    html = (tmp_path / "index.html").read_text(encoding="utf-8")
+    html = page.render(content.build(hostile, facts.collect(hostile), [], "<svg/>", []))
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html
     assert html.count("</script>") == 2
     data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)
