@@ -5,7 +5,7 @@ import sys
 from snakemake.utils import min_version
 
 from pipeline.sources import source_hash
-from pipeline.workflow import check_problems, check_room, designs
+from pipeline.workflow import check_problems, check_room, chunks, designs
 from pipeline.workflow import options, prepare_jobs, section, studies
 
 min_version("9.20")

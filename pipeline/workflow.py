@@ -149,6 +149,14 @@ def designs(wildcards: Wildcards) -> list[str]:
     ]
 
 
+def chunks(wildcards: Wildcards, most: int) -> list[str]:
+    """The parts of the map, at most so many and none without a frequency of its own."""
+    study = study_of(wildcards)
+    sweep = problem_of(study).sweep
+    frequencies = sweep.frequency.points if sweep else 1
+    return [f"results/{study}/sweep_{chunk}.nc" for chunk in range(min(most, frequencies))]
+
+
 def section(stage: Stage) -> Callable[[Wildcards], str]:
     """A function from wildcards to the hash of what `stage` depends on in the problem file.
 

@@ -1,5 +1,5 @@
 # A few jobs of many cases each, for a laptop and for a cluster alike.
-SWEEP_CHUNKS = config.get("sweep_chunks", 4)
+MOST_CHUNKS = config.get("sweep_chunks", 4)
 
 
 rule sweep:
@@ -13,7 +13,7 @@ rule sweep:
     threads: 1
     params:
         study=options,
-        chunks=SWEEP_CHUNKS,
+        chunks=lambda wildcards: len(chunks(wildcards, MOST_CHUNKS)),
         problem=section("sweep"),
         source=source_hash("pipeline.sweep"),
     message:
@@ -25,7 +25,7 @@ rule sweep:
 
 rule gather_sweep:
     input:
-        expand("results/{{name}}{{preset}}/sweep_{chunk}.nc", chunk=range(SWEEP_CHUNKS)),
+        lambda wildcards: chunks(wildcards, MOST_CHUNKS),
     output:
         "results/{name}{preset}/sweep.nc",
     log:

@@ -31,6 +31,10 @@ def test_study_from_nothing(sandbox: Sandbox) -> None:
     assert sandbox.planned("fig2") == STUDY
 
 
+def test_map_has_no_part_without_a_frequency(sandbox: Sandbox) -> None:
+    assert sandbox.planned("fig2@quick")["sweep"] == 3
+
+
 @pytest.mark.parametrize("target", ["fig2@quick", "fig2_quick"])
 def test_preset_has_its_own_target_and_folder(sandbox: Sandbox, target: str) -> None:
     ended = sandbox.run(target)
