@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 import xarray as xr
 from numpy.typing import NDArray
 
 from reports.scene import Scene
-from reports.structure import CLOAK, SOURCE, SURROUNDINGS, Structure
+from reports.structure import CLOAK, SOURCE, Structure
 
 Array = NDArray[np.float64]
 
@@ -84,29 +85,13 @@ def _best_fit(polygon: Array, other: Array) -> Array:
     return min(tries, key=lambda distances: float(distances.sum()))
 
 
-def rim(structure: Structure) -> NDArray[np.bool_]:
-    """Cloak units (n_units,) that a ligament joins to a unit of the surroundings."""
-    region = structure.region[structure.ligament_unit]
-    across = (region == CLOAK) & (region[:, ::-1] == SURROUNDINGS)
-    found = np.zeros(structure.n_units, bool)
-    found[structure.ligament_unit[across]] = True
-    return found
-
-
-def porosity(structure: Structure, spacing: float, inside: NDArray[np.bool_]) -> float:
-    """Open share of the lattice cells of the units `inside`."""
-    area = polygon_areas(structure.vertices[inside]).sum()
-    return 1.0 - float(area) / (spacing**2 * int(inside.sum()))
-
-
-def polygon_areas(vertices: Array) -> Array:
-    """Areas (n,) of polygons (n, m, 2) padded with NaN."""
-    ring = np.where(np.isnan(vertices[..., :1]), vertices[:, :1], vertices)
-    local = ring - ring[:, :1]
-    following = np.roll(local, -1, axis=1)
-    cross = local[..., 0] * following[..., 1] - local[..., 1] * following[..., 0]
-    area: Array = 0.5 * cross.sum(axis=1)
-    return area
+def porosity(structure: Structure, middle: tuple[float, float], low: float, high: float) -> float:
+    """Open share of the ring between two distances (mm) from `middle`, by geometry."""
+    disc = shapely.Point(middle)
+    ring = disc.buffer(high, quad_segs=64).difference(disc.buffer(low, quad_segs=64))
+    polygons = [polygon[~np.isnan(polygon[:, 0])] for polygon in structure.vertices]
+    units = shapely.union_all([shapely.Polygon(polygon) for polygon in polygons])
+    return 1.0 - float(ring.intersection(units).area / ring.area)
 
 
 def site_radius(structure: Structure, middle: tuple[float, float], region: int) -> float:

@@ -164,7 +164,7 @@ def outline(axes: Axes, centre: Array, radii: Iterable[float], colour: str) -> N
                 radius,
                 fill=False,
                 edgecolor=colour,
-                linewidth=0.9,
+                linewidth=0.8,
                 linestyle=(0, (3.0, 1.6)),
                 zorder=5,
             )

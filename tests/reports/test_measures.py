@@ -72,16 +72,12 @@ def test_asymmetry_of_one_moved_vertex(study: Study) -> None:
 
 def test_porosity_of_the_initial_lattice(study: Study) -> None:
     initial = from_dataset(study.design, study.scene.spacing, "vertices_initial")
-    everywhere = np.full(initial.n_units, True)
-    assert measures.porosity(initial, 15.0, everywhere) == pytest.approx(1 - 92.049 / 225, abs=1e-5)
-
-
-def test_rim_is_the_outermost_layer_of_the_cloak(quick: Study) -> None:
-    structure = from_dataset(quick.design, quick.scene.spacing)
-    away = np.linalg.norm(structure.site - np.array(quick.scene.middle), axis=1)
-    np.testing.assert_array_equal(
-        measures.rim(structure), (structure.region == CLOAK) & (away > 20.0)
+    middle = study.scene.middle
+    assert measures.porosity(initial, middle, 0.0, 100.0) == pytest.approx(
+        1 - 92.049 / 225, abs=0.01
     )
+    assert measures.porosity(initial, middle, 0.0, 4.0) == pytest.approx(0.0)
+    assert measures.porosity(initial, middle, 400.0, 410.0) == 1.0
 
 
 def test_first_evaluation_that_is_near_the_best() -> None:
