@@ -27,8 +27,8 @@ def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
     made = cli.parser(
         "pipeline.design",
-        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from which the same"
-        " command resumes after any kind of end.",
+        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from"
+        " which the same command resumes after any kind of end.",
     )
     made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
@@ -89,7 +89,9 @@ def optimise(
             bar.update(loss=evaluation.loss, violation=evaluation.violation)
 
         try:
-            with Journal(folder / f"{method}.journal", f"{key} {source_hash('pipeline.design')}") as journal:
+            with Journal(
+                folder / f"{method}.journal", f"{key} {source_hash('pipeline.design')}"
+            ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
                     journal.wrap(evaluator(scene, plan)),

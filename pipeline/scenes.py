@@ -29,7 +29,9 @@ def lattice_of(problem: Problem) -> Lattice:
     )
 
 
-def scene_of(problem: Problem, folder: Path, motions: tuple[loads.Motion, ...] | None = None) -> Scene:
+def scene_of(
+    problem: Problem, folder: Path, motions: tuple[loads.Motion, ...] | None = None
+) -> Scene:
     """The scene of a problem whose files lie in ``folder``.
 
     Args:
@@ -138,10 +140,14 @@ def _measured(path: Path) -> loads.TimeSeries:
     try:
         header, *_ = path.read_text(encoding="utf-8").splitlines() or [""]
         if tuple(name.strip() for name in header.split(",")) != TIME_SERIES_COLUMNS:
-            raise UserError("the columns of a measured drive are wrong", file=path, value=header, remedy=remedy)
+            raise UserError(
+                "the columns of a measured drive are wrong", file=path, value=header, remedy=remedy
+            )
         table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
     except (OSError, ValueError) as error:
-        raise UserError(f"the measured drive cannot be read: {error}", file=path, remedy=remedy) from error
+        raise UserError(
+            f"the measured drive cannot be read: {error}", file=path, remedy=remedy
+        ) from error
     if table.shape[1:] != (4,) or not np.isfinite(table).all() or (np.diff(table[:, 0]) <= 0).any():
         raise UserError(
             "the measured drive needs finite values at ascending times", file=path, remedy=remedy

@@ -42,7 +42,9 @@ def work(args: argparse.Namespace) -> None:
         wanted = problem.section_hash(asked, "design", method)
         if design.attrs["problem_hash"] != wanted:
             raise UserError(
-                "the design is of another problem", file=path, remedy="remove it and run the same command again"
+                "the design is of another problem",
+                file=path,
+                remedy="remove it and run the same command again",
             )
         designs[method] = design
     best = min(designs, key=lambda method: float(designs[method]["best_loss"]))

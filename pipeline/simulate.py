@@ -55,9 +55,7 @@ def work(args: argparse.Namespace) -> None:
         "cloaked": flat_vertices(scene.lattice, design["vertices"]),
     }
     made, plans = response_dataset(asked, scene, shapes, args.threads)
-    origin = provenance.attributes(
-        asked, "simulate", parents={"design": args.design}, plan=plans
-    )
+    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
 
 
@@ -66,8 +64,8 @@ class Times(NamedTuple):
 
     Attributes:
         asked: all times, ascending, s.
-        shown, integrated, sampled: where in them the response's own samples are, those of the loss's integral,
-            and those of the authors' sum.
+        shown, integrated, sampled: where in them the response's own samples are, those of the
+            loss's integral, and those of the authors' sum.
     """
 
     asked: Floats
@@ -228,7 +226,10 @@ def _dataset(
         **unit_coordinates(scene.lattice),
         "structure": (("structure",), list(shapes)),
         "direction": (("case",), np.rad2deg(directions)),
-        "frequency": (("case",), nothing if asked.frequency is None else [asked.frequency] * len(nothing)),
+        "frequency": (
+            ("case",),
+            nothing if asked.frequency is None else [asked.frequency] * len(nothing),
+        ),
         "amplitude": (("case",), [amplitude] * len(nothing)),
         "time": (("time",), times),
         "dof": (("dof",), ["ux", "uy", "theta"]),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import scipy.linalg.cython_lapack  # noqa: F401  (its function addresses are looked up below)
 import scipy.sparse as sp
@@ -12,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from threadpoolctl import threadpool_limits
 
-from sim.kernels import Ints, compiled
+from sim.arrays import Ints
+from sim.kernels import compiled
 
 threadpool_limits(1, user_api="blas")  # threads make factorisations of this size 8-30 times slower
 
@@ -21,11 +25,12 @@ _INTEGER = types.CPointer(types.int32)
 _CHARACTER = types.CPointer(types.uint8)
 
 
-def _routine(name: str, *arguments: types.Type) -> types.ExternalFunction:
+def _routine(name: str, *arguments: Any) -> Callable[..., None]:
     """A LAPACK routine by symbol, so that compiled callers can be cached across processes."""
     symbol = f"sim_band_{name}"
     binding.add_symbol(symbol, get_cython_function_address("scipy.linalg.cython_lapack", name))
-    return types.ExternalFunction(symbol, types.void(*arguments))
+    made: Callable[..., None] = types.ExternalFunction(symbol, types.void(*arguments))
+    return made
 
 
 _dpbtrf = _routine("dpbtrf", _CHARACTER, _INTEGER, _INTEGER, _POINTER, _INTEGER, _INTEGER)
@@ -44,7 +49,7 @@ _dpbtrs = _routine(
 
 
 @compiled
-def factorise(band):
+def factorise(band: Floats) -> bool:
     """Cholesky factor in place of a lower band (n, width + 1); False if not positive definite."""
     uplo = np.full(1, ord("L"), dtype=np.uint8)
     size = np.array([band.shape[0], band.shape[1] - 1, band.shape[1], 0], dtype=np.int32)
@@ -60,7 +65,7 @@ def factorise(band):
 
 
 @compiled
-def solve(factor, right):
+def solve(factor: Floats, right: Floats) -> None:
     """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
     uplo = np.full(1, ord("L"), dtype=np.uint8)
     size = np.array([factor.shape[0], factor.shape[1] - 1, 1, factor.shape[1], 0], dtype=np.int32)
@@ -86,7 +91,8 @@ def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArra
         held: ids of the prescribed dofs.
 
     Returns:
-        (3 n_units,) position of each dof among the free ones, -1 where held; and the half bandwidth.
+        (3 n_units,) position of each dof among the free ones, -1 where held; and the half
+        bandwidth.
     """
     order = min(
         (np.arange(n_units), _cuthill_mckee(n_units, unit_pairs)),

@@ -1,4 +1,4 @@
-"""Many independent cases in one call: spread over cores, memory flat, failures kept with their reason."""
+"""Many independent cases in one call: over all cores, memory flat, failures kept with a reason."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from sim.arrays import Floats
 from sim.dynamics import Drive, Solver
 from sim.errors import SimulationError
-from sim.kernels import Floats
-from sim.model import Parameters
+from sim.model import Values
 
 R = TypeVar("R")
 
@@ -20,7 +20,7 @@ R = TypeVar("R")
 class Case:
     """One structure under one drive, and the solver to use."""
 
-    values: Parameters
+    values: Values
     drive: Drive
     solver: Solver
 
@@ -37,13 +37,11 @@ Measure = Callable[[Case, Floats, Floats], R]
 """Reduces a case's displacement and velocity (n_asked, n_units, 3) to what is kept of it."""
 
 
-def run_batch(
-    cases: Iterable[Case], measure: Measure[R], threads: int = 1
-) -> Iterator[Outcome[R]]:
+def run_batch(cases: Iterable[Case], measure: Measure[R], threads: int = 1) -> Iterator[Outcome[R]]:
     """Yields the outcome of every case, in order, while others are still computed.
 
-    Cases are taken from the iterable as cores fall free, at most two per thread ahead, and only what
-    ``measure`` returns is kept of them. A case whose simulation fails yields its reason.
+    Cases are taken from the iterable as cores fall free, at most two per thread ahead, and only
+    what ``measure`` returns is kept of them. A case whose simulation fails yields its reason.
     """
     if threads == 1:
         yield from (_outcome(case, measure) for case in cases)

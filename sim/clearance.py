@@ -12,7 +12,8 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from sim.lattice import Floats, Ints, Lattice
+from sim.arrays import Floats, Ints
+from sim.lattice import Lattice
 
 OVERLAP_AREA = 1e-9
 """Intersections of a smaller area (mm^2) are touching units, not overlapping ones."""

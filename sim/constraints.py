@@ -17,10 +17,11 @@ import numpy as np
 import scipy.sparse as sp
 from jax import Array
 
+from sim.arrays import Floats, Ints
 from sim.clearance import close_pairs
 from sim.design import DesignSpace
 from sim.geometry import VOID_BRANCH, angle_between, unwrap
-from sim.lattice import Floats, Ints, Lattice
+from sim.lattice import Lattice
 
 ANGLE_LENGTH = 5.0
 """Length (mm) that turns a margin in radians into one comparable to the margins in mm."""

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 from jax import Array
 
-from sim.lattice import Floats, Ints, Lattice
-
-jax.config.update("jax_enable_x64", True)
+from sim.arrays import Floats, Ints, Numbers
+from sim.lattice import Lattice
 
 Symmetry = Literal["none", "C4", "mirror_x", "mirror_y"]
 
@@ -52,7 +50,7 @@ class DesignSpace:
         """Ids of the vertices that the design moves."""
         return np.flatnonzero(np.isin(self.lattice.group, self.groups))
 
-    def vertices(self, design: Array) -> Array:
+    def vertices(self, design: Numbers) -> Array:
         """Vertex positions (n_vertices, 2) of a design vector (n_variables,), mm."""
         free_shifts = (jnp.asarray(self.basis) @ design).reshape(-1, 2)
         shifts = jnp.zeros((self.lattice.n_groups, 2)).at[self.groups].set(free_shifts)
@@ -60,7 +58,7 @@ class DesignSpace:
 
     def project(self, shifts: Floats) -> Floats:
         """Design vector closest to the given group shifts (n_groups, 2), mm."""
-        return np.linalg.lstsq(self.basis, shifts[self.groups].ravel(), rcond=None)[0]
+        return np.asarray(np.linalg.lstsq(self.basis, shifts[self.groups].ravel(), rcond=None)[0])
 
 
 def design_space(

@@ -2,9 +2,9 @@
 
     motion = simulate(solver, parameters, drives)
 
-is the displacement and velocity of every case at the asked times; ``jax.grad`` through it runs the exact
-adjoint of the steps taken. The solvers are ``ImplicitSolver`` (slow drives) and ``explicit.ExplicitSolver``
-(waves, tight tolerances).
+is the displacement and velocity of every case at the asked times; ``jax.grad`` through it runs the
+exact adjoint of the steps taken. The solvers are ``ImplicitSolver`` (slow drives) and
+``explicit.ExplicitSolver`` (waves, tight tolerances).
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ import numpy as np
 from jax import Array
 from jax.custom_derivatives import SymbolicZero
 
-from sim.kernels import Floats, Ints, Sensitivity
+from sim.arrays import Floats, Ints
+from sim.kernels import Sensitivity
 from sim.loads import Motion, held_values
-from sim.model import Parameters, Topology
+from sim.model import Parameters, Topology, Values
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -54,14 +55,21 @@ class Drive(NamedTuple):
 class Solver(Protocol):
     """One way to integrate one case in time, forward and back."""
 
-    topology: Topology
-    threads: int
+    @property
+    def topology(self) -> Topology:
+        """The structure."""
+        ...
+
+    @property
+    def threads(self) -> int:
+        """Cases solved side by side."""
+        ...
 
     def refined(self) -> Solver:
         """A more accurate one of the same kind, to estimate the error by."""
         ...
 
-    def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Any]:
+    def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Any]:
         """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
 
         Raises:
@@ -70,8 +78,8 @@ class Solver(Protocol):
         ...
 
     def backward(
-        self, values: Parameters, record: Any, bar_u: Floats, bar_v: Floats
-    ) -> tuple[Parameters, Floats, Floats]:
+        self, values: Values, record: Any, bar_u: Floats, bar_v: Floats
+    ) -> tuple[Values, Floats, Floats]:
         """Loss derivatives by the parameters, and by the drive at the times also returned."""
         ...
 
@@ -80,14 +88,14 @@ class Solver(Protocol):
 class _Records:
     """The solver's records of all cases, opaque to JAX."""
 
-    def __init__(self, values: Parameters, drives: Sequence[Drive], records: list[Any]) -> None:
+    def __init__(self, values: Values, drives: Sequence[Drive], records: list[Any]) -> None:
         self.values = values
         self.drives = drives
         self.records = records
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
-def simulate(solver: Solver, parameters: Parameters, drives: tuple[Drive, ...]) -> Response:
+def simulate(solver: Solver, parameters: Parameters[Any], drives: tuple[Drive, ...]) -> Response:
     """Integrates every case and returns its motion at the solver's asked times.
 
     Not for use under ``jit``: the solvers run compiled code of their own on concrete arrays.
@@ -98,14 +106,10 @@ def simulate(solver: Solver, parameters: Parameters, drives: tuple[Drive, ...]) 
     return _forward(solver, parameters, drives)[0]
 
 
-def _concrete(tree: Any) -> Any:
-    return jax.tree.map(np.asarray, tree)
-
-
 def _forward(
-    solver: Solver, parameters: Parameters, drives: tuple[Drive, ...]
+    solver: Solver, parameters: Parameters[Any], drives: tuple[Drive, ...]
 ) -> tuple[Response, _Records]:
-    values = Parameters(*_concrete(tuple(parameters)))
+    values = Values(*(np.asarray(part) for part in parameters))
     results = _spread(lambda drive: solver.forward(values, drive), drives, solver.threads)
     shape = (len(drives), -1, solver.topology.n_units, 3)
     response = Response(
@@ -130,16 +134,20 @@ def _is_primal(node: Any) -> bool:
 
 def _backward_rule(
     solver: Solver, residual: tuple[_Records, bool], bar: Response
-) -> tuple[Parameters, Any]:
+) -> tuple[Parameters[Array], Any]:
     records, driven = residual
     n_dofs = solver.topology.n_dofs
     bar_u, bar_v = (_dense(cotangent).reshape(len(records.drives), -1, n_dofs) for cotangent in bar)
     results = _spread(
-        lambda case: solver.backward(records.values, records.records[case], bar_u[case], bar_v[case]),
+        lambda case: solver.backward(
+            records.values, records.records[case], bar_u[case], bar_v[case]
+        ),
         range(len(records.drives)),
         solver.threads,
     )
-    total = Parameters(*(jnp.asarray(sum(parts)) for parts in zip(*(r[0] for r in results), strict=True)))
+    total = Parameters(
+        *(jnp.asarray(sum(parts)) for parts in zip(*(r[0] for r in results), strict=True))
+    )
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
     return total, tuple(
@@ -159,7 +167,9 @@ def _dense(cotangent: Any) -> Floats:
 
 def _zero(leaf: Any) -> Any:
     array = np.asarray(leaf)
-    return np.zeros(array.shape, jnp.asarray(array).dtype if array.dtype.kind == "f" else jax.dtypes.float0)
+    return np.zeros(
+        array.shape, jnp.asarray(array).dtype if array.dtype.kind == "f" else jax.dtypes.float0
+    )
 
 
 def _drive_cotangent(held: Ints, drive: Drive, times: Floats, bar: Floats) -> Drive:
@@ -171,14 +181,14 @@ def _drive_cotangent(held: Ints, drive: Drive, times: Floats, bar: Floats) -> Dr
 
 
 def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:
-    """Maps over cases on threads, in order; the compiled loops run without the interpreter's lock."""
+    """Maps over cases on threads, in order; compiled loops run without the interpreter's lock."""
     if threads == 1 or len(items) == 1:
         return [work(item) for item in items]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, items))
 
 
-def empty_sensitivity(values: Parameters) -> Sensitivity:
+def empty_sensitivity(values: Values) -> Sensitivity:
     """Zeros to add parameter derivatives to."""
     return Sensitivity(
         arm=np.zeros(values.arm.shape),
@@ -189,8 +199,6 @@ def empty_sensitivity(values: Parameters) -> Sensitivity:
     )
 
 
-def as_parameters(sensitivity: Sensitivity, mass: Floats, damping: Floats) -> Parameters:
+def as_parameters(sensitivity: Sensitivity, mass: Floats, damping: Floats) -> Values:
     """Gathers the derivatives by all parameters."""
-    return Parameters(
-        *sensitivity, mass=mass.reshape(-1, 3), damping=damping.reshape(-1, 3)
-    )
+    return Values(*sensitivity, mass=mass.reshape(-1, 3), damping=damping.reshape(-1, 3))

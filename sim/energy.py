@@ -1,6 +1,7 @@
 """Energy of one ligament and of one contact pair: the definition that all else is derived from.
 
-The compiled kernels (sim/kernels.py) are tested against the automatic derivatives of these functions.
+The compiled kernels (sim/kernels.py) are tested against the automatic derivatives of these
+functions.
 """
 
 from __future__ import annotations
@@ -67,8 +68,9 @@ def ligament_energy(
 def contact_energy(void_angle: Array, law: ContactLaw) -> Array:
     """Energy of one void that closes below the cutoff, infinite at the barrier, N mm.
 
-    With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1) - 2),
-    which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is silently zero; here it
+    With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1)
+    - 2), which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is
+    silently zero; here it
     is infinite: a state there is not admissible.
     """
     width = law.cutoff - law.barrier

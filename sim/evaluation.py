@@ -9,10 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from sim.arrays import Floats
 from sim.dynamics import simulate
 from sim.geometry import shape
 from sim.grid import simpson_weights
-from sim.kernels import Floats
 from sim.model import Parameters, parameters
 from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
 from sim.plan import Plan

@@ -4,8 +4,8 @@ A step alternates drifts u += a h v and kicks, which solve M v' = -dE/dq - C v e
 
     v' = decay v - gain dE/dq,   decay = exp(-b h C / M),   gain = (1 - decay) / C.
 
-The reverse sweep needs the states at the kicks; they are kept at checkpoints and computed again segment by
-segment, so memory grows with the square root of the number of steps.
+The reverse sweep needs the states at the kicks; they are kept at checkpoints and computed again
+segment by segment, so memory grows with the square root of the number of steps.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim import grid
+from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, as_parameters, empty_sensitivity
 from sim.errors import SimulationError
 from sim.kernels import (
-    Floats,
-    Ints,
+    Network,
+    Sensitivity,
     compiled,
     gradient,
     hessian_product,
     mixed,
     smallest_void,
 )
-from sim.model import Parameters, Topology
+from sim.model import Topology, Values
 from sim.splitting import BLANES_MOAN, Splitting
 
 MAX_HALVINGS = 6
@@ -35,8 +36,23 @@ WATCH_EVERY = 8
 
 
 @compiled
-def _step(u, v, h, drifts, decay, gain, drive, net, dofs, held, turn, force, kept_u, kept_v):
-    """Advances ``u``, ``v`` (n_dofs,) in place by one step; keeps the states just before its kicks."""
+def _step(
+    u: Floats,
+    v: Floats,
+    h: float,
+    drifts: Floats,
+    decay: Floats,
+    gain: Floats,
+    drive: Floats,
+    net: Network,
+    dofs: Ints,
+    held: Ints,
+    turn: Floats,
+    force: Floats,
+    kept_u: Floats,
+    kept_v: Floats,
+) -> None:
+    """Advances ``u``, ``v`` (n_dofs,) by one step; keeps the states just before its kicks."""
     for m in range(len(gain)):
         for i in range(len(dofs)):
             u[dofs[i]] += drifts[m] * h * v[dofs[i]]
@@ -53,15 +69,32 @@ def _step(u, v, h, drifts, decay, gain, drive, net, dofs, held, turn, force, kep
 
 
 @compiled
-def run(n_steps, h, drifts, decay, gain, drive, net, dofs, held, segment, interval, values, rates,
-        checkpoints, out_u, out_v):  # fmt: skip
+def run(
+    n_steps: int,
+    h: float,
+    drifts: Floats,
+    decay: Floats,
+    gain: Floats,
+    drive: Floats,
+    net: Network,
+    dofs: Ints,
+    held: Ints,
+    segment: int,
+    interval: Ints,
+    values: Floats,
+    rates: Floats,
+    checkpoints: Floats,
+    out_u: Floats,
+    out_v: Floats,
+) -> int:
     """Integrates from rest; fills the asked outputs and the checkpoints.
 
     Args:
         drive: (n_steps, n_kicks, n_held) prescribed values at the kicks.
         segment: steps between checkpoints.
         interval: (n_asked,) step in which each output lies, ascending.
-        values, rates: (n_asked, 4) weights of (u, u', v, v') at the step's ends in displacement and velocity.
+        values, rates: (n_asked, 4) weights of (u, u', v, v') at the step's ends in displacement and
+            velocity.
         checkpoints: (n_segments, 2, n_dofs) displacement and velocity.
         out_u, out_v: (n_asked, n_dofs).
 
@@ -93,9 +126,30 @@ def run(n_steps, h, drifts, decay, gain, drive, net, dofs, held, segment, interv
 
 
 @compiled
-def sweep_back(n_steps, h, drifts, decay, gain, drive, net, dofs, held, segment, interval, values, rates,
-               checkpoints, bar_out_u, bar_out_v, which, sensitivity, bar_decay, bar_gain, bar_drive):  # fmt: skip
-    """Reverse sweep of ``run``: ``bar_out_u``, ``bar_out_v`` (n_asked, n_dofs) are the loss derivatives.
+def sweep_back(
+    n_steps: int,
+    h: float,
+    drifts: Floats,
+    decay: Floats,
+    gain: Floats,
+    drive: Floats,
+    net: Network,
+    dofs: Ints,
+    held: Ints,
+    segment: int,
+    interval: Ints,
+    values: Floats,
+    rates: Floats,
+    checkpoints: Floats,
+    bar_out_u: Floats,
+    bar_out_v: Floats,
+    which: Ints,
+    sensitivity: Sensitivity,
+    bar_decay: Floats,
+    bar_gain: Floats,
+    bar_drive: Floats,
+) -> None:
+    """Reverse sweep of ``run`` from the loss derivatives ``bar_out_u``, ``bar_out_v``.
 
     Adds to ``sensitivity``, ``bar_decay`` and ``bar_gain`` (as decay and gain) and ``bar_drive``.
     """
@@ -153,8 +207,8 @@ def sweep_back(n_steps, h, drifts, decay, gain, drive, net, dofs, held, segment,
                 v[d] = kept_v[n, 0, d]
 
 
-def highest_frequency(topology: Topology, values: Parameters, motion: Floats | None = None) -> float:
-    """Highest angular eigenfrequency (rad/s) of the free dofs about a state, by Lanczos iteration."""
+def highest_frequency(topology: Topology, values: Values, motion: Floats | None = None) -> float:
+    """Highest angular eigenfrequency (rad/s) about a state, by Lanczos iteration."""
     network = topology.network(values)
     state = np.zeros(topology.n_dofs) if motion is None else motion
     turn = np.empty((topology.n_units, 4))
@@ -196,8 +250,8 @@ class Record:
 class ExplicitSolver:
     """Integrates one case explicitly with equal steps (``dynamics.Solver``).
 
-    A run that leaves the admissible states (a void beyond its barrier, or a blow-up) is repeated with half
-    the step, up to MAX_HALVINGS times.
+    A run that leaves the admissible states (a void beyond its barrier, or a blow-up) is repeated
+    with half the step, up to MAX_HALVINGS times.
 
     Attributes:
         topology: the structure.
@@ -221,7 +275,7 @@ class ExplicitSolver:
         """The same with twice the steps, to estimate the error by."""
         return replace(self, n_steps=2 * self.n_steps)
 
-    def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
+    def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         touching = np.arange(len(values.void)) if self.touching is None else self.touching
         for halving in range(MAX_HALVINGS + 1):
@@ -232,13 +286,13 @@ class ExplicitSolver:
                 u[:, held] = drive.values(held, self.asked)
                 return u, v, record
         raise SimulationError(
-            f"the explicit run left the admissible states at t = {failed * self.duration / n_steps:.6g} s even"
-            f" with {n_steps} steps (a void closed beyond its barrier); try a smaller drive",
+            "the explicit run left the admissible states at"
+            f" t = {failed * self.duration / n_steps:.6g} s even with {n_steps} steps (a void closed beyond its barrier); try a smaller drive",
             step=failed,
         )
 
     def _run(
-        self, values: Parameters, drive: Drive, n_steps: int, touching: Ints
+        self, values: Values, drive: Drive, n_steps: int, touching: Ints
     ) -> tuple[Floats, Floats, Record, int]:
         top, h = self.topology, self.duration / n_steps
         n_kicks = len(self.splitting.kicks)
@@ -249,14 +303,14 @@ class ExplicitSolver:
         checkpoints = np.empty((-(-n_steps // segment), 2, top.n_dofs))
         u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
         failed = run(
-            n_steps, h, self.splitting.drifts, decay, gain, held_values, top.network(values, touching),
-            top.free_dofs, top.held, segment, *self._outputs(n_steps), checkpoints, u, v,
+            n_steps, h, self.splitting.drifts, decay, gain, held_values,
+            top.network(values, touching), top.free_dofs, top.held, segment, *self._outputs(n_steps), checkpoints, u, v,
         )  # fmt: skip
         return u, v, Record(held_values, checkpoints, touching), failed
 
     def backward(
-        self, values: Parameters, record: Record, bar_u: Floats, bar_v: Floats
-    ) -> tuple[Parameters, Floats, Floats]:
+        self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
+    ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         top, h = self.topology, self.duration / record.n_steps
         decay, gain = _kicks(values, self.splitting.kicks * h)
@@ -266,8 +320,8 @@ class ExplicitSolver:
         sweep_back(
             record.n_steps, h, self.splitting.drifts, decay, gain, record.drive,
             top.network(values, record.touching), top.free_dofs, top.held, _segment(record.n_steps),
-            *self._outputs(record.n_steps), record.checkpoints, bar_u, bar_v, top.designed, sensitivity,
-            bar_decay, bar_gain, bar_drive,
+            *self._outputs(record.n_steps), record.checkpoints, bar_u, bar_v, top.designed,
+            sensitivity, bar_decay, bar_gain, bar_drive,
         )  # fmt: skip
         by_mass, by_damping = _kicks_transposed(
             values, self.splitting.kicks * h, decay, gain, bar_decay, bar_gain
@@ -291,7 +345,7 @@ def _segment(n_steps: int) -> int:
     return max(1, int(np.sqrt(n_steps)))
 
 
-def _kicks(values: Parameters, lengths: Floats) -> tuple[Floats, Floats]:
+def _kicks(values: Values, lengths: Floats) -> tuple[Floats, Floats]:
     """decay and gain (n_kicks, n_dofs) of kicks of the given lengths (s)."""
     mass, damping = values.mass.ravel(), values.damping.ravel()
     x = lengths[:, None] * damping / mass
@@ -305,7 +359,12 @@ def _mean_decay(x: Floats) -> Floats:
 
 
 def _kicks_transposed(
-    values: Parameters, lengths: Floats, decay: Floats, gain: Floats, bar_decay: Floats, bar_gain: Floats
+    values: Values,
+    lengths: Floats,
+    decay: Floats,
+    gain: Floats,
+    bar_decay: Floats,
+    bar_gain: Floats,
 ) -> tuple[Floats, Floats]:
     """Derivatives by mass and damping (n_dofs,) from those by decay and gain."""
     mass, damping = values.mass.ravel(), values.damping.ravel()

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from sim.arrays import Numbers
 from sim.lattice import Lattice
 
 VOID_BRANCH = -jnp.pi / 4
@@ -33,14 +34,14 @@ class Shape(NamedTuple):
     void_angle: Array
 
 
-def shape(lattice: Lattice, vertices: Array) -> Shape:
+def shape(lattice: Lattice, vertices: Numbers) -> Shape:
     """Shape of the network whose vertices lie at ``vertices`` (n_vertices, 2), in mm."""
     centroid, area, polar_moment = inertia(lattice, vertices)
     arm = vertices - centroid[lattice.unit]
-    return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
+    return Shape(centroid, area, polar_moment, jnp.asarray(arm), void_angles(lattice, vertices))
 
 
-def inertia(lattice: Lattice, vertices: Array) -> tuple[Array, Array, Array]:
+def inertia(lattice: Lattice, vertices: Numbers) -> tuple[Array, Array, Array]:
     """Centroid, area and polar moment about the centroid of each polygon (shoelace sums).
 
     Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
@@ -49,22 +50,22 @@ def inertia(lattice: Lattice, vertices: Array) -> tuple[Array, Array, Array]:
     def total(values: Array) -> Array:
         return jax.ops.segment_sum(values, lattice.unit, lattice.n_units)
 
-    here = vertices - lattice.site[lattice.unit]
+    here = jnp.asarray(vertices) - lattice.site[lattice.unit]
     there = here[lattice.next_vertex]
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
     area = total(cross) / 2
     offset = total((here + there) * cross[:, None]) / (6 * area[:, None])
     squares = jnp.sum(here * here + here * there + there * there, axis=1)
     polar_moment = total(cross * squares) / 12 - area * jnp.sum(offset**2, axis=1)
-    return lattice.site + offset, area, polar_moment
+    return jnp.asarray(lattice.site) + offset, area, polar_moment
 
 
-def void_angles(lattice: Lattice, vertices: Array) -> Array:
+def void_angles(lattice: Lattice, vertices: Numbers) -> Array:
     """Signed, unwrapped angles (n_ligaments, 2) of the voids on both sides of each ligament, rad.
 
-    The first lies between the clockwise edge of the second end and the counter-clockwise edge of the
-    first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid units a
-    and b they change by exactly theta_a - theta_b and theta_b - theta_a.
+    The first lies between the clockwise edge of the second end and the counter-clockwise edge of
+    the first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid
+    units a and b they change by exactly theta_a - theta_b and theta_b - theta_a.
     """
     first, second = lattice.ligaments.T
     one = angle_between(
@@ -78,19 +79,19 @@ def void_angles(lattice: Lattice, vertices: Array) -> Array:
     return unwrap(jnp.stack([one, other], axis=1), VOID_BRANCH)
 
 
-def block_angles(lattice: Lattice, vertices: Array) -> Array:
+def block_angles(lattice: Lattice, vertices: Numbers) -> Array:
     """Interior angle (n_vertices,) of each unit at each vertex, on [0, 2 pi), rad."""
     following = vertices[lattice.next_vertex] - vertices
     preceding = vertices[lattice.previous_vertex] - vertices
     return unwrap(angle_between(following, preceding), 0.0)
 
 
-def edge_lengths(lattice: Lattice, vertices: Array) -> Array:
+def edge_lengths(lattice: Lattice, vertices: Numbers) -> Array:
     """Length (n_vertices,) of the edge from each vertex to its counter-clockwise neighbour, mm."""
     return jnp.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
 
 
-def angle_between(start: Array, end: Array) -> Array:
+def angle_between(start: Numbers, end: Numbers) -> Array:
     """Signed angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
     cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
     return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))

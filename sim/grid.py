@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from sim.kernels import Floats
+from sim.arrays import Floats
 
 
 def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
@@ -45,13 +45,18 @@ def hermite_stencils(times: Floats, asked: Floats) -> tuple[np.ndarray, Floats, 
     """Cubic Hermite interpolation between grid points.
 
     Returns:
-        (n_asked,) step in which each asked time lies, and the weights (n_asked, 4) of value at the left and
-        right end, slope at the left and right end, in the value and in the slope.
+        (n_asked,) step in which each asked time lies, and the weights (n_asked, 4) of value at the
+        left and right end, slope at the left and right end, in the value and in the slope.
     """
     interval = np.clip(np.searchsorted(times, asked, side="right") - 1, 0, len(times) - 2)
     h = times[interval + 1] - times[interval]
     x = (asked - times[interval]) / h
-    value = [(1 + 2 * x) * (1 - x) ** 2, x**2 * (3 - 2 * x), h * x * (1 - x) ** 2, h * x**2 * (x - 1)]
+    value = [
+        (1 + 2 * x) * (1 - x) ** 2,
+        x**2 * (3 - 2 * x),
+        h * x * (1 - x) ** 2,
+        h * x**2 * (x - 1),
+    ]
     slope = [6 * x * (x - 1) / h, 6 * x * (1 - x) / h, (1 - x) * (1 - 3 * x), x * (3 * x - 2)]
     return interval, np.stack(value, axis=1), np.stack(slope, axis=1)
 
@@ -62,14 +67,14 @@ def hermite_matrices(times: Floats, asked: Floats) -> tuple[sp.csr_matrix, sp.cs
     n = len(times)
     columns = interval[:, None] + np.array([0, 1, n, n + 1])
     rows = np.repeat(np.arange(len(asked)), 4)
-    return tuple(  # type: ignore[return-value]
+    return tuple(
         sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(asked), 2 * n))
         for weights in (value, slope)
     )
 
 
 def simpson_weights(n: int, duration: float) -> Floats:
-    """Weights (n,) of the composite Simpson rule on n equally spaced times; trapezoids if n is even."""
+    """Weights (n,) of the composite Simpson rule on equal steps; of trapezoids if n is even."""
     h = duration / (n - 1)
     weights = np.full(n, h)
     if n % 2:

@@ -1,11 +1,13 @@
 """Compiled implicit integration of a network's motion and its exact discrete adjoint.
 
-Equation: M q'' = -dE/dq - C q' on the free dofs, the held ones prescribed. Each implicit stage solves
+Equation: M q'' = -dE/dq - C q' on the free dofs, the held ones prescribed. Each implicit stage
+solves
 
     M (u - u* - k v*) / k^2 + C (u - u*) / k + dE/du = 0,   k = gamma h,
 
-for its displacement u by Newton's method; then v = (u - u*) / k and a = (v - v*) / k. The factor is kept
-while it contracts. The adjoint refactors at every stage, so that it is the derivative of the steps taken.
+for its displacement u by Newton's method; then v = (u - u*) / k and a = (v - v*) / k. The factor is
+kept while it contracts. The adjoint refactors at every stage, so that it is the derivative of the
+steps taken.
 """
 
 from __future__ import annotations
@@ -15,12 +17,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim import grid
+from sim.arrays import Floats, Ints
 from sim.band import factorise, solve
 from sim.dynamics import Drive, as_parameters, empty_sensitivity
 from sim.errors import SimulationError
 from sim.kernels import (
-    Floats,
-    Ints,
+    Network,
+    Sensitivity,
     barrier_step,
     compiled,
     gradient,
@@ -29,7 +32,7 @@ from sim.kernels import (
     smallest_void,
     tangent,
 )
-from sim.model import Parameters, Topology
+from sim.model import Topology, Values
 from sim.tableau import ESDIRK3, Tableau
 
 MAX_SPLITS = 40
@@ -41,7 +44,17 @@ CONVERGED, STALLED, INDEFINITE = 0, 1, 2
 
 
 @compiled
-def _fill_tangent(motion, net, turn, free, dofs, mass, damping, k, band):
+def _fill_tangent(
+    motion: Floats,
+    net: Network,
+    turn: Floats,
+    free: Ints,
+    dofs: Ints,
+    mass: Floats,
+    damping: Floats,
+    k: float,
+    band: Floats,
+) -> None:
     """Tangent of a stage: M/k^2 + C/k + K, in band storage."""
     band[:] = 0.0
     tangent(motion, net, turn, free, band)
@@ -51,9 +64,29 @@ def _fill_tangent(motion, net, turn, free, dofs, mass, damping, k, band):
 
 @compiled
 def _solve_stage(
-    motion, target, base_u, base_v, k, tolerance, net, mass, damping, free, dofs, held, scale,
-    band, fresh, rate, turn, force, step, coupling, right, counts,
-):  # fmt: skip
+    motion: Floats,
+    target: Floats,
+    base_u: Floats,
+    base_v: Floats,
+    k: float,
+    tolerance: float,
+    net: Network,
+    mass: Floats,
+    damping: Floats,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    scale: Floats,
+    band: Floats,
+    fresh: bool,
+    rate: float,
+    turn: Floats,
+    force: Floats,
+    step: Floats,
+    coupling: Floats,
+    right: Floats,
+    counts: Ints,
+) -> tuple[int, bool, float]:
     """Newton iteration of one stage from the guess in ``motion``, whose held dofs go to ``target``.
 
     Returns the status, whether the factor in ``band`` is usable, and the last contraction rate.
@@ -83,9 +116,7 @@ def _solve_stage(
         for i in range(len(dofs)):
             d = dofs[i]
             velocity = (motion[d] - base_u[d]) / k
-            right[i] = -(
-                mass[d] * (velocity - base_v[d]) / k + damping[d] * velocity + force[d]
-            )
+            right[i] = -(mass[d] * (velocity - base_v[d]) / k + damping[d] * velocity + force[d])
         solve(band, right)
         counts[2] += 1
         size = 0.0
@@ -116,8 +147,27 @@ def _solve_stage(
 
 
 @compiled
-def march(times, drive, initial_u, initial_v, net, mass, damping, free, dofs, held, scale, stages, nodes,
-          width, tolerance, out_u, out_v, out_a, counts):  # fmt: skip
+def march(
+    times: Floats,
+    drive: Floats,
+    initial_u: Floats,
+    initial_v: Floats,
+    net: Network,
+    mass: Floats,
+    damping: Floats,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    scale: Floats,
+    stages: Floats,
+    nodes: Floats,
+    width: int,
+    tolerance: float,
+    out_u: Floats,
+    out_v: Floats,
+    out_a: Floats,
+    counts: Ints,
+) -> tuple[int, int, int]:
     """Integrates over the fixed grid ``times``.
 
     Args:
@@ -130,8 +180,9 @@ def march(times, drive, initial_u, initial_v, net, mass, damping, free, dofs, he
         stages, nodes: the method's coefficients.
         width: half bandwidth.
         tolerance: of the stage velocity, mm/s.
-        out_u, out_v, out_a: (n_steps + 1, n_stages, n_dofs) displacement, velocity and acceleration of all
-            stages; row n holds the stages of step n, the last row only the end state in its first.
+        out_u, out_v, out_a: (n_steps + 1, n_stages, n_dofs) displacement, velocity and acceleration
+            of all stages; row n holds the stages of step n, the last row only the end state in its
+            first.
         counts: (3,) gradients, factorisations, solves.
 
     Returns:
@@ -181,8 +232,8 @@ def march(times, drive, initial_u, initial_v, net, mass, damping, free, dofs, he
                 motion[:] = out_u[n, s - 1]
             target = drive[1 + n * (n_stages - 1) + s - 1]
             status, fresh, rate = _solve_stage(
-                motion, target, base_u, base_v, k, tolerance * h, net, mass, damping, free, dofs, held,
-                scale, band, fresh, rate, turn, force, step, coupling, right, counts,
+                motion, target, base_u, base_v, k, tolerance * h, net, mass, damping, free, dofs,
+                held, scale, band, fresh, rate, turn, force, step, coupling, right, counts,
             )  # fmt: skip
             if status != CONVERGED:
                 worst = 0
@@ -200,14 +251,33 @@ def march(times, drive, initial_u, initial_v, net, mass, damping, free, dofs, he
 
 
 @compiled
-def adjoint(times, stage_u, stage_v, stage_a, bar_u, bar_v, net, mass, damping, free, dofs, held, stages,
-            width, which, sensitivity, bar_mass, bar_damping, bar_drive):  # fmt: skip
+def adjoint(
+    times: Floats,
+    stage_u: Floats,
+    stage_v: Floats,
+    stage_a: Floats,
+    bar_u: Floats,
+    bar_v: Floats,
+    net: Network,
+    mass: Floats,
+    damping: Floats,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    stages: Floats,
+    width: int,
+    which: Ints,
+    sensitivity: Sensitivity,
+    bar_mass: Floats,
+    bar_damping: Floats,
+    bar_drive: Floats,
+) -> bool:
     """Reverse sweep of ``march``.
 
     Args:
         stage_u, stage_v, stage_a: its outputs.
-        bar_u, bar_v: (n_steps + 1, n_dofs) loss derivatives by displacement and velocity at the grid
-            points.
+        bar_u, bar_v: (n_steps + 1, n_dofs) loss derivatives by displacement and velocity at the
+            grid points.
         which: ligaments whose parameters are differentiated by.
         sensitivity: ``kernels.Sensitivity``, added to.
         bar_mass, bar_damping: (n_dofs,), added to.
@@ -220,7 +290,11 @@ def adjoint(times, stage_u, stage_v, stage_a, bar_u, bar_v, net, mass, damping, 
     n_dofs = len(mass)
     turn = np.empty((n_dofs // 3, 4))
     product, weights = np.empty(n_dofs), np.zeros(n_dofs)
-    u, v, a = np.zeros((n_stages, n_dofs)), np.zeros((n_stages, n_dofs)), np.zeros((n_stages, n_dofs))
+    u, v, a = (
+        np.zeros((n_stages, n_dofs)),
+        np.zeros((n_stages, n_dofs)),
+        np.zeros((n_stages, n_dofs)),
+    )
     next_a = np.zeros(n_dofs)
     next_u, next_v = bar_u[n_steps].copy(), bar_v[n_steps].copy()
     right = np.empty(len(dofs))
@@ -311,8 +385,9 @@ class ImplicitSolver:
         asked: (n_asked,) times of the output, s.
         tolerance: of the stage velocities, mm/s.
         threads: cases solved side by side.
-        turn_allowance: contact is skipped in ligaments whose units can turn by this much against each other
-            before it acts, rad. If one comes that far after all, the case is solved again with all.
+        turn_allowance: contact is skipped in ligaments whose units can turn by this much against
+            each other before it acts, rad. If one comes that far after all, the case is solved
+            again with all.
         tableau: the method.
     """
 
@@ -328,13 +403,11 @@ class ImplicitSolver:
         """The same with every step cut in two, to estimate the error by."""
         return replace(self, times=grid.halved(self.times))
 
-    def touching(self, values: Parameters) -> Ints:
+    def touching(self, values: Values) -> Ints:
         """Ligaments in which contact is computed."""
-        return np.flatnonzero(
-            values.void.min(axis=1) < self.topology.cutoff + self.turn_allowance
-        )
+        return np.flatnonzero(values.void.min(axis=1) < self.topology.cutoff + self.turn_allowance)
 
-    def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
+    def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         touching = self.touching(values)
         record = self._march(values, drive, touching)
@@ -347,14 +420,14 @@ class ImplicitSolver:
         displacement[:, held] = drive.values(held, self.asked)
         return displacement, velocity, record
 
-    def _untouched_voids_close(self, values: Parameters, record: Record) -> bool:
+    def _untouched_voids_close(self, values: Values, record: Record) -> bool:
         """Whether a void whose contact was skipped came to the cutoff in any stage."""
         stages = record.u[:-1].reshape(-1, self.topology.n_units, 3)
         closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
         closest[record.touching] = np.inf
         return bool(closest.min() < self.topology.cutoff)
 
-    def _march(self, values: Parameters, drive: Drive, touching: Ints) -> Record:
+    def _march(self, values: Values, drive: Drive, touching: Ints) -> Record:
         top = self.topology
         network = top.network(values, touching)
         number, width = top.numbering
@@ -366,22 +439,23 @@ class ImplicitSolver:
             held_values = drive.values(top.held, grid.stage_times(times, self.tableau.nodes))
             status, step, worst = march(
                 times, np.asarray(held_values), np.zeros(top.n_dofs), np.zeros(top.n_dofs), network,
-                values.mass.ravel(), values.damping.ravel(), number, top.free_dofs, top.held, top.scale,
-                self.tableau.stages, self.tableau.nodes, width, self.tolerance, u, v, a, counts,
+                values.mass.ravel(), values.damping.ravel(), number, top.free_dofs, top.held,
+                top.scale, self.tableau.stages, self.tableau.nodes, width, self.tolerance, u, v, a, counts,
             )  # fmt: skip
             if status == CONVERGED:
                 return Record(times, u, v, a, touching, counts)
             times = grid.split_step(times, step)
         raise SimulationError(
-            f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit {worst // 3}"
-            " (the tangent is indefinite or a contact jams); try a smaller drive or accuracy: tight",
+            f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
+            f" {worst // 3} (the tangent is indefinite or a contact jams); try a smaller drive or"
+            " accuracy: tight",
             step=step,
             unit=worst // 3,
         )
 
     def backward(
-        self, values: Parameters, record: Record, bar_u: Floats, bar_v: Floats
-    ) -> tuple[Parameters, Floats, Floats]:
+        self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
+    ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         top = self.topology
         number, width = top.numbering
@@ -393,11 +467,14 @@ class ImplicitSolver:
         bar_drive = np.zeros((len(stage_times), len(top.held)))
         positive = adjoint(
             record.times, record.u, record.v, record.a,
-            *np.split(bar_states, 2), top.network(values, record.touching), values.mass.ravel(),
-            values.damping.ravel(), number, top.free_dofs, top.held, self.tableau.stages, width, top.designed, sensitivity,
-            bar_mass, bar_damping, bar_drive,
+            bar_states[: len(record.times)],
+ bar_states[len(record.times) :], top.network(values, record.touching), values.mass.ravel(),
+            values.damping.ravel(), number, top.free_dofs, top.held, self.tableau.stages, width,
+            top.designed, sensitivity, bar_mass, bar_damping, bar_drive,
         )  # fmt: skip
         if not positive:
-            raise SimulationError("a stage's tangent is indefinite in the adjoint; try shorter steps")
+            raise SimulationError(
+                "a stage's tangent is indefinite in the adjoint; try shorter steps"
+            )
         gradient_ = as_parameters(sensitivity, bar_mass, bar_damping)
         return gradient_, stage_times, bar_drive

@@ -3,25 +3,30 @@
 Derived by hand from sim/energy.py and tested against its automatic derivatives. With d the current
 ligament vector, n and t its unit tangent and normal, L its length and gamma its shear angle,
 
-    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta kappa,
+    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta
+    kappa,
 
-and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a - r_a).
+and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a -
+r_a).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from sim.arrays import Floats, Ints
 
-compiled = njit(cache=True, nogil=True, error_model="numpy")
-"""Every kernel is compiled once, cached on disk, and runs without the interpreter's lock."""
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def compiled(function: F) -> F:
+    """Compiles a loop once, caches it on disk, and runs it without the interpreter's lock."""
+    return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 class Network(NamedTuple):
@@ -34,7 +39,8 @@ class Network(NamedTuple):
         void: (n_ligaments, 2) reference void angles, rad.
         law: (n_ligaments, 3) axial, shear, bending stiffness.
         contact: (n_ligaments, 3) contact stiffness, barrier and cutoff angle.
-        touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip contact.
+        touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip
+            contact.
     """
 
     unit: Ints
@@ -47,7 +53,7 @@ class Network(NamedTuple):
 
 
 @compiled
-def _trigonometry(motion, turn):
+def _trigonometry(motion: Floats, turn: Floats) -> None:
     """Fills ``turn`` (n_units, 4): cos and sin of all rotations, then of their halves."""
     for unit in range(turn.shape[0]):
         half = 0.5 * motion[3 * unit + 2]
@@ -59,7 +65,9 @@ def _trigonometry(motion, turn):
 
 
 @compiled
-def _kinematics(motion, turn, net, k):
+def _kinematics(
+    motion: Floats, turn: Floats, net: Network, k: int
+) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Rotated arms of ligament k, its current vector, length, rest length and shear angle."""
     a, b = net.unit[k, 0], net.unit[k, 1]
     ca, sa, cb, sb = turn[a, 0], turn[a, 1], turn[b, 0], turn[b, 1]
@@ -83,7 +91,16 @@ def _kinematics(motion, turn, net, k):
 
 
 @compiled
-def _forces(net, k, dx, dy, length, rest, shear, bend):
+def _forces(
+    net: Network,
+    k: int,
+    dx: float,
+    dy: float,
+    length: float,
+    rest: float,
+    shear: float,
+    bend: float,
+) -> tuple[float, float, float, float]:
     """dW/dd (2) and dW/dtheta of either unit at fixed d."""
     nx, ny = dx / length, dy / length
     tension = net.law[k, 0] * (length - rest)
@@ -95,7 +112,9 @@ def _forces(net, k, dx, dy, length, rest, shear, bend):
 
 
 @compiled
-def _contact(angle, stiffness, barrier, cutoff):
+def _contact(
+    angle: float, stiffness: float, barrier: float, cutoff: float
+) -> tuple[float, float, float]:
     """Energy, slope and curvature of one void; infinite energy beyond the barrier."""
     if angle >= cutoff:
         return 0.0, 0.0, 0.0
@@ -113,7 +132,7 @@ def _contact(angle, stiffness, barrier, cutoff):
 
 
 @compiled
-def gradient(motion, net, turn, out):
+def gradient(motion: Floats, net: Network, turn: Floats, out: Floats) -> tuple[float, float]:
     """Fills the energy gradient ``out`` (3 n_units,); returns strain and contact energy, N mm."""
     _trigonometry(motion, turn)
     out[:] = 0.0
@@ -153,7 +172,7 @@ def gradient(motion, net, turn, out):
 
 
 @compiled
-def ligament_energies(motion, net, turn, out):
+def ligament_energies(motion: Floats, net: Network, turn: Floats, out: Floats) -> None:
     """Fills the strain energy ``out`` (n_ligaments,) of every ligament, without contact, N mm."""
     _trigonometry(motion, turn)
     for k in range(net.unit.shape[0]):
@@ -168,7 +187,9 @@ def ligament_energies(motion, net, turn, out):
 
 
 @compiled
-def _second(net, k, dx, dy, length, rest, shear):
+def _second(
+    net: Network, k: int, dx: float, dy: float, length: float, rest: float, shear: float
+) -> tuple[float, float, float, float, float]:
     """Second derivatives of W: d d (xx, xy, yy) and d theta (x, y); theta theta is constant."""
     nx, ny = dx / length, dy / length
     axial, torsion = net.law[k, 0], net.law[k, 1] * rest * rest
@@ -182,7 +203,7 @@ def _second(net, k, dx, dy, length, rest, shear):
 
 
 @compiled
-def tangent(motion, net, turn, free, band):
+def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> None:
     """Adds the energy's Hessian among the free dofs to a lower band ``band[column, row - column]``.
 
     ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
@@ -275,7 +296,7 @@ def tangent(motion, net, turn, free, band):
 
 
 @compiled
-def _contact_curvature(motion, net, k):
+def _contact_curvature(motion: Floats, net: Network, k: int) -> float:
     """Second derivative of both voids' contact energy in the relative rotation."""
     turned = motion[3 * net.unit[k, 0] + 2] - motion[3 * net.unit[k, 1] + 2]
     total = 0.0
@@ -292,7 +313,9 @@ def _contact_curvature(motion, net, k):
 
 
 @compiled
-def hessian_product(motion, net, turn, direction, out):
+def hessian_product(
+    motion: Floats, net: Network, turn: Floats, direction: Floats, out: Floats
+) -> None:
     """Fills ``out`` (3 n_units,) with the Hessian times ``direction``, over all dofs."""
     _trigonometry(motion, turn)
     out[:] = 0.0
@@ -343,7 +366,9 @@ class Sensitivity(NamedTuple):
 
 
 @compiled
-def mixed(motion, net, turn, direction, which, out):
+def mixed(
+    motion: Floats, net: Network, turn: Floats, direction: Floats, which: Ints, out: Sensitivity
+) -> None:
     """Adds d/dp of (``direction`` . dE/dmotion) to ``out`` for the ligaments in ``which``."""
     _trigonometry(motion, turn)
     for k in which:
@@ -392,7 +417,7 @@ def mixed(motion, net, turn, direction, which, out):
 
 
 @compiled
-def smallest_void(motion, net):
+def smallest_void(motion: Floats, net: Network) -> tuple[float, int]:
     """Smallest distance of a void angle from its barrier (rad) and the ligament it belongs to."""
     smallest, where = np.inf, -1
     for k in range(net.unit.shape[0]):
@@ -404,7 +429,7 @@ def smallest_void(motion, net):
 
 
 @compiled
-def barrier_step(motion, net, step):
+def barrier_step(motion: Floats, net: Network, step: Floats) -> float:
     """Largest multiple of ``step`` (3 n_units,) before a void reaches its barrier; exact."""
     largest = np.inf
     for k in net.touching:

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from sim.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Lattice:
         return ends[:, 1] - ends[:, 0]
 
     def padded(self, values: Floats) -> Floats:
-        """Rearranges a per-vertex array (n_vertices, k) into (n_units, most_vertices, k), NaN padded."""
+        """Rearranges a per-vertex array (n_vertices, k) by units (n_units, most, k), NaN padded."""
         counts = np.diff(self.first_vertex)
         out = np.full((self.n_units, int(counts.max()), values.shape[1]), np.nan)
         out[self.unit, np.arange(self.n_vertices) - self.first_vertex[self.unit]] = values
@@ -99,16 +97,18 @@ def quads(
     """Rotating squares: quadrilateral units on a square grid, joined at their four corners.
 
     Unit ``i + columns * j`` has its lattice point at ``(i, j) * spacing`` and its vertices in the
-    order right, top, left, bottom. Units with even ``i + j`` are turned by ``-bias_angle`` (rad), the
-    others by ``+bias_angle``, and scaled so that the ligaments stay horizontal and vertical.
+    order right, top, left, bottom. Units with even ``i + j`` are turned by ``-bias_angle`` (rad),
+    the others by ``+bias_angle``, and scaled so that the ligaments stay horizontal and vertical.
     """
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
-    site = np.stack([i, j], axis=1) * spacing
+    site: Floats = np.stack([i, j], axis=1) * spacing
     turn = np.where((i + j) % 2 == 0, -1.0, 1.0) * np.tan(bias_angle)
     half = (spacing - ligament_length) / 2
     right = half * np.stack([np.ones_like(turn), turn], axis=1)
     top = np.stack([-right[:, 1], right[:, 0]], axis=1)
-    vertices = (site[:, None, :] + np.stack([right, top, -right, -top], axis=1)).reshape(-1, 2)
+    vertices: Floats = (site[:, None, :] + np.stack([right, top, -right, -top], axis=1)).reshape(
+        -1, 2
+    )
 
     unit_id = np.arange(columns * rows).reshape(rows, columns)
     horizontal = np.stack([4 * unit_id[:, :-1].ravel(), 4 * unit_id[:, 1:].ravel() + 2], axis=1)

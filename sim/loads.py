@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.kernels import Floats, Ints
+from sim.arrays import Floats, Ints, Numbers
 
 
 class Motion(Protocol):
     """Motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
 
-    def __call__(self, times: Array) -> Array: ...
+    def __call__(self, times: Numbers) -> Array: ...
 
 
 def _along(direction: float | Array, displacement: Array) -> Array:
@@ -28,8 +28,8 @@ def _along(direction: float | Array, displacement: Array) -> Array:
 class Harmonic(NamedTuple):
     """A sin(2 pi f t) along a direction, from rest with a velocity jump, as the authors drive it.
 
-    With a ``rise`` time the sine is switched on smoothly about ``delay``, and its phase starts there:
-    A (1 + tanh((t - delay) / rise)) / 2 sin(2 pi f (t - delay)).
+    With a ``rise`` time the sine is switched on smoothly about ``delay``, and its phase starts
+    there: A (1 + tanh((t - delay) / rise)) / 2 sin(2 pi f (t - delay)).
     """
 
     amplitude: float | Array
@@ -38,7 +38,7 @@ class Harmonic(NamedTuple):
     rise: float | None = None
     delay: float = 0.0
 
-    def __call__(self, times: Array) -> Array:
+    def __call__(self, times: Numbers) -> Array:
         shifted = times - self.delay
         wave = self.amplitude * jnp.sin(2 * jnp.pi * self.frequency * shifted)
         if self.rise is not None:
@@ -53,8 +53,8 @@ class TanhRamp(NamedTuple):
     duration: float
     direction: float | Array = 0.0
 
-    def __call__(self, times: Array) -> Array:
-        phase = 2 * times / self.duration - 1
+    def __call__(self, times: Numbers) -> Array:
+        phase = 2 * jnp.asarray(times) / self.duration - 1
         return _along(self.direction, self.amplitude * (1 + jnp.tanh(6 * phase)) / 2)
 
 
@@ -65,8 +65,8 @@ class LinearRamp(NamedTuple):
     duration: float
     direction: float | Array = 0.0
 
-    def __call__(self, times: Array) -> Array:
-        return _along(self.direction, self.amplitude * times / self.duration)
+    def __call__(self, times: Numbers) -> Array:
+        return _along(self.direction, self.amplitude * jnp.asarray(times) / self.duration)
 
 
 class TimeSeries(NamedTuple):
@@ -77,10 +77,10 @@ class TimeSeries(NamedTuple):
         motion: (n, 3) mm, mm, rad; or (n, n_units, 3) with one motion for each driven unit.
     """
 
-    times: Array
-    motion: Array
+    times: Numbers
+    motion: Numbers
 
-    def __call__(self, times: Array) -> Array:
+    def __call__(self, times: Numbers) -> Array:
         flat = jnp.reshape(self.motion, (len(self.times), -1))
         columns = [jnp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
         return jnp.stack(columns, axis=-1).reshape(len(times), *jnp.shape(self.motion)[1:])

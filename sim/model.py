@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from sim.arrays import Floats, Ints
 from sim.band import number_free_dofs
 from sim.geometry import Shape
-from sim.kernels import Floats, Ints, Network
+from sim.kernels import Network
 from sim.lattice import Lattice
+
+A = TypeVar("A")
 
 
 class Material(NamedTuple):
@@ -37,7 +40,7 @@ class Material(NamedTuple):
     damping_rotation: float | Array
 
 
-class Parameters(NamedTuple):
+class Parameters(NamedTuple, Generic[A]):
     """All that a response depends on differentiably, besides the drive.
 
     Attributes:
@@ -50,13 +53,17 @@ class Parameters(NamedTuple):
         damping: (n_units, 3) tonne/s, tonne/s, tonne mm^2/s.
     """
 
-    arm: Array
-    vector: Array
-    void: Array
-    law: Array
-    contact: Array
-    mass: Array
-    damping: Array
+    arm: A
+    vector: A
+    void: A
+    law: A
+    contact: A
+    mass: A
+    damping: A
+
+
+Values: TypeAlias = Parameters[Floats]
+"""Concrete parameters, as the solvers take them."""
 
 
 def damping_of_ratio(
@@ -73,7 +80,7 @@ def damping_of_ratio(
     )
 
 
-def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters:
+def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters[Array]:
     """Parameters of a network of the given shape; differentiable in shape and material."""
     n = lattice.n_ligaments
     stiffness = (material.axial, material.shear, material.bending)
@@ -134,8 +141,8 @@ class Topology:
     def n_free(self) -> int:
         return self.n_dofs - len(self.held)
 
-    def network(self, values: Parameters, touching: Ints | None = None) -> Network:
-        """The kernels' arrays of concrete parameters; contact acts in the ``touching`` ligaments."""
+    def network(self, values: Values, touching: Ints | None = None) -> Network:
+        """The kernels' arrays of concrete parameters, with contact in ``touching`` ligaments."""
         n = len(self.ligament_units)
         contact = np.empty((n, 3))
         contact[:, 0] = values.contact
@@ -176,8 +183,8 @@ def topology(
     """Topology of a lattice whose dofs ``held`` are prescribed.
 
     Without ``designed_units`` every ligament's parameters can be differentiated by; with them only
-    those of the ligaments of these units, which must be all units with a vertex that the design moves
-    (a moved vertex shifts the centroid, and with it every arm of its unit).
+    those of the ligaments of these units, which must be all units with a vertex that the design
+    moves (a moved vertex shifts the centroid, and with it every arm of its unit).
     """
     units = lattice.ligament_units
     designed = (

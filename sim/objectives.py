@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
+from sim.arrays import Floats, Ints, Numbers
 from sim.energy import LigamentLaw, ligament_energy
-from sim.kernels import Floats, Ints
 from sim.model import Parameters
 
 
 class DisplacementMimicking(NamedTuple):
-    """Weighted sum over samples and units of |U - U_target|^2, U = (ux/s, uy/s, theta) (paper, Eq. 1).
+    """Weighted sum of |U - U_target|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1).
 
     Attributes:
         units: (n,) region of interest.
@@ -28,7 +28,7 @@ class DisplacementMimicking(NamedTuple):
     weights: Floats
     target: Array | None = None
 
-    def __call__(self, displacement: Array, parameters: Parameters) -> Array:
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
         motion = displacement[:, :, self.units]
         if self.target is not None:
@@ -38,7 +38,7 @@ class DisplacementMimicking(NamedTuple):
 
 
 class StrainEnergyMimicking(NamedTuple):
-    """Weighted sum over samples of the region's strain energy, contact excluded, N mm (paper, Eq. 2, at rest).
+    """Weighted sum over samples of the region's strain energy, without contact, N mm (Eq. 2).
 
     Attributes:
         ligaments: (n,) ligaments that touch the region.
@@ -50,17 +50,18 @@ class StrainEnergyMimicking(NamedTuple):
     ligament_units: Ints
     weights: Floats
 
-    def __call__(self, displacement: Array, parameters: Parameters) -> Array:
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
         energies = strain_energies(displacement, parameters, self.ligaments, self.ligament_units)
         return jnp.einsum("ctl,t->c", energies, self.weights)
 
 
 def strain_energies(
-    displacement: Array, parameters: Parameters, ligaments: Ints, ligament_units: Ints
+    displacement: Numbers, parameters: Parameters[Any], ligaments: Ints, ligament_units: Ints
 ) -> Array:
     """Strain energy (..., n) of the chosen ligaments in states (..., n_units, 3), N mm."""
-    first, second = (displacement[..., ligament_units[:, end], :] for end in range(2))
+    whole = jnp.asarray(displacement)
+    first, second = (whole[..., ligament_units[:, end], :] for end in range(2))
     arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]
     law = LigamentLaw(*parameters.law[ligaments].T)
     of_all = jax.vmap(ligament_energy, in_axes=(0, 0, 0, 0, 0, 0))
@@ -68,5 +69,7 @@ def strain_energies(
     def of_state(a: Array, b: Array) -> Array:
         return of_all(a, b, arm[:, 0], arm[:, 1], vector, law)
 
-    flat = jax.vmap(of_state)(first.reshape(-1, *first.shape[-2:]), second.reshape(-1, *second.shape[-2:]))
+    flat = jax.vmap(of_state)(
+        first.reshape(-1, *first.shape[-2:]), second.reshape(-1, *second.shape[-2:])
+    )
     return flat.reshape(first.shape[:-1])

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.kernels import Floats, compiled, gradient
-from sim.model import Parameters, Topology
+from sim.arrays import Floats
+from sim.kernels import Network, compiled, gradient
+from sim.model import Topology, Values
 
 
 class Observables(NamedTuple):
@@ -15,7 +16,8 @@ class Observables(NamedTuple):
 
     Attributes:
         strain_energy, contact_energy: (n_states,) N mm.
-        reaction: (n_states, n_units, 3) elastic and contact force on the held dofs, N and N mm; NaN on free ones.
+        reaction: (n_states, n_units, 3) elastic and contact force on the held dofs, N and N mm; NaN
+            on free ones.
         void_angle: (n_states,) smallest void angle, rad.
     """
 
@@ -26,13 +28,13 @@ class Observables(NamedTuple):
 
 
 @compiled
-def _visit(states, net, energies, forces):
+def _visit(states: Floats, net: Network, energies: Floats, forces: Floats) -> None:
     turn = np.empty((states.shape[1] // 3, 4))
     for n in range(len(states)):
         energies[n] = gradient(states[n], net, turn, forces[n])
 
 
-def observe(topology: Topology, values: Parameters, motion: Floats) -> Observables:
+def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
     """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)

@@ -9,13 +9,15 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim import grid
+from sim.adaptive import adapted
+from sim.arrays import Floats, Ints
 from sim.band import factorise, solve
 from sim.dynamics import Solver
 from sim.explicit import ExplicitSolver, highest_frequency
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
-from sim.kernels import Floats, Ints, compiled, tangent
-from sim.model import Parameters, parameters
+from sim.kernels import Network, compiled, tangent
+from sim.model import Values, parameters
 from sim.scene import Accuracy, Scene
 from sim.splitting import BLANES_MOAN
 from sim.statics import StaticSolver
@@ -34,18 +36,27 @@ CONTACT_STIFFENING = 1.7
 
 @dataclass(frozen=True)
 class GridRule:
-    """A graded grid: first step (s), growth, and steps for one period of the drive."""
+    """How the implicit grid is made.
+
+    Attributes:
+        first: first step of a graded grid, s.
+        growth: of its steps.
+        per_period: its longest steps, as parts of the drive's period.
+        per_step: error allowed in each step of an adapted grid, mm.
+        newton: tolerance of the stage velocities, mm/s.
+    """
 
     first: float
     growth: float
     per_period: int
-    tolerance: float
+    per_step: float
+    newton: float
 
 
 GRIDS: dict[Accuracy, GridRule] = {
-    "draft": GridRule(2e-3, 1.3, 12, 1e-2),
-    "default": GridRule(5e-4, 1.2, 20, 1e-3),
-    "tight": GridRule(1e-4, 1.05, 80, 1e-5),
+    "draft": GridRule(2e-3, 1.3, 12, 1e-2, 1e-2),
+    "default": GridRule(5e-4, 1.2, 20, 1e-3, 5e-3),
+    "tight": GridRule(1e-4, 1.05, 80, 1e-5, 1e-5),
 }
 
 
@@ -92,8 +103,8 @@ def make_plan(
 
     Args:
         scene: the scene.
-        vertices: (n_vertices, 2) the structure, mm; None for a plan that serves an optimisation from the
-            initial one.
+        vertices: (n_vertices, 2) the structure, mm; None for a plan that serves an optimisation
+            from the initial one.
         asked: (n_asked,) output times, s; None for the loss's own samples.
         threads: cases to solve side by side.
     """
@@ -108,13 +119,14 @@ def make_plan(
     case_of = _equal_cases(scene, structure) if stays_symmetric else every_case
     if len(np.unique(case_of)) < len(case_of):
         skipped.append(
-            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned by 90 deg"
+            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
+            " by 90 deg"
         )
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
     if n_designed < n_ligaments:
         skipped.append(
-            f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the design"
-            " does not move them"
+            f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the"
+            " design does not move them"
         )
     solver: Solver
     if scene.static:
@@ -125,12 +137,16 @@ def make_plan(
         integrator = _choose(scene, values, decisions)
         end = float(times[-1])
         if integrator == "implicit":
-            solver = _implicit(scene, end, times, threads)
-            decisions.append(f"grid: {len(solver.times) - 1} graded steps over {end:.6g} s, frozen")
-            skipped.append(_contact_line(values, solver))
+            implicit = _implicit(scene, values, end, times, threads)
+            kind = "adapted" if scene.frequency is None else "graded"
+            n_steps = len(implicit.times) - 1
+            decisions.append(f"grid: {n_steps} {kind} steps over {end:.6g} s, frozen")
+            skipped.append(_contact_line(values, implicit))
+            solver = implicit
         else:
-            solver = _explicit(scene, values, end, times, threads)
-            decisions.append(f"grid: {solver.n_steps} equal steps over {end:.6g} s")
+            explicit = _explicit(scene, values, end, times, threads)
+            decisions.append(f"grid: {explicit.n_steps} equal steps over {end:.6g} s")
+            solver = explicit
     decisions.insert(0, f"integrator: {integrator}")
     return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
 
@@ -140,10 +156,10 @@ def sample_times(scene: Scene) -> Floats:
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
-def concrete_parameters(scene: Scene, vertices: Floats) -> Parameters:
-    """Parameters of a structure as NumPy arrays."""
+def concrete_parameters(scene: Scene, vertices: Floats) -> Values:
+    """Values of a structure as NumPy arrays."""
     made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.material)
-    return Parameters(*(np.asarray(part) for part in made))
+    return Values(*(np.asarray(part) for part in made))
 
 
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
@@ -161,9 +177,7 @@ def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
     return equal_directions(np.asarray(directions, dtype=float))
 
 
-def _choose(
-    scene: Scene, values: Parameters, decisions: list[str]
-) -> Literal["implicit", "explicit"]:
+def _choose(scene: Scene, values: Values, decisions: list[str]) -> Literal["implicit", "explicit"]:
     if scene.integrator != "auto":
         decisions.append("integrator as asked for")
         return scene.integrator
@@ -176,32 +190,41 @@ def _choose(
     lowest = lowest_frequency(scene, values) / (2 * np.pi)
     slow = scene.frequency < SLOW * lowest
     decisions.append(
-        f"{'implicit' if slow else 'explicit'}: drive at {scene.frequency:.4g} Hz, lowest eigenfrequency"
-        f" {lowest:.4g} Hz"
+        f"{'implicit' if slow else 'explicit'}: drive at {scene.frequency:.4g} Hz, lowest"
+        f" eigenfrequency {lowest:.4g} Hz"
     )
     return "implicit" if slow else "explicit"
 
 
-def _implicit(scene: Scene, end: float, times: Floats, threads: int) -> ImplicitSolver:
+def _implicit(
+    scene: Scene, values: Values, end: float, times: Floats, threads: int
+) -> ImplicitSolver:
+    """Solver on a graded grid, or adapted to the hardest case if the drive has no frequency."""
     rule = GRIDS[scene.accuracy]
-    period = end / 2 if scene.frequency is None else 1 / scene.frequency
+    period = end if scene.frequency is None else 1 / scene.frequency
     largest = period / rule.per_period
     steps = grid.graded(end, min(rule.first, largest), rule.growth, largest)
-    return ImplicitSolver(
-        scene.topology, steps, times, rule.tolerance, threads, turn_allowance=TURN_ALLOWANCE
+    solver = ImplicitSolver(
+        scene.topology, steps, times, rule.newton, threads, turn_allowance=TURN_ALLOWANCE
     )
+    if scene.frequency is not None:
+        return solver
+    adapted_to_each = (
+        adapted(solver, values, drive, rule.per_step, rule.first, largest) for drive in scene.drives
+    )
+    return max(adapted_to_each, key=lambda made: len(made.times))
 
 
-def _contact_line(values: Parameters, solver: ImplicitSolver) -> str:
+def _contact_line(values: Values, solver: ImplicitSolver) -> str:
     n_touching = len(solver.touching(values))
     return (
-        f"contact of {len(values.void) - n_touching} of {len(values.void)} ligaments at the start: their voids"
-        " are wide open (checked after each solve)"
+        f"contact of {len(values.void) - n_touching} of {len(values.void)} ligaments at the start:"
+        " their voids are wide open (checked after each solve)"
     )
 
 
 def _explicit(
-    scene: Scene, values: Parameters, end: float, times: Floats, threads: int
+    scene: Scene, values: Values, end: float, times: Floats, threads: int
 ) -> ExplicitSolver:
     highest = CONTACT_STIFFENING * highest_frequency(scene.topology, values)
     largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / highest
@@ -209,13 +232,13 @@ def _explicit(
 
 
 @compiled
-def _stiffness(motion, net, turn, free, band):
+def _stiffness(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> None:
     band[:] = 0.0
     tangent(motion, net, turn, free, band)
 
 
-def lowest_frequency(scene: Scene, values: Parameters) -> float:
-    """Lowest angular eigenfrequency of the free dofs at rest, rad/s; zero if the rest is not stable."""
+def lowest_frequency(scene: Scene, values: Values) -> float:
+    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
     top = scene.topology
     number, width = top.numbering
     band = np.zeros((top.n_free, width + 1))

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
+from sim.arrays import Floats, Ints
 from sim.design import DesignSpace, Symmetry, design_space
 from sim.dynamics import Drive
-from sim.kernels import Floats, Ints
 from sim.lattice import Lattice
 from sim.loads import Motion
 from sim.model import Material, Topology, topology

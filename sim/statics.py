@@ -1,8 +1,9 @@
 """Equilibrium paths of a network by Newton continuation, and their exact adjoint.
 
-The held dofs go through given loads; between two loads the increment adapts itself. A predictor along the path
-and every correction stop short of the contact barrier. Corrections descend the energy: an indefinite tangent is
-shifted until it is positive definite, so that the path ends in minima and leaves saddles.
+The held dofs go through given loads; between two loads the increment adapts itself. A predictor
+along the path and every correction stop short of the contact barrier. Corrections descend the
+energy: an indefinite tangent is shifted until it is positive definite, so that the path ends in
+minima and leaves saddles.
 """
 
 from __future__ import annotations
@@ -11,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.arrays import Floats, Ints
 from sim.band import factorise, solve
 from sim.dynamics import Drive, as_parameters, empty_sensitivity
 from sim.errors import SimulationError
 from sim.kernels import (
-    Floats,
-    Ints,
+    Network,
+    Sensitivity,
     barrier_step,
     compiled,
     gradient,
@@ -24,7 +26,7 @@ from sim.kernels import (
     mixed,
     tangent,
 )
-from sim.model import Parameters, Topology
+from sim.model import Topology, Values
 
 KEEP_FROM_BARRIER = 0.9
 MAX_CORRECTIONS = 60
@@ -35,7 +37,9 @@ ON_THE_WAY = 1e-3
 
 
 @compiled
-def _residual(motion, net, turn, dofs, held, scale, force):
+def _residual(
+    motion: Floats, net: Network, turn: Floats, dofs: Ints, held: Ints, scale: Floats, force: Floats
+) -> tuple[float, float, float]:
     """Energy, and the largest out-of-balance and reaction force (rotations over ``scale``), N."""
     strain, contact = gradient(motion, net, turn, force)
     residual, reaction = 0.0, 0.0
@@ -47,7 +51,7 @@ def _residual(motion, net, turn, dofs, held, scale, force):
 
 
 @compiled
-def _factorise_shifted(motion, net, turn, free, band):
+def _factorise_shifted(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> int:
     """Factor of the tangent, shifted if need be; returns the number of shifts tried."""
     shift = 0.0
     for tries in range(40):
@@ -67,11 +71,27 @@ def _factorise_shifted(motion, net, turn, free, band):
 
 
 @compiled
-def _correct(motion, net, turn, free, dofs, held, scale, relative, absolute, band, force, step, trial, right, counts):
+def _correct(
+    motion: Floats,
+    net: Network,
+    turn: Floats,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    scale: Floats,
+    relative: float,
+    absolute: float,
+    band: Floats,
+    force: Floats,
+    step: Floats,
+    trial: Floats,
+    right: Floats,
+    counts: Ints,
+) -> bool:
     """Newton descent at fixed held dofs. True once the residual is below its tolerance.
 
-    On success ``band`` holds the factor at the last iterate but one of the path's states unless it was needed
-    no more; ``counts`` gathers gradients, factorisations, shifted factorisations.
+    On success ``band`` holds the factor at the last iterate but one of the path's states unless it
+    was needed no more; ``counts`` gathers gradients, factorisations, shifted factorisations.
     """
     energy, residual, reaction = _residual(motion, net, turn, dofs, held, scale, force)
     counts[0] += 1
@@ -95,10 +115,14 @@ def _correct(motion, net, turn, free, dofs, held, scale, relative, absolute, ban
         accepted = False
         for _ in range(MAX_BACKTRACKS):
             trial[:] = motion + length * step
-            new_energy, new_residual, reaction = _residual(trial, net, turn, dofs, held, scale, force)
+            new_energy, new_residual, reaction = _residual(
+                trial, net, turn, dofs, held, scale, force
+            )
             counts[0] += 1
             descends = new_energy <= energy + 1e-4 * length * slope
-            if np.isfinite(new_energy) and (descends or (shifts == 0 and new_residual < 0.5 * residual)):
+            if np.isfinite(new_energy) and (
+                descends or (shifts == 0 and new_residual < 0.5 * residual)
+            ):
                 accepted = True
                 break
             length *= 0.5
@@ -110,18 +134,36 @@ def _correct(motion, net, turn, free, dofs, held, scale, relative, absolute, ban
 
 
 @compiled
-def follow(loads, net, free, dofs, held, scale, width, relative, absolute, out, stable, counts):
-    """Fills ``out`` (n_loads, n_dofs) with the equilibria at ``loads`` (n_loads, n_held), from rest.
+def follow(
+    loads: Floats,
+    net: Network,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    scale: Floats,
+    width: int,
+    relative: float,
+    absolute: float,
+    out: Floats,
+    stable: Ints,
+    counts: Ints,
+) -> tuple[int, float]:
+    """Fills ``out`` (n_loads, n_dofs) with the equilibria at ``loads`` (n_loads, n_held).
 
-    ``stable`` (n_loads,) tells whether the tangent there is positive definite. ``counts`` (4,) gathers gradients,
-    factorisations, shifted factorisations and increments.
+    ``stable`` (n_loads,) tells whether the tangent there is positive definite. ``counts`` (4,)
+    gathers gradients, factorisations, shifted factorisations and increments.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.
     """
     n_dofs = len(scale)
     turn, force = np.empty((n_dofs // 3, 4)), np.empty(n_dofs)
-    motion, saved, step, trial = np.zeros(n_dofs), np.empty(n_dofs), np.empty(n_dofs), np.empty(n_dofs)
+    motion, saved, step, trial = (
+        np.zeros(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+    )
     right, band = np.empty(len(dofs)), np.empty((len(dofs), width + 1))
     increment = 1.0
     # the rest state itself may be out of balance (contact at the start)
@@ -180,8 +222,19 @@ def follow(loads, net, free, dofs, held, scale, width, relative, absolute, out, 
 
 
 @compiled
-def adjoint(states, bar, net, free, dofs, held, width, which, sensitivity, bar_loads):
-    """Adds the derivatives of a loss with derivatives ``bar`` (n_loads, n_dofs) by the equilibria ``states``.
+def adjoint(
+    states: Floats,
+    bar: Floats,
+    net: Network,
+    free: Ints,
+    dofs: Ints,
+    held: Ints,
+    width: int,
+    which: Ints,
+    sensitivity: Sensitivity,
+    bar_loads: Floats,
+) -> int:
+    """Adds to the sensitivities of a loss with derivatives ``bar`` by the equilibria ``states``.
 
     Returns:
         the first load whose tangent is not positive definite, or -1.
@@ -229,14 +282,15 @@ class Record:
 
 @dataclass(frozen=True)
 class StaticSolver:
-    """Finds the equilibria of one case at the asked values of its load parameter (``dynamics.Solver``).
+    """Finds the equilibria of one case at the asked load parameters (``dynamics.Solver``).
 
     The load parameter takes the place of time; velocities are zero.
 
     Attributes:
         topology: the structure.
         asked: (n_asked,) load parameters, in the order in which they are passed.
-        relative, absolute: tolerance of the residual, relative to the largest reaction, and its floor in N.
+        relative, absolute: tolerance of the residual, relative to the largest reaction, and its
+            floor in N.
         threads: cases solved side by side.
         touching: ligaments in which contact is computed, None for all.
     """
@@ -252,7 +306,7 @@ class StaticSolver:
         """The same to a hundred times tighter a tolerance, to estimate the error by."""
         return replace(self, relative=self.relative / 100)
 
-    def forward(self, values: Parameters, drive: Drive) -> tuple[Floats, Floats, Record]:
+    def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
         touching = np.arange(len(values.void)) if self.touching is None else self.touching
@@ -266,28 +320,28 @@ class StaticSolver:
         )  # fmt: skip
         if reached < len(loads):
             raise SimulationError(
-                f"no equilibrium found beyond load {reached} of {len(loads)} (at {fraction:.3g} of the way to the"
-                " next): a limit point or jammed contact; try a smaller load or more load steps",
+                f"no equilibrium found beyond load {reached} of {len(loads)} (at {fraction:.3g} of the"
+                " way to the next): a limit point or jammed contact; try a smaller load or more load steps",
                 step=reached,
             )
         return states, np.zeros_like(states), Record(states, stable, touching, counts)
 
     def backward(
-        self, values: Parameters, record: Record, bar_u: Floats, bar_v: Floats
-    ) -> tuple[Parameters, Floats, Floats]:
+        self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
+    ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         top = self.topology
         number, width = top.numbering
         sensitivity = empty_sensitivity(values)
         bar_loads = np.zeros((len(record.states), len(top.held)))
         unstable = adjoint(
-            record.states, bar_u, top.network(values, record.touching), number, top.free_dofs, top.held, width,
-            top.designed, sensitivity, bar_loads,
+            record.states, bar_u, top.network(values, record.touching), number, top.free_dofs,
+            top.held, width, top.designed, sensitivity, bar_loads,
         )  # fmt: skip
         if unstable >= 0:
             raise SimulationError(
-                f"the equilibrium at load {unstable} is not a minimum of the energy, so it has no gradient to"
-                " follow; try another design or more load steps",
+                f"the equilibrium at load {unstable} is not a minimum of the energy, so it has no"
+                " gradient to follow; try another design or more load steps",
                 step=unstable,
             )
         zero = np.zeros(top.n_dofs)

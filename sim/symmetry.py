@@ -1,16 +1,18 @@
-"""Symmetries of a structure about the middle of its lattice, and the load cases that they make equal."""
+"""Symmetries of a structure about its middle, and the load cases that they make equal."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.kernels import Floats, Ints
+from sim.arrays import Floats, Ints
 from sim.lattice import Lattice
 
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
-def unit_image(lattice: Lattice, vertices: Floats, operation: Floats, tolerance: float) -> Ints | None:
+def unit_image(
+    lattice: Lattice, vertices: Floats, operation: Floats, tolerance: float
+) -> Ints | None:
     """Image (n_units,) of each unit under an operation, or None if the structure changes by it.
 
     Args:
@@ -41,7 +43,8 @@ def is_invariant(image: Ints, *sets: Ints) -> bool:
 def equal_directions(directions: Floats) -> Ints:
     """First case equal to each case when a quarter turn leaves the structure alone.
 
-    Directions (n_cases,) in rad that differ by multiples of 90 deg give turned copies of one response.
+    Directions (n_cases,) in rad that differ by multiples of 90 deg give turned copies of one
+    response.
     """
     quarter = np.pi / 2
     reduced = np.mod(np.asarray(directions) + 1e-9, quarter)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.kernels import Floats
+from sim.arrays import Floats
 
 
 class Tableau(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.lattice import Floats
+from sim.arrays import Floats
 from sim.optimise.problem import InfeasibleStartError, Place, Problem
 from sim.optimise.qp import reachable, shortest_step
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from sim.lattice import Floats
+from sim.arrays import Floats
 from sim.optimise.mma import MmaOptions, mma
 from sim.optimise.problem import Callback, Constrain, Evaluate, Problem, Result
 from sim.optimise.sqp import SqpOptions, sqp

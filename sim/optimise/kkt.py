@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from sim.lattice import Floats, Ints
+from sim.arrays import Floats, Ints
 from sim.optimise.qp import reachable, shortest_step
 
 MULTIPLIER = 1e-7
@@ -19,9 +19,9 @@ class Stationarity:
     """Optimality of a design.
 
     Attributes:
-        residual: largest entry of the step (mm) that takes the design, pushed down the gradient by up
-            to 1 mm, back to its linearised constraints; 0 at an optimum, 1 where nothing is in the
-            way of the steepest slope.
+        residual: largest entry of the step (mm) that takes the design, pushed down the gradient by
+            up to 1 mm, back to its linearised constraints; 0 at an optimum, 1 where nothing is in
+            the way of the steepest slope.
         active: ids of the constraints that carry a multiplier.
         multipliers: (n_active,) theirs.
     """

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from sim.arrays import Floats, Ints
 from sim.errors import SimulationError
-from sim.lattice import Floats, Ints
 from sim.optimise.feasibility import feasible_start, project
 from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import reachable

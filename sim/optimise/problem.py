@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
+from sim.arrays import Floats
 from sim.errors import SimulationError
-from sim.lattice import Floats
 from sim.optimise.kkt import Stationarity, stationarity
 
 Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]

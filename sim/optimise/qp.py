@@ -8,7 +8,7 @@ import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from sim.lattice import Floats
+from sim.arrays import Floats
 
 
 @dataclass(frozen=True)

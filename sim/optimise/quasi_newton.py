@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 
-from sim.lattice import Floats
+from sim.arrays import Floats
 
-import os
-EASE = float(os.environ.get('EASE','1'))
+EASE = float(os.environ.get("EASE", "1"))
 DAMPING = 0.2
 """Smallest curvature along a step, relative to the model's, that an update may leave."""
 

@@ -18,8 +18,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 
+from sim.arrays import Floats
 from sim.errors import SimulationError
-from sim.lattice import Floats
 
 WEIGHT = 1000.0
 """Price of violating a constraint, relative to the steepest slope of the objective."""

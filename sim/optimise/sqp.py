@@ -7,19 +7,22 @@ set before it is simulated, and the loss alone decides whether it is accepted (W
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
 
+from sim.arrays import Floats, Ints
 from sim.errors import SimulationError
-from sim.lattice import Floats, Ints
 from sim.optimise.feasibility import feasible_start, project
 from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
 
-import os
-RESET=os.environ.get("RESET","0")=="1"; NORESTART=os.environ.get("NORESTART","1")=="1"
+KEEP = float(os.environ.get("KEEP", "0"))
+KDEC = float(os.environ.get("KDEC", "0.9"))
+RESET = os.environ.get("RESET", "0") == "1"
+NORESTART = os.environ.get("NORESTART", "1") == "1"
 ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
 """Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
 
@@ -88,8 +91,10 @@ def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
             break
         kicked = _kick(problem, options, random)
         if kicked is not None:
-            if RESET: descent = Descent(problem, kicked, options)
-            else: descent.go_on_from(kicked)
+            if RESET:
+                descent = Descent(problem, kicked, options)
+            else:
+                descent.go_on_from(kicked)
             reason = descent.run()
     return problem.result(problem.finished or reason)
 
@@ -177,7 +182,7 @@ class Descent:
             self.model.matrix,
             point.gradient,
             point.jacobian[rows],
-            -point.values[rows],
+            -point.values[rows] * (1 - KEEP * KDEC ** len(self.problem.evaluations)),
             np.maximum(self.problem.lower - point.x, -radius),
             np.minimum(self.problem.upper - point.x, radius),
         )
