@@ -49,8 +49,7 @@ def write_report(study: Study, folder: Path) -> list[Path]:
 
     known = facts.collect(study)
     fact_files.write_json(known, folder / "facts.json")
-    fact_files.write_csv(known, folder / "facts.csv")
-    data = tables.build(study)
+    data = [fact_files.table(known), *tables.build(study)]
     for table in data:
         (folder / table.name).write_bytes(table.csv)
     with style.styled():
@@ -58,7 +57,7 @@ def write_report(study: Study, folder: Path) -> list[Path]:
     svg = (folder / f"{study.name}.svg").read_text(encoding="utf-8")
     html = page.render(content.build(study, known, data, svg, [path.name for path in drawn]))
     (folder / "index.html").write_text(html, encoding="utf-8")
-    names = ["facts.json", "facts.csv", *(table.name for table in data), "index.html"]
+    names = ["facts.json", *(table.name for table in data), "index.html"]
     return [*drawn, *(folder / name for name in names)]
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
+
+from reports.tables import Table
 
 ABSENT = "—"
 
@@ -81,9 +82,7 @@ def write_json(facts: Sequence[Fact], path: Path) -> None:
     path.write_text(json.dumps(records, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
 
-def write_csv(facts: Sequence[Fact], path: Path) -> None:
+def table(facts: Sequence[Fact]) -> Table:
     """Facts as a table, one a line."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        table = csv.DictWriter(file, list(asdict(facts[0])), lineterminator="\n")
-        table.writeheader()
-        table.writerows(asdict(fact) for fact in facts)
+    columns = {entry.name: [getattr(fact, entry.name) for fact in facts] for entry in fields(Fact)}
+    return Table("facts.csv", "the paper’s numbers and ours", columns)

@@ -44,6 +44,11 @@ def nearest_case(response: xr.Dataset, direction: float) -> int:
     return int(np.argmin(np.abs(response["direction"].values - direction)))
 
 
+def case_direction(response: xr.Dataset, direction: float) -> float:
+    """Direction in degrees of the load case that is nearest to `direction`."""
+    return float(response["direction"].values[nearest_case(response, direction)])
+
+
 def peak_to_peak(series: xr.DataArray, until: float) -> xr.DataArray:
     """Peak-to-peak value over the time [0, until]."""
     window = series.sel(time=slice(None, until * LAST_SAMPLE))

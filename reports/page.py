@@ -11,46 +11,16 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
-import numpy as np
 import xarray as xr
 from markupsafe import Markup, escape
-from numpy.typing import NDArray
 
 from reports.facts import Fact
+from reports.tables import Table
 
 LARGEST_PAGE = 6_000_000
 """Bytes that a page may have."""
 
 _TEMPLATES = Path(__file__).parent / "templates"
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table that lies beside the page as a CSV file and inside it as a download."""
-
-    name: str
-    text: str
-    columns: Mapping[str, NDArray[Any]]
-
-    @property
-    def n_rows(self) -> int:
-        """Number of rows without the heading."""
-        return len(next(iter(self.columns.values())))
-
-    @property
-    def csv(self) -> bytes:
-        """The table as CSV: ten significant digits, empty where there is no value."""
-        lines = [",".join(self.columns)]
-        cells = ([_cell(value) for value in column] for column in self.columns.values())
-        lines += [",".join(row) for row in zip(*cells, strict=True)]
-        return ("\n".join(lines) + "\n").encode("utf-8")
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, float | np.floating):
-        return "" if np.isnan(value) else f"{value:.10g}"
-    text = str(value)
-    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & set(',"\n') else text
 
 
 @dataclass(frozen=True)

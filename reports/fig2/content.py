@@ -12,13 +12,14 @@ import xarray as xr
 
 from pipeline.problem import canonical_json, content_hash
 from reports import measures, style
-from reports.facts import Fact
+from reports.facts import Fact, worded
 from reports.fig2.facts import MONITORED
-from reports.page import Page, Source, Table, source
+from reports.page import Page, Source, source
 from reports.player import Axis, Clip, Disc, Field, payload, quantisation_error
 from reports.scene import Scene
 from reports.structure import DRIVEN, from_dataset, middle_of_top_edge
 from reports.study import Study
+from reports.tables import Table
 
 HEADLINE = ("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max")
 
@@ -115,9 +116,9 @@ def _player_note(player: Mapping[str, Any]) -> str:
     shift, turn = quantisation_error(player)
     shown, saved = player["axis"]["shown"], player["axis"]["saved"]
     return (
-        f"{shown} of {saved} saved times, rounded to ±{shift:.1g} mm and "
-        f"±{turn:.1g} rad; between them the motion is interpolated. The dot marks the unit of "
-        "panel d."
+        f"{shown} of {saved} saved times, rounded to ±{worded(shift, 'mm', 1)} and "
+        f"±{worded(turn, 'rad', 1)}; between them the motion is interpolated. The dot marks the "
+        "unit of panel d."
     )
 
 

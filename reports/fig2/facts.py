@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from reports import measures
-from reports.facts import Fact, grouped, number, percent, share, worded
+from reports.facts import ABSENT, Fact, grouped, number, percent, share, worded
 from reports.scene import Scene, cycles
 from reports.structure import CLOAK, from_dataset, middle_of_top_edge
 from reports.study import Study
@@ -74,15 +74,20 @@ def loss_facts(scene: Scene, response: xr.Dataset) -> Iterator[Fact]:
         yield share(f"mean_reduction{suffix}", label, measures.reduction(mean), paper, note)
     note = f"time integral over {scene.horizon:g} s"
     start, end = (mean_loss(scene, response, "loss", name) for name in ("altered", "cloaked"))
-    yield number("loss_start", "Loss J, altered", start, note=note)
+    yield loss_fact("loss_start", "Loss J, altered", start, note=note)
     paper = f"≈ {paper_loss(start):.2g}"
     note += "; the paper's is inferred from its 70 %, (1 − 0.7)² of ours at the start"
-    yield number("loss_end", "Loss J, cloaked", end, paper=paper, note=note)
+    yield loss_fact("loss_end", "Loss J, cloaked", end, paper, note)
     for key, name in (("start", "altered"), ("end", "cloaked")):
         value = mean_loss(scene, response, "loss_samples", name)
         label = f"Loss J, {name}, mean of samples"
         note = "the authors' mean over the saved samples of the same time"
-        yield number(f"loss_samples_{key}", label, value, note=note)
+        yield loss_fact(f"loss_samples_{key}", label, value, note=note)
+
+
+def loss_fact(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
+    """Fact of a loss, to four decimals."""
+    return Fact(key, label, value, "1", f"{value:.4f}", paper, note)
 
 
 def mean_loss(scene: Scene, response: xr.Dataset, variable: str, structure: str) -> float:
@@ -110,7 +115,7 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
             f"evaluations_{method}", f"Evaluations, {name}", count, paper="≈ 150", note=note
         )
         note = "shipped" if ours else "not shipped"
-        yield number(f"best_{method}", f"Best feasible J, {name}", best, note=note)
+        yield loss_fact(f"best_{method}", f"Best feasible J, {name}", best, note=note)
         residual = float(history["kkt_residual"])
         yield number(f"kkt_{method}", f"KKT residual, {name}", residual, digits=2)
 
@@ -180,10 +185,8 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     worst = loss.where(loss == loss.max(), drop=True)
     angle, rate = float(worst["direction"][0]), float(worst["frequency"][0])
     note = f"at α = {angle:g}°, f = {rate:g} Hz"
-    yield number(
-        "map_max", "Largest J over the map", float(loss.max()), digits=3, paper="< 0.35", note=note
-    )
-    yield number("map_min", "Smallest J over the map", float(loss.min()), digits=3)
+    yield loss_fact("map_max", "Largest J over the map", float(loss.max()), "< 0.35", note)
+    yield loss_fact("map_min", "Smallest J over the map", float(loss.min()))
     note = "1 − √(J / J of the altered structure) at the worst point"
     yield share(
         "map_reduction", "RMS |U| reduced at least by", 1 - float(np.sqrt(ratio.max())), note=note

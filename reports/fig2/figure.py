@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import xarray as xr
 from matplotlib.figure import Figure
 
-from reports import style
+from reports import measures, style
 from reports.fig2.curves import loss_panel, map_panel, motion_panel
+from reports.fig2.facts import MONITORED
 from reports.fig2.structures import (
     SnapshotRow,
     problem_panel,
@@ -36,12 +37,14 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     top_c = 51.5
     top_d = top_c + 8.5 + snapshots + 1.0
     figure = style.page(top_d + 51.0)
-    _problem(figure, scene, design)
+    direction = measures.case_direction(response, MONITORED)
+    load = f"$α$ = {direction:g}°"
+    _problem(figure, scene, design, direction)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
     loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design)
-    style.letter(figure, 0.0, top_c, "c", "Response over one drive cycle, $α$ = 45°")
+    style.letter(figure, 0.0, top_c, "c", f"Response over one drive cycle, {load}")
     snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
-    style.letter(figure, 0.0, top_d, "d", "Middle unit of the top edge, $α$ = 45°")
+    style.letter(figure, 0.0, top_d, "d", f"Middle unit of the top edge, {load}")
     motion_panel(style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0), scene, response, simulated)
     most = f"largest $J$ = {float(sweep['loss'].max()):.3f}"
     style.letter(figure, 109.0, top_d, "e", f"Robustness, {most}")
@@ -52,7 +55,7 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     return figure
 
 
-def _problem(figure: Figure, scene: Scene, design: xr.Dataset) -> None:
+def _problem(figure: Figure, scene: Scene, design: xr.Dataset, direction: float) -> None:
     style.letter(figure, 0.0, 0.8, "a")
     side = 40.0
     radius = scene.radii[-1]
@@ -64,7 +67,8 @@ def _problem(figure: Figure, scene: Scene, design: xr.Dataset) -> None:
     for k, name in enumerate(("reference", "altered", "cloaked")):
         vertices = "vertices" if name == "cloaked" else "vertices_initial"
         axes = style.place(figure, k * (side + 0.6), 6.0, side, side)
-        problem_panel(axes, scene, from_dataset(design, scene.spacing, vertices), name)
+        structure = from_dataset(design, scene.spacing, vertices)
+        problem_panel(axes, scene, structure, name, direction)
         axes.set_title(
             name.capitalize(), color=style.STRUCTURE_COLOURS[name], fontsize=style.TITLE, pad=2.0
         )

@@ -54,8 +54,10 @@ class SnapshotRow:
     displacement: Array
 
 
-def problem_panel(axes: Axes, scene: Scene, structure: Structure, name: str) -> None:
-    """One structure of panel (a): "reference", "altered" or "cloaked"."""
+def problem_panel(
+    axes: Axes, scene: Scene, structure: Structure, name: str, direction: float
+) -> None:
+    """One structure of panel (a), "reference", "altered" or "cloaked", driven in `direction`."""
     draw_clamps(axes, structure, scene.spacing)
     draw(axes, structure, colours=list(_colours(structure, name)))
     middle = np.array(scene.middle)
@@ -64,22 +66,22 @@ def problem_panel(axes: Axes, scene: Scene, structure: Structure, name: str) -> 
     if name == "cloaked":
         outline(axes, middle, scene.radii, style.CLOAKED)
     if name == "altered":
-        _direction(axes, scene)
+        _direction(axes, scene, direction)
     reach = (0.75 * scene.spacing, 0.16 * scene.columns * scene.spacing + 0.2 * scene.spacing)
-    drive_arrows(axes, middle, MONITORED, reach, style.ALTERED)
+    drive_arrows(axes, middle, direction, reach, style.ALTERED)
 
 
-def _direction(axes: Axes, scene: Scene) -> None:
-    """The loading angle, between the x axis and the drive."""
+def _direction(axes: Axes, scene: Scene, direction: float) -> None:
+    """The loading angle in degrees, between the x axis and the drive."""
     x, y = scene.middle
     halo: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.0, foreground="white")]
     radius = 0.2 * scene.columns * scene.spacing
     line = axes.plot(
         [x + 0.75 * scene.spacing, x + 1.15 * radius], [y, y], color=style.INTACT, lw=0.6, zorder=6
     )[0]
-    arc = Arc((x, y), 1.7 * radius, 1.7 * radius, theta1=0, theta2=MONITORED, lw=0.6, zorder=6)
+    arc = Arc((x, y), 1.7 * radius, 1.7 * radius, theta1=0, theta2=direction, lw=0.6, zorder=6)
     axes.add_patch(arc)
-    angle = np.radians(0.5 * MONITORED)
+    angle = np.radians(0.5 * direction)
     at = (x + 1.12 * radius * np.cos(angle), y + 1.12 * radius * np.sin(angle))
     text = axes.text(*at, r"$\alpha$", fontsize=style.TITLE, ha="center", va="center", zorder=9)
     for artist in (line, arc, text):

@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from reports.page import Table
 from reports.scene import Scene
 from reports.structure import from_dataset, middle_of_top_edge
 from reports.study import Study
+from reports.tables import Table
 
 Columns = dict[str, NDArray[Any]]
 

@@ -12,8 +12,8 @@ import pytest
 
 from reports import page
 from reports.fig2 import content, facts
-from reports.page import Table
 from reports.study import Study
+from reports.tables import Table
 
 
 class Links(HTMLParser):
@@ -59,7 +59,13 @@ def test_links_lead_somewhere(html: str, report: Path) -> None:
 
 def test_inlined_tables_are_the_files_beside_the_page(html: str, report: Path) -> None:
     tables = {name: href for name, href in Links(html).hrefs.items() if href.startswith("data:")}
-    assert sorted(tables) == ["design.csv", "loss_history.csv", "robustness.csv", "top_edge.csv"]
+    assert sorted(tables) == [
+        "design.csv",
+        "facts.csv",
+        "loss_history.csv",
+        "robustness.csv",
+        "top_edge.csv",
+    ]
     for name, href in tables.items():
         assert base64.b64decode(href.partition(",")[2]) == (report / name).read_bytes()
 

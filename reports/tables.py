@@ -1,0 +1,39 @@
+"""Data tables of a report, as CSV."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that lies beside the page as a CSV file and inside it as a download."""
+
+    name: str
+    text: str
+    columns: Mapping[str, NDArray[Any] | Sequence[Any]]
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows without the heading."""
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def csv(self) -> bytes:
+        """The table as CSV: ten significant digits, empty where there is no value."""
+        lines = [",".join(self.columns)]
+        cells = ([_cell(value) for value in column] for column in self.columns.values())
+        lines += [",".join(row) for row in zip(*cells, strict=True)]
+        return ("\n".join(lines) + "\n").encode("utf-8")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float | np.floating):
+        return "" if np.isnan(value) else f"{value:.10g}"
+    text = str(value)
+    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & set(',"\n') else text
