@@ -13,6 +13,10 @@ rule report:
         ),
         page="results/{name}{preset}/report/index.html",
         facts="results/{name}{preset}/report/facts.json",
+        tables=expand(
+            "results/{{name}}{{preset}}/report/{table}.csv",
+            table=["design", "facts", "loss_history", "robustness", "top_edge"],
+        ),
     log:
         "results/{name}{preset}/logs/report.log",
     threads: 1

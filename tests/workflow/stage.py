@@ -5,6 +5,11 @@ import sys
 import time
 from pathlib import Path
 
+REPORT = (
+    *("index.html", "facts.json", "fig2.pdf", "fig2.svg", "fig2.png"),
+    *("design.csv", "facts.csv", "loss_history.csv", "robustness.csv", "top_edge.csv"),
+)
+
 
 def main(words: list[str]) -> None:
     options = {word: words[at + 1] for at, word in enumerate(words) if word.startswith("--")}
@@ -13,8 +18,7 @@ def main(words: list[str]) -> None:
         Path(options["--out"]).write_text(" ".join(words))
     if "--out-dir" in options:
         folder = Path(options["--out-dir"])
-        figures = (f"fig2{suffix}" for suffix in (".pdf", ".svg", ".png"))
-        for name in ("index.html", "facts.json", *figures):
+        for name in REPORT:
             (folder / name).write_text("")
     Path(options["--log"]).write_text("done\n")
 
