@@ -10,7 +10,6 @@ import argparse
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -63,8 +62,11 @@ def write_report(study: Study, folder: Path) -> list[Path]:
 
 @contextmanager
 def _aside(folder: Path) -> Iterator[Path]:
-    """A new folder beside `folder`, gone at the end."""
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".part", dir=folder.parent))
+    """An empty folder beside `folder`, gone at the end; what a killed build left there goes too."""
+    aside = folder.with_name(f".{folder.name}.part")
+    if aside.exists():
+        shutil.rmtree(aside)
+    aside.mkdir()
     try:
         yield aside
     finally:

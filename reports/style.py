@@ -71,13 +71,13 @@ RC: dict[Any, Any] = {
     "savefig.facecolor": "white",
     "pdf.fonttype": 42,
     "svg.fonttype": "path",
-    "svg.hashsalt": "cloak",
+    "svg.hashsalt": "metacloak",
     "path.simplify": False,
 }
 
 _METADATA: dict[str, dict[str, str | None]] = {
-    "pdf": {"Creator": "cloak", "Producer": None, "CreationDate": None},
-    "svg": {"Creator": "cloak", "Date": None},
+    "pdf": {"Creator": "metacloak", "Producer": None, "CreationDate": None},
+    "svg": {"Creator": "metacloak", "Date": None},
     "png": {"Software": None},
 }
 

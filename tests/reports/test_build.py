@@ -70,6 +70,16 @@ def test_a_build_that_fails_leaves_the_old_report(
     assert sorted(quick_report.parent.iterdir()) == beside
 
 
+def test_what_a_killed_build_left_goes(quick_report: Path, quick: Study) -> None:
+    left = quick_report.with_name(f".{quick_report.name}.part")
+    left.mkdir()
+    (left / "index.html").write_text("half a page", encoding="utf-8")
+    before = contents(quick_report)
+    build.publish(quick, quick_report)
+    assert contents(quick_report) == before
+    assert not left.exists()
+
+
 def test_help_needs_no_libraries(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         build.main(["--help"])
