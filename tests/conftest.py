@@ -1,0 +1,7 @@
+from __future__ import annotations
+
+from hypothesis import settings
+
+# The same examples in every run, and no deadline: the first one compiles.
+settings.register_profile("suite", deadline=None, derandomize=True)
+settings.load_profile("suite")

@@ -1,0 +1,175 @@
+"""Small structures, drives and losses that the tests of the physics share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.design import DesignSpace, design_space
+from sim.dynamics import Drive, Solver, simulate
+from sim.geometry import shape
+from sim.kernels import Floats, Ints
+from sim.lattice import Lattice, quads
+from sim.loads import Motion, held_dofs
+from sim.model import Material, Parameters, Topology, damping_of_ratio, parameters, topology
+
+BARRIER, CUTOFF = float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0))
+DENSITY, AXIAL, SHEAR, BENDING, CONTACT = 6.18e-9, 120.0, 1.19, 1.5, 1.5
+MATERIAL = Material(
+    DENSITY,
+    AXIAL,
+    SHEAR,
+    BENDING,
+    CONTACT,
+    *damping_of_ratio(0.0186, DENSITY, 15.0, SHEAR, BENDING),
+)
+"""The paper's constants."""
+NONE = np.array([], dtype=np.int64)
+
+
+def rotating_squares(side: int = 5, bias_deg: float = 20.0) -> Lattice:
+    return quads(side, side, 15.0, 2.25, np.deg2rad(bias_deg))
+
+
+def mixed_polygons() -> Lattice:
+    """A hexagon with a triangle at each corner, the triangles chained, and a pentagon at one end."""
+    ring = np.deg2rad(60.0) * np.arange(6)
+    outward = np.stack([np.cos(ring), np.sin(ring)], axis=1)
+    across = np.stack([-np.sin(ring), np.cos(ring)], axis=1)
+    triangles = [
+        np.stack([8 * o, 16 * o - 5 * t, 16 * o + 5 * t])
+        for o, t in zip(outward, across, strict=True)
+    ]
+    fifths = np.pi + np.deg2rad(72.0) * np.arange(5)
+    pentagon = [25.0, -5.0] + 5 * np.stack([np.cos(fifths), np.sin(fifths)], axis=1)
+    polygons = [6 * outward, *triangles, pentagon]
+
+    corner = np.cumsum([0] + [len(polygon) for polygon in polygons])
+    spokes = [(k, corner[1 + k]) for k in range(6)]
+    chain = [(corner[1 + k] + 2, corner[2 + k] + 1) for k in range(5)]
+    return hand_made(polygons, np.array([*spokes, *chain, (corner[1] + 1, corner[7])]))
+
+
+def hand_made(polygons: list[Floats], ligaments: Ints) -> Lattice:
+    """Lattice of any polygons; ``ligaments`` (n, 2) use each vertex at most once."""
+    n_vertices = sum(len(polygon) for polygon in polygons)
+    group = np.arange(n_vertices)
+    group[ligaments[:, 1]] = group[ligaments[:, 0]]
+    n_units = len(polygons)
+    return Lattice(
+        vertices=np.concatenate(polygons),
+        unit=np.repeat(np.arange(n_units), [len(polygon) for polygon in polygons]),
+        ligaments=ligaments,
+        group=np.unique(group, return_inverse=True)[1],
+        site=np.array([polygon.mean(axis=0) for polygon in polygons]),
+        index=np.stack([np.arange(n_units), np.zeros(n_units, dtype=int)], axis=1),
+        spacing=15.0,
+    )
+
+
+class Numbers(NamedTuple):
+    """Everything that a response may be differentiated by.
+
+    Attributes:
+        design: (n_variables,) mm.
+        stiffness: (n_ligaments, 3) factors on axial, shear and bending stiffness.
+        contact: (n_ligaments,) factors on the contact stiffness.
+        density: factor.
+        damping: (n_units, 2) factors on translational and rotational damping.
+        drive: the motion, itself a tree of numbers.
+    """
+
+    design: Array
+    stiffness: Array
+    contact: Array
+    density: Array
+    damping: Array
+    drive: Motion
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A small structure, clamped and driven, all of whose numbers can be varied.
+
+    Attributes:
+        lattice: the network; every vertex but those of the driven units is a design variable.
+        clamped, driven: units.
+        motion: of the driven units.
+    """
+
+    lattice: Lattice
+    clamped: Ints
+    driven: Ints
+    motion: Motion
+
+    @cached_property
+    def space(self) -> DesignSpace:
+        return design_space(self.lattice, np.arange(self.lattice.n_units), self.driven)
+
+    @cached_property
+    def topology(self) -> Topology:
+        return topology(self.lattice, held_dofs(self.clamped, self.driven), BARRIER, CUTOFF)
+
+    @property
+    def numbers(self) -> Numbers:
+        """The initial structure."""
+        return Numbers(
+            design=jnp.zeros(self.space.n_variables),
+            stiffness=jnp.ones((self.lattice.n_ligaments, 3)),
+            contact=jnp.ones(self.lattice.n_ligaments),
+            density=jnp.ones(()),
+            damping=jnp.ones((self.lattice.n_units, 2)),
+            drive=jax.tree.map(jnp.asarray, self.motion),
+        )
+
+    @cached_property
+    def parameters(self) -> Callable[[Numbers], Parameters]:
+        """Compiled map from the numbers to what the solvers take."""
+
+        @jax.jit
+        def of_numbers(numbers: Numbers) -> Parameters:
+            axial, shear, bending = numbers.stiffness.T
+            one = numbers.density * MATERIAL.density
+            material = Material(
+                one,
+                AXIAL * axial,
+                SHEAR * shear,
+                BENDING * bending,
+                CONTACT * numbers.contact,
+                MATERIAL.damping_translation * numbers.damping[:, 0],
+                MATERIAL.damping_rotation * numbers.damping[:, 1],
+            )
+            made = shape(self.lattice, self.space.vertices(numbers.design))
+            return parameters(self.lattice, made, material)
+
+        return of_numbers
+
+    @property
+    def values(self) -> Parameters:
+        """Parameters of the initial structure as NumPy arrays."""
+        return Parameters(*(np.asarray(part) for part in self.parameters(self.numbers)))
+
+    @property
+    def drive(self) -> Drive:
+        return Drive(self.driven, self.motion)
+
+    def loss(self, solver: Solver, numbers: Numbers) -> Array:
+        """A smooth function of displacement and velocity without any symmetry."""
+        drive = Drive(self.driven, numbers.drive)
+        response = simulate(solver, self.parameters(numbers), (drive,))
+        return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
+
+
+@jax.jit
+def _uneven(motion: Array, scale: float) -> Array:
+    """Sum of squares of (n_cases, n_asked, n_units, 3) with weights that differ everywhere."""
+    weights = 1.5 + jnp.sin(jnp.arange(motion.size, dtype=float)).reshape(motion.shape)
+    lengths = scale * motion * jnp.array([1.0, 1.0, 7.5])
+    return jnp.sum(weights * lengths**2) / motion.shape[1]
