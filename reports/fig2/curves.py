@@ -58,10 +58,10 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     accepted = done & (history["accepted"].values > 0)
     good = accepted & (history["violation"].values <= FEASIBLE)
     for curve in history["loss_case"].transpose("case", "evaluation").values:
-        axes.plot(step[accepted], curve[accepted], color=colour, lw=0.45, alpha=0.5, zorder=2)
-    axes.plot(step[accepted], loss[accepted], color=colour, lw=1.4, alpha=0.35, zorder=3)
+        axes.plot(step[accepted], curve[accepted], color=colour, lw=0.5, alpha=0.7, zorder=2)
+    axes.plot(step[accepted], loss[accepted], color=colour, lw=1.1, alpha=0.35, zorder=3)
     feasible = np.where(good, loss, np.nan)[accepted]
-    axes.plot(step[accepted], feasible, color=colour, lw=1.4, label=name, zorder=4)
+    axes.plot(step[accepted], feasible, color=colour, lw=1.1, label=name, zorder=4)
     outside = done & ~good
     axes.plot(step[outside], loss[outside], ".", color=colour, ms=2.4, mew=0, alpha=0.4, zorder=2)
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
