@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from sim.optimise import Evaluation, Result
+    from sim.optimise import Evaluation, MmaOptions, Result, SqpOptions
     from sim.plan import Plan
     from sim.scene import Scene
 
@@ -61,6 +61,9 @@ def optimise(
     asked: Problem, scene: Scene, plan: Plan, method: str, source: Path, results: Path
 ) -> Result:
     """Runs the optimiser with a journal in ``results`` and a progress bar."""
+    import numpy as np
+
+    from pipeline.scenes import limits_of
     from pipeline.sources import source_hash
     from sim.constraints import Constraints
     from sim.errors import SimulationError
@@ -79,10 +82,6 @@ def optimise(
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
     space = scene.space
-    import numpy as np
-
-    from pipeline.scenes import limits_of
-
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
 
         def show(evaluation: Evaluation) -> None:
@@ -104,7 +103,7 @@ def optimise(
             raise UserError(str(error), file=source) from error
 
 
-def _options(asked: Problem, method: str):  # noqa: ANN202  (a union of imported option types)
+def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
     from sim.optimise import MmaOptions, SqpOptions
 
     wanted = asked.optimiser

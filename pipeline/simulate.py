@@ -6,7 +6,6 @@ import argparse
 import logging
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from sim.batch import Case
+    from sim.batch import Case, Measure
     from sim.observables import Observables
     from sim.plan import Plan
     from sim.scene import Scene
@@ -79,13 +78,16 @@ def times_of(asked: Problem, scene: Scene) -> Times:
     from sim.plan import sample_times
 
     horizon = scene.duration
-    cycles = asked.response.cycles if asked.response is not None else 0
-    end = horizon if asked.frequency is None else max(horizon, cycles / asked.frequency)
-    shown = np.linspace(0.0, end, asked.response.samples if asked.response is not None else 2)
+    end = (
+        horizon
+        if asked.frequency is None
+        else max(horizon, asked.response.cycles / asked.frequency)
+    )
+    shown = np.linspace(0.0, end, asked.response.samples)
     wanted = (shown, sample_times(scene), np.linspace(0.0, horizon, asked.horizon.samples))
     nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
     every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
-    return Times(every * 1e-9, *np.split(place, np.cumsum([len(t) for t in wanted])[:-1]))
+    return Times(np.asarray(every * 1e-9), *np.split(place, np.cumsum([len(t) for t in wanted])[:-1]))
 
 
 class Measured(NamedTuple):
@@ -118,7 +120,7 @@ def response_dataset(
             plans[name] = plan.record()
             LOG.info("%s: %s", name, plan.describe())
             cases = _cases(scene, vertices, plan)
-            reduce = _measure(asked, scene, vertices, times)
+            reduce = _measure(scene, vertices, times)
             measured[name] = []
             for outcome in run_batch(cases, reduce, threads):
                 if outcome.value is None:
@@ -136,19 +138,20 @@ def _cases(scene: Scene, vertices: Floats, plan: Plan) -> Iterator[Case]:
     return (Case(values, drive, plan.solver) for drive in scene.drives)
 
 
-def _measure(asked: Problem, scene: Scene, vertices: Floats, times: Times):  # noqa: ANN202
+def _measure(scene: Scene, vertices: Floats, times: Times) -> Measure[Measured]:
     import jax.numpy as jnp
 
     from sim.clearance import clearance
+    from sim.dynamics import solve_case
     from sim.evaluation import objective
     from sim.observables import observe
 
     integral = objective(scene)
-    mean = replace_weights(integral, np.full(len(times.sampled), 1 / len(times.sampled)))
+    mean = integral._replace(weights=np.full(len(times.sampled), 1 / len(times.sampled)))
 
     def reduce(case: Case, displacement: Floats, velocity: Floats) -> Measured:
         solver = case.solver
-        refined, _, _ = solver.refined().forward(case.values, case.drive)
+        refined, _, _ = solve_case(solver.refined(), case.values, case.drive)
         refined = refined.reshape(displacement.shape)
         whole, fine = displacement[times.integrated], refined[times.integrated]
         loss, fine_loss = (
@@ -172,11 +175,6 @@ def _measure(asked: Problem, scene: Scene, vertices: Floats, times: Times):  # n
         )
 
     return reduce
-
-
-def replace_weights(measure, weights: Floats):  # noqa: ANN001, ANN201
-    """An objective with other quadrature weights."""
-    return measure._replace(weights=weights)
 
 
 def _dataset(

@@ -156,6 +156,7 @@ def _column(
     measure = objective(at_frequency)
 
     def reduce(case: Case, displacement: Floats, velocity: Floats) -> tuple[float, float]:
+        del velocity
         loss = float(measure(displacement[None], case.values)[0])
         voids = case.solver.topology.smallest_void_angle(case.values.void, displacement)
         return loss, float(voids.min())

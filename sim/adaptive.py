@@ -10,8 +10,10 @@ from sim import grid
 from sim.arrays import Floats
 from sim.dynamics import Drive
 from sim.errors import SimulationError
-from sim.implicit import CONVERGED, ImplicitSolver, march
+from sim.esdirk import CONVERGED, march
+from sim.implicit import ImplicitSolver
 from sim.model import Values
+from sim.system import system_of
 
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
 
@@ -72,15 +74,13 @@ def _attempt(
     """State after one step and its error estimate, or None if Newton's method failed."""
     top, tableau = solver.topology, solver.tableau
     times = np.array([start, start + step])
-    number, width = top.numbering
-    u, v, a = (np.empty((2, len(tableau.nodes), top.n_dofs)) for _ in range(3))
-    held = np.asarray(drive.values(top.held, grid.stage_times(times, tableau.nodes)))
+    u, v, a = (np.zeros((2, len(tableau.nodes), top.n_dofs)) for _ in range(3))
+    u[0, 0], v[0, 0] = state
+    held = drive.values(top.held, grid.stage_times(times, tableau.nodes))
+    system, counts = system_of(top, values), np.zeros(3, dtype=np.int64)
     status, _, _ = march(
-        times, held, *state, top.network(values), values.mass.ravel(), values.damping.ravel(),
-        number,
-        top.free_dofs, top.held, top.scale, tableau.stages, tableau.nodes, width, solver.tolerance,
-        u, v, a, np.zeros(3, dtype=np.int64),
-    )  # fmt: skip
+        times, held, system, tableau.stages, tableau.nodes, solver.tolerance, u, v, a, counts
+    )
     if status != CONVERGED:
         return None, np.inf
     difference = step * (tableau.error @ v[0]) * top.scale

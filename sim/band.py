@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import scipy.linalg.cython_lapack  # noqa: F401  (its function addresses are looked up below)
@@ -15,17 +14,18 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from threadpoolctl import threadpool_limits
 
-from sim.arrays import Ints
+from sim.arrays import Floats, Ints
 from sim.kernels import compiled
 
 threadpool_limits(1, user_api="blas")  # threads make factorisations of this size 8-30 times slower
 
-_POINTER = types.CPointer(types.float64)
-_INTEGER = types.CPointer(types.int32)
-_CHARACTER = types.CPointer(types.uint8)
+_POINTER, _INTEGER, _CHARACTER = (
+    types.CPointer(kind)  # type: ignore[no-untyped-call]
+    for kind in (types.float64, types.int32, types.uint8)
+)
 
 
-def _routine(name: str, *arguments: Any) -> Callable[..., None]:
+def _routine(name: str, *arguments: types.Type) -> Callable[..., None]:
     """A LAPACK routine by symbol, so that compiled callers can be cached across processes."""
     symbol = f"sim_band_{name}"
     binding.add_symbol(symbol, get_cython_function_address("scipy.linalg.cython_lapack", name))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from sim.arrays import Floats
-from sim.dynamics import Drive, Solver
+from sim.dynamics import Drive, Solver, solve_case
 from sim.errors import SimulationError
 from sim.model import Values
 
@@ -59,7 +59,7 @@ def run_batch(cases: Iterable[Case], measure: Measure[R], threads: int = 1) -> I
 def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
     shape = (-1, case.solver.topology.n_units, 3)
     try:
-        displacement, velocity, _ = case.solver.forward(case.values, case.drive)
+        displacement, velocity, _ = solve_case(case.solver, case.values, case.drive)
     except SimulationError as error:
         return Outcome(None, str(error))
     return Outcome(measure(case, displacement.reshape(shape), velocity.reshape(shape)))

@@ -43,6 +43,7 @@ class DesignSpace:
 
     @property
     def n_variables(self) -> int:
+        """Number of design variables."""
         return self.basis.shape[1]
 
     @cached_property

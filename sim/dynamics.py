@@ -21,7 +21,6 @@ from jax import Array
 from jax.custom_derivatives import SymbolicZero
 
 from sim.arrays import Floats, Ints
-from sim.kernels import Sensitivity
 from sim.loads import Motion, held_values
 from sim.model import Parameters, Topology, Values
 
@@ -47,9 +46,18 @@ class Drive(NamedTuple):
     units: Ints
     motion: Motion
 
-    def values(self, held: Ints, times: Floats) -> Array:
+    def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
-        return held_values(held, self.units, self.motion, times)
+        return np.asarray(held_values(held, self.units, self.motion, times))
+
+    def rates(self, held: Ints, times: Floats) -> Floats:
+        """Their rates of change, per s."""
+        return np.asarray(_held_rates(held, self.units, self.motion, times))
+
+
+def _held_rates(held: Ints, units: Ints, motion: Motion, times: Floats) -> Array:
+    at = jnp.asarray(times)
+    return jax.jvp(lambda t: held_values(held, units, motion, t), (at,), (jnp.ones_like(at),))[1]
 
 
 class Solver(Protocol):
@@ -58,6 +66,11 @@ class Solver(Protocol):
     @property
     def topology(self) -> Topology:
         """The structure."""
+        ...
+
+    @property
+    def asked(self) -> Floats:
+        """Times (n_asked,) of the output, s."""
         ...
 
     @property
@@ -72,6 +85,8 @@ class Solver(Protocol):
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Any]:
         """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
 
+        The held dofs' own entries are of no account: they follow from the drive.
+
         Raises:
             SimulationError: a step failed.
         """
@@ -82,6 +97,19 @@ class Solver(Protocol):
     ) -> tuple[Values, Floats, Floats]:
         """Loss derivatives by the parameters, and by the drive at the times also returned."""
         ...
+
+
+def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Floats, Any]:
+    """One case: displacement and velocity (n_asked, n_dofs), and the solver's record.
+
+    Raises:
+        SimulationError: a step failed.
+    """
+    displacement, velocity, record = solver.forward(values, drive)
+    held = solver.topology.held
+    displacement[:, held] = drive.values(held, solver.asked)
+    velocity[:, held] = drive.rates(held, solver.asked)
+    return displacement, velocity, record
 
 
 @jax.tree_util.register_static
@@ -110,7 +138,7 @@ def _forward(
     solver: Solver, parameters: Parameters[Any], drives: tuple[Drive, ...]
 ) -> tuple[Response, _Records]:
     values = Values(*(np.asarray(part) for part in parameters))
-    results = _spread(lambda drive: solver.forward(values, drive), drives, solver.threads)
+    results = _spread(lambda drive: solve_case(solver, values, drive), drives, solver.threads)
     shape = (len(drives), -1, solver.topology.n_units, 3)
     response = Response(
         jnp.asarray(np.stack([u for u, _, _ in results]).reshape(shape)),
@@ -137,12 +165,15 @@ def _backward_rule(
 ) -> tuple[Parameters[Array], Any]:
     records, driven = residual
     n_dofs = solver.topology.n_dofs
-    bar_u, bar_v = (_dense(cotangent).reshape(len(records.drives), -1, n_dofs) for cotangent in bar)
+    held, cases = solver.topology.held, range(len(records.drives))
+    bar_u, bar_v = (_dense(part).reshape(len(cases), -1, n_dofs).copy() for part in bar)
+    held_u, held_v = bar_u[..., held], bar_v[..., held]
+    bar_u[..., held] = bar_v[..., held] = 0.0
     results = _spread(
         lambda case: solver.backward(
             records.values, records.records[case], bar_u[case], bar_v[case]
         ),
-        range(len(records.drives)),
+        cases,
         solver.threads,
     )
     total = Parameters(
@@ -151,9 +182,12 @@ def _backward_rule(
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
     return total, tuple(
-        _drive_cotangent(solver.topology.held, drive, times, bar_drive)
-        for drive, (_, times, bar_drive) in zip(records.drives, results, strict=True)
-    )
+        _drive_cotangent(
+            held, records.drives[case], (results[case][1], solver.asked),
+            (results[case][2], held_u[case], held_v[case]),
+        )
+        for case in cases
+    )  # fmt: skip
 
 
 simulate.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
@@ -172,12 +206,29 @@ def _zero(leaf: Any) -> Any:
     )
 
 
-def _drive_cotangent(held: Ints, drive: Drive, times: Floats, bar: Floats) -> Drive:
-    """Pulls derivatives by the held values back to the drive's own numbers."""
-    _, pull_back = jax.vjp(
-        lambda motion: held_values(held, np.asarray(drive.units), motion, times), drive.motion
-    )
-    return Drive(_zero(drive.units), pull_back(jnp.asarray(bar))[0])
+def _drive_cotangent(
+    held: Ints, drive: Drive, times: tuple[Floats, Floats], bars: tuple[Floats, Floats, Floats]
+) -> Drive:
+    """Pulls derivatives back to the drive's own numbers.
+
+    Args:
+        held: ids of the held dofs.
+        drive: the case's drive.
+        times: those of the solver's stages and of the output.
+        bars: derivatives by the held values at both, and by their rates at the output.
+    """
+    within, asked = times
+    units = np.asarray(drive.units)
+
+    def prescribed(motion: Motion) -> tuple[Array, Array, Array]:
+        return (
+            held_values(held, units, motion, within),
+            held_values(held, units, motion, asked),
+            _held_rates(held, units, motion, asked),
+        )
+
+    _, pull_back = jax.vjp(prescribed, drive.motion)
+    return Drive(_zero(drive.units), pull_back(tuple(jnp.asarray(bar) for bar in bars))[0])
 
 
 def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:
@@ -186,19 +237,3 @@ def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]
         return [work(item) for item in items]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, items))
-
-
-def empty_sensitivity(values: Values) -> Sensitivity:
-    """Zeros to add parameter derivatives to."""
-    return Sensitivity(
-        arm=np.zeros(values.arm.shape),
-        vector=np.zeros(values.vector.shape),
-        void=np.zeros(values.void.shape),
-        law=np.zeros(values.law.shape),
-        contact=np.zeros(values.contact.shape),
-    )
-
-
-def as_parameters(sensitivity: Sensitivity, mass: Floats, damping: Floats) -> Values:
-    """Gathers the derivatives by all parameters."""
-    return Values(*sensitivity, mass=mass.reshape(-1, 3), damping=damping.reshape(-1, 3))

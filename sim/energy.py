@@ -40,8 +40,10 @@ def ligament_energy(
     """Strain energy of one ligament in large rotation, N mm.
 
     Args:
-        motion_a, motion_b: (3,) displacement (mm) and rotation (rad) of the two units.
-        arm_a, arm_b: (2,) reference vectors from the units' centroids to the ligament's ends, mm.
+        motion_a: (3,) displacement (mm) and rotation (rad) of the first unit.
+        motion_b: the same of the second.
+        arm_a: (2,) reference vector from the first unit's centroid to the ligament's end, mm.
+        arm_b: the same of the second.
         vector: (2,) reference vector of the ligament, mm.
         law: stiffnesses.
 

@@ -203,96 +203,66 @@ def _second(
 
 
 @compiled
+def _ligament_block(k: int, motion: Floats, turn: Floats, net: Network, block: Floats) -> None:
+    """Fills the lower half of the Hessian (6, 6) of ligament ``k`` in the dofs of its two units."""
+    a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
+    pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
+    bend = motion[b + 2] - motion[a + 2]
+    gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
+    hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+    torsion, bending = 0.25 * net.law[k, 1] * rest * rest, net.law[k, 2]
+    # dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx)
+    hax, hay = hxx * pay - hxy * pax, hxy * pay - hyy * pax
+    hbx, hby = -hxx * pby + hxy * pbx, -hxy * pby + hyy * pbx
+    across_a, across_b = mx * pay - my * pax, my * pbx - mx * pby
+    block[0, 0] = block[3, 3] = hxx
+    block[1, 0] = block[4, 3] = hxy
+    block[1, 1] = block[4, 4] = hyy
+    block[3, 0], block[3, 1], block[4, 0], block[4, 1] = -hxx, -hxy, -hxy, -hyy
+    block[2, 0], block[2, 1] = -hax - mx, -hay - my
+    block[3, 2], block[4, 2] = hax + mx, hay + my
+    block[5, 0], block[5, 1] = -hbx - mx, -hby - my
+    block[5, 3], block[5, 4] = hbx + mx, hby + my
+    stiff = torsion + bending
+    block[2, 2] = pay * hax - pax * hay + 2.0 * across_a + stiff + gx * pax + gy * pay
+    block[5, 2] = pay * hbx - pax * hby + across_a + across_b + torsion - bending
+    block[5, 5] = pbx * hby - pby * hbx + 2.0 * across_b + stiff - gx * pbx - gy * pby
+
+
+@compiled
+def _add(band: Floats, i: int, j: int, value: float) -> None:
+    """Adds to the entry (i, j) of a lower band, unless either dof is held."""
+    if i < 0 or j < 0:
+        return
+    if i >= j:
+        band[j, i - j] += value
+    else:
+        band[i, j - i] += value
+
+
+@compiled
 def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> None:
-    """Adds the energy's Hessian among the free dofs to a lower band ``band[column, row - column]``.
+    """Adds the energy's Hessian among the free dofs to a band ``band[column, row - column]``.
 
     ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
     """
     _trigonometry(motion, turn)
-    block = np.empty((6, 6))
-    place = np.empty(6, dtype=np.int64)
+    block, place = np.empty((6, 6)), np.empty(6, dtype=np.int64)
     for k in range(net.unit.shape[0]):
-        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
-        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
-        bend = motion[b + 2] - motion[a + 2]
-        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
-        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
-        torsion = 0.25 * net.law[k, 1] * rest * rest
-        bending = net.law[k, 2]
-        # dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx)
-        hax, hay = hxx * pay - hxy * pax, hxy * pay - hyy * pax
-        hbx, hby = -hxx * pby + hxy * pbx, -hxy * pby + hyy * pbx
-        block[0, 0] = hxx
-        block[1, 0] = hxy
-        block[1, 1] = hyy
-        block[2, 0] = -hax - mx
-        block[2, 1] = -hay - my
-        block[2, 2] = (
-            pay * hax
-            - pax * hay
-            + 2.0 * (mx * pay - my * pax)
-            + torsion
-            + bending
-            + gx * pax
-            + gy * pay
-        )
-        block[3, 0] = -hxx
-        block[3, 1] = -hxy
-        block[3, 2] = hax + mx
-        block[3, 3] = hxx
-        block[4, 0] = -hxy
-        block[4, 1] = -hyy
-        block[4, 2] = hay + my
-        block[4, 3] = hxy
-        block[4, 4] = hyy
-        block[5, 0] = -hbx - mx
-        block[5, 1] = -hby - my
-        block[5, 2] = (
-            pay * hbx
-            - pax * hby
-            + (mx * pay - my * pax)
-            + (-mx * pby + my * pbx)
-            + torsion
-            - bending
-        )
-        block[5, 3] = hbx + mx
-        block[5, 4] = hby + my
-        block[5, 5] = (
-            -pby * hbx
-            + pbx * hby
-            + 2.0 * (-mx * pby + my * pbx)
-            + torsion
-            + bending
-            - gx * pbx
-            - gy * pby
-        )
+        _ligament_block(k, motion, turn, net, block)
         for m in range(3):
-            place[m] = free[a + m]
-            place[3 + m] = free[b + m]
+            place[m] = free[3 * net.unit[k, 0] + m]
+            place[3 + m] = free[3 * net.unit[k, 1] + m]
         for row in range(6):
-            i = place[row]
-            if i < 0:
-                continue
             for column in range(row + 1):
-                j = place[column]
-                if j < 0:
-                    continue
-                if i >= j:
-                    band[j, i - j] += block[row, column]
-                else:
-                    band[i, j - i] += block[row, column]
+                _add(band, place[row], place[column], block[row, column])
     for k in net.touching:
-        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
         curvature = _contact_curvature(motion, net, k)
-        if curvature == 0.0:
-            continue
-        i, j = free[a], free[b]
-        if i >= 0:
-            band[i, 0] += curvature
-        if j >= 0:
-            band[j, 0] += curvature
-        if i >= 0 and j >= 0:
-            band[min(i, j), abs(i - j)] -= curvature
+        if curvature > 0.0:
+            i, j = free[3 * net.unit[k, 0] + 2], free[3 * net.unit[k, 1] + 2]
+            _add(band, i, i, curvature)
+            _add(band, j, j, curvature)
+            _add(band, i, j, -curvature)
 
 
 @compiled

@@ -38,18 +38,22 @@ class Lattice:
 
     @property
     def n_units(self) -> int:
+        """Number of units."""
         return len(self.site)
 
     @property
     def n_vertices(self) -> int:
+        """Number of vertices of all units."""
         return len(self.vertices)
 
     @property
     def n_ligaments(self) -> int:
+        """Number of ligaments."""
         return len(self.ligaments)
 
     @cached_property
     def n_groups(self) -> int:
+        """Number of design groups."""
         return int(self.group.max()) + 1
 
     @cached_property
@@ -101,7 +105,7 @@ def quads(
     the others by ``+bias_angle``, and scaled so that the ligaments stay horizontal and vertical.
     """
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
-    site: Floats = np.stack([i, j], axis=1) * spacing
+    site = np.stack([i, j], axis=1) * np.float64(spacing)
     turn = np.where((i + j) % 2 == 0, -1.0, 1.0) * np.tan(bias_angle)
     half = (spacing - ligament_length) / 2
     right = half * np.stack([np.ones_like(turn), turn], axis=1)

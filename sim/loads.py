@@ -8,13 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.arrays import Floats, Ints, Numbers
+from sim.arrays import Ints, Numbers
 
 
 class Motion(Protocol):
     """Motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
 
-    def __call__(self, times: Numbers) -> Array: ...
+    def __call__(self, times: Numbers) -> Array:
+        """Motion at the given times, s."""
+        ...
 
 
 def _along(direction: float | Array, displacement: Array) -> Array:
@@ -39,6 +41,7 @@ class Harmonic(NamedTuple):
     delay: float = 0.0
 
     def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
         shifted = times - self.delay
         wave = self.amplitude * jnp.sin(2 * jnp.pi * self.frequency * shifted)
         if self.rise is not None:
@@ -54,6 +57,7 @@ class TanhRamp(NamedTuple):
     direction: float | Array = 0.0
 
     def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
         phase = 2 * jnp.asarray(times) / self.duration - 1
         return _along(self.direction, self.amplitude * (1 + jnp.tanh(6 * phase)) / 2)
 
@@ -66,6 +70,7 @@ class LinearRamp(NamedTuple):
     direction: float | Array = 0.0
 
     def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
         return _along(self.direction, self.amplitude * jnp.asarray(times) / self.duration)
 
 
@@ -81,6 +86,7 @@ class TimeSeries(NamedTuple):
     motion: Numbers
 
     def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) or (n_times, n_units, 3) at the given times, s."""
         flat = jnp.reshape(self.motion, (len(self.times), -1))
         columns = [jnp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
         return jnp.stack(columns, axis=-1).reshape(len(times), *jnp.shape(self.motion)[1:])
@@ -92,7 +98,7 @@ def held_dofs(clamped: Ints, driven: Ints) -> Ints:
     return (3 * units[:, None] + np.arange(3)).ravel()
 
 
-def held_values(held: Ints, driven: Ints, motion: Motion, times: Floats) -> Array:
+def held_values(held: Ints, driven: Ints, motion: Motion, times: Numbers) -> Array:
     """Values (n_times, n_held) of the held dofs when ``driven`` follow ``motion``; the others rest.
 
     Raises:

@@ -135,10 +135,12 @@ class Topology:
 
     @property
     def n_dofs(self) -> int:
+        """Number of all dofs."""
         return 3 * self.n_units
 
     @property
     def n_free(self) -> int:
+        """Number of free dofs."""
         return self.n_dofs - len(self.held)
 
     def network(self, values: Values, touching: Ints | None = None) -> Network:

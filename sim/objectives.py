@@ -30,6 +30,7 @@ class DisplacementMimicking(NamedTuple):
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        del parameters
         motion = displacement[:, :, self.units]
         if self.target is not None:
             motion = motion - self.target

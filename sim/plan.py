@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import scipy.sparse.linalg as spla
 
 from sim import grid
 from sim.adaptive import adapted
 from sim.arrays import Floats, Ints
-from sim.band import factorise, solve
 from sim.dynamics import Solver
-from sim.explicit import ExplicitSolver, highest_frequency
+from sim.explicit import ExplicitSolver
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
-from sim.kernels import Network, compiled, tangent
 from sim.model import Values, parameters
+from sim.modes import highest_frequency, lowest_frequency
 from sim.scene import Accuracy, Scene
 from sim.splitting import BLANES_MOAN
 from sim.statics import StaticSolver
@@ -187,7 +185,7 @@ def _choose(scene: Scene, values: Values, decisions: list[str]) -> Literal["impl
     if scene.frequency is None:
         decisions.append("implicit: the drive has no frequency of its own")
         return "implicit"
-    lowest = lowest_frequency(scene, values) / (2 * np.pi)
+    lowest = lowest_frequency(scene.topology, values) / (2 * np.pi)
     slow = scene.frequency < SLOW * lowest
     decisions.append(
         f"{'implicit' if slow else 'explicit'}: drive at {scene.frequency:.4g} Hz, lowest"
@@ -229,31 +227,3 @@ def _explicit(
     highest = CONTACT_STIFFENING * highest_frequency(scene.topology, values)
     largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / highest
     return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)
-
-
-@compiled
-def _stiffness(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> None:
-    band[:] = 0.0
-    tangent(motion, net, turn, free, band)
-
-
-def lowest_frequency(scene: Scene, values: Values) -> float:
-    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
-    top = scene.topology
-    number, width = top.numbering
-    band = np.zeros((top.n_free, width + 1))
-    rest = np.zeros(top.n_dofs)
-    _stiffness(rest, top.network(values), np.empty((top.n_units, 4)), number, band)
-    if not factorise(band):
-        return 0.0
-    root = np.sqrt(values.mass.ravel()[top.free_dofs])
-
-    def product(x: Floats) -> Floats:
-        right = np.ravel(x) * root
-        solve(band, right)
-        return right * root
-
-    operator = spla.LinearOperator((top.n_free, top.n_free), matvec=product, dtype=float)
-    start = np.random.default_rng(0).normal(size=top.n_free)
-    largest = spla.eigsh(operator, k=1, which="LM", v0=start, tol=1e-3, return_eigenvectors=False)
-    return float(1 / np.sqrt(largest[0]))

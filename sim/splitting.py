@@ -29,7 +29,7 @@ LEAPFROG = Splitting(np.array([0.5, 0.5]), np.array([1.0]), 2, 2.0)
 
 
 def blanes_moan() -> Splitting:
-    """Order 4, six kicks, small error constants (Blanes & Moan, J. Comput. Appl. Math. 142, 2002)."""
+    """Order 4, six kicks, small errors (Blanes & Moan, J. Comput. Appl. Math. 142, 2002)."""
     a1, a2, a3 = 0.0792036964311957, 0.353172906049774, -0.0420650803577195
     b1, b2 = 0.209515106613362, -0.143851773179818
     drifts = [a1, a2, a3, 1 - 2 * (a1 + a2 + a3), a3, a2, a1]

@@ -42,14 +42,15 @@ def _newton(problem: Problem, place: Place, reach: float) -> Floats | None:
 
 
 def feasible_start(problem: Problem, x: Floats, reach: float) -> Place:
-    """As ``project``, allowing many rounds.
+    """As ``project``, allowing many rounds and ever longer steps.
 
     Raises:
         InfeasibleStartError: naming the worst constraint.
     """
-    place = project(problem, x, reach, rounds=50)
-    if place is None:
-        start = problem.place(x)
-        worst = int(np.argmin(start.values))
-        raise InfeasibleStartError(worst, -float(start.values[worst]))
-    return place
+    for factor in (1, 4, 16):
+        place = project(problem, x, factor * reach, rounds=50)
+        if place is not None:
+            return place
+    start = problem.place(x)
+    worst = int(np.argmin(start.values))
+    raise InfeasibleStartError(worst, -float(start.values[worst]))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
 from sim.arrays import Floats
 
-EASE = float(os.environ.get("EASE", "1"))
 DAMPING = 0.2
 """Smallest curvature along a step, relative to the model's, that an update may leave."""
+
+EASE = 0.3
+"""Curvature of directions not yet seen, relative to the first one measured.
+
+The losses at hand are sums of squares that few directions bend; the trust radius bounds the others.
+"""
 
 
 class QuasiNewton:

@@ -7,7 +7,6 @@ set before it is simulated, and the loss alone decides whether it is accepted (W
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,12 +18,11 @@ from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
 
-KEEP = float(os.environ.get("KEEP", "0"))
-KDEC = float(os.environ.get("KDEC", "0.9"))
-RESET = os.environ.get("RESET", "0") == "1"
-NORESTART = os.environ.get("NORESTART", "1") == "1"
 ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
 """Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
+
+CALM = 0.9
+"""Factor of the caution from one evaluation to the next."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,7 @@ class SqpOptions:
         target: loss that is good enough.
         radius: largest change of a variable in the first step.
         radius_max: the same in any step.
+        caution: share of every margin that the first step leaves; later ones leave less and less.
         radius_min: radius at which the descent has stalled.
         residual: KKT residual at which a design counts as optimal.
         patience: the descent has stalled if this many simulations in a row ...
@@ -47,8 +46,9 @@ class SqpOptions:
 
     evaluations: int = 120
     target: float = -np.inf
-    radius: float = 0.5
-    radius_max: float = 3.0
+    radius: float = 0.25
+    radius_max: float = 1.0
+    caution: float = 0.9
     radius_min: float = 1e-4
     residual: float = 1e-5
     patience: int = 15
@@ -91,10 +91,7 @@ def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
             break
         kicked = _kick(problem, options, random)
         if kicked is not None:
-            if RESET:
-                descent = Descent(problem, kicked, options)
-            else:
-                descent.go_on_from(kicked)
+            descent.go_on_from(kicked)
             reason = descent.run()
     return problem.result(problem.finished or reason)
 
@@ -102,7 +99,7 @@ def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
 def _kick(problem: Problem, options: SqpOptions, random: np.random.Generator) -> Point | None:
     assert problem.best is not None
     shift = random.uniform(-options.kick, options.kick, problem.best.x.shape)
-    place = project(problem, problem.best.x + shift, options.radius)
+    place = project(problem, problem.best.x + shift, options.radius_max)
     if place is None:
         return None
     outcome = problem.simulate(place)
@@ -128,7 +125,7 @@ class Descent:
             if self.residual <= self.options.residual:
                 return "stationary"
             if self._stalled():
-                if NORESTART or self.point.loss > restarted_at * (1 - self.options.progress):
+                if self.point.loss > restarted_at * (1 - self.options.progress):
                     return "no further progress"
                 restarted_at = self.point.loss
                 self._forget()
@@ -177,12 +174,13 @@ class Descent:
     def _propose(self) -> Trial | None:
         """Best step of the model within the radius, made feasible; None if there is none."""
         point, radius = self.point, self.radius
-        rows = reachable(point.values, point.jacobian, radius)
+        spendable = (1 - self._kept()) * point.values
+        rows = reachable(spendable, point.jacobian, radius)
         found = dense_step(
             self.model.matrix,
             point.gradient,
             point.jacobian[rows],
-            -point.values[rows] * (1 - KEEP * KDEC ** len(self.problem.evaluations)),
+            -spendable[rows],
             np.maximum(self.problem.lower - point.x, -radius),
             np.minimum(self.problem.upper - point.x, radius),
         )
@@ -194,6 +192,13 @@ class Descent:
         # The model of the Lagrangian already counts what the projection will cost.
         predicted = self.model.reduction(point.gradient, found.step)
         return Trial(place, predicted, rows, found.multipliers) if predicted > 0 else None
+
+    def _kept(self) -> float:
+        """Share of every margin that the next step must leave.
+
+        Constraints that become active early steer the descent into poor optima.
+        """
+        return self.options.caution * CALM ** len(self.problem.evaluations)
 
     def _judge(self, trial: Trial, outcome: Point) -> bool:
         """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""

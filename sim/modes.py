@@ -1,0 +1,63 @@
+"""Highest and lowest eigenfrequency of a structure about a state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.sparse.linalg as spla
+
+from sim.arrays import Floats
+from sim.band import factorise, solve
+from sim.kernels import hessian_product, tangent
+from sim.model import Topology, Values
+
+
+def highest_frequency(topology: Topology, values: Values, motion: Floats | None = None) -> float:
+    """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration."""
+    network = topology.network(values)
+    state = np.zeros(topology.n_dofs) if motion is None else motion.ravel()
+    turn = np.empty((topology.n_units, 4))
+    free, root = topology.free_dofs, _root_mass(topology, values)
+
+    def product(x: Floats) -> Floats:
+        full, out = np.zeros(topology.n_dofs), np.empty(topology.n_dofs)
+        full[free] = np.ravel(x) / root
+        hessian_product(state, network, turn, full, out)
+        return np.asarray(out[free] / root)
+
+    return float(np.sqrt(abs(_largest(product, topology.n_free, 1e-2))))
+
+
+def lowest_frequency(topology: Topology, values: Values) -> float:
+    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
+    number, width = topology.numbering
+    band = np.zeros((topology.n_free, width + 1))
+    turn = np.empty((topology.n_units, 4))
+    tangent(np.zeros(topology.n_dofs), topology.network(values), turn, number, band)
+    if not factorise(band):
+        return 0.0
+    root = _root_mass(topology, values)
+
+    def product(x: Floats) -> Floats:
+        right = np.ravel(x) * root
+        solve(band, right)
+        return np.asarray(right * root)
+
+    return float(1 / np.sqrt(_largest(product, topology.n_free, 1e-3)))
+
+
+def _root_mass(topology: Topology, values: Values) -> Floats:
+    return np.asarray(np.sqrt(values.mass.ravel()[topology.free_dofs]))
+
+
+def _largest(product: Callable[[Floats], Floats], size: int, tolerance: float) -> float:
+    """Eigenvalue of largest magnitude of a symmetric operator."""
+    if size <= 2:
+        return float(np.linalg.norm(np.stack([product(e) for e in np.eye(size)]), 2))
+    operator = spla.LinearOperator((size, size), matvec=product, dtype=float)
+    start = np.random.default_rng(0).normal(size=size)
+    found = spla.eigsh(
+        operator, k=1, which="LM", v0=start, tol=tolerance, return_eigenvectors=False
+    )
+    return float(found[0])

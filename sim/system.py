@@ -1,0 +1,116 @@
+"""A structure with its held dofs as compiled solvers take it, and their scratch memory."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.arrays import Floats, Ints
+from sim.kernels import Network, Sensitivity, compiled
+from sim.model import Topology, Values
+
+
+class System(NamedTuple):
+    """One structure, its inertia and the numbering of its dofs.
+
+    Attributes:
+        net: ligaments and contacts.
+        mass, damping: (n_dofs,) diagonal.
+        free: (n_dofs,) number of each dof among the free ones, negative where held.
+        dofs: (n_free,) ids of the free dofs in the tangent's order.
+        held: (n_held,) ids of the prescribed dofs.
+        scale: (n_dofs,) weights that make rotations comparable with displacements, mm.
+        width: half bandwidth of the tangent.
+    """
+
+    net: Network
+    mass: Floats
+    damping: Floats
+    free: Ints
+    dofs: Ints
+    held: Ints
+    scale: Floats
+    width: int
+
+
+class Workspace(NamedTuple):
+    """Scratch arrays of a solve, overwritten at will.
+
+    Attributes:
+        turn: (n_units, 4) of the kernels.
+        force, step, product: (n_dofs,).
+        right: (n_free,).
+        band: (n_free, width + 1) lower band.
+    """
+
+    turn: Floats
+    force: Floats
+    step: Floats
+    product: Floats
+    right: Floats
+    band: Floats
+
+
+class Bars(NamedTuple):
+    """Loss derivatives that a reverse sweep adds to.
+
+    Attributes:
+        sensitivity: by the network's parameters.
+        mass, damping: (n_dofs,).
+        drive: by the held values, shaped as the sweep takes them.
+    """
+
+    sensitivity: Sensitivity
+    mass: Floats
+    damping: Floats
+    drive: Floats
+
+
+@compiled
+def workspace(system: System) -> Workspace:
+    """Scratch arrays that fit a system."""
+    n_dofs, n_free = len(system.mass), len(system.dofs)
+    return Workspace(
+        np.empty((n_dofs // 3, 4)),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_free),
+        np.empty((n_free, system.width + 1)),
+    )
+
+
+def system_of(topology: Topology, values: Values, touching: Ints | None = None) -> System:
+    """The system of concrete parameters, with contact in ``touching`` ligaments (default all)."""
+    free, width = topology.numbering
+    return System(
+        net=topology.network(values, touching),
+        mass=np.ascontiguousarray(values.mass, dtype=float).ravel(),
+        damping=np.ascontiguousarray(values.damping, dtype=float).ravel(),
+        free=free,
+        dofs=topology.free_dofs,
+        held=topology.held,
+        scale=topology.scale,
+        width=width,
+    )
+
+
+def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
+    """Zeros to add derivatives to."""
+    net = system.net
+    sensitivity = Sensitivity(
+        arm=np.zeros_like(net.arm),
+        vector=np.zeros_like(net.vector),
+        void=np.zeros_like(net.void),
+        law=np.zeros_like(net.law),
+        contact=np.zeros(len(net.contact)),
+    )
+    zero = np.zeros_like(system.mass)
+    return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))
+
+
+def as_values(bars: Bars) -> Values:
+    """The derivatives by all parameters, shaped as they are."""
+    mass, damping = bars.mass.reshape(-1, 3), bars.damping.reshape(-1, 3)
+    return Values(*bars.sensitivity, mass=mass, damping=damping)
