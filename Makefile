@@ -4,7 +4,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/problem.yaml,%,$(wildcard experiments/*/problem.yaml)))
-SOURCES := $(wildcard sim pipeline reports tests docs)
+SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
 .PHONY: help setup test clients lint format bench lock clean $(STUDIES)
@@ -61,7 +61,7 @@ format: setup
 	$(BIN)/snakefmt $(WORKFLOW)
 
 bench: setup
-	$(BIN)/python -m pipeline.bench
+	$(BIN)/python -m benchmarks
 
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }

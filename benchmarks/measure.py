@@ -1,0 +1,201 @@
+"""Measuring: every candidate in a process of its own, all on one core, one run at a time."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import resource
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from benchmarks.frame import Benchmark, Candidate, Floats, Outcome, Run, Sample, errors
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+Tell = Callable[[str], None]
+
+
+class Timed(NamedTuple):
+    """One run: seconds of processor and of the clock, and what it found."""
+
+    cpu_s: float
+    wall_s: float
+    sample: Sample
+
+
+def pin(core: int | None) -> int:
+    """Binds this process and its children to one core, and returns it.
+
+    Raises:
+        ValueError: the machine lends this process no such core.
+    """
+    lent = os.sched_getaffinity(0)
+    chosen = max(lent) if core is None else core
+    if chosen not in lent:
+        raise ValueError(f"no core {chosen}: this process may use {sorted(lent)}")
+    os.sched_setaffinity(0, {chosen})
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    return chosen
+
+
+class CandidateError(Exception):
+    """A candidate raised; the message says what."""
+
+
+class Worker:
+    """A process that prepares one candidate and runs it on demand."""
+
+    def __init__(self, prepare: Callable[[], Run]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._here, there = context.Pipe()
+        self._process = context.Process(target=_serve, args=(there, prepare), daemon=True)
+        self._process.start()
+        there.close()
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._process.is_alive():
+            self._process.terminate()
+        self._process.join()
+
+    def prepare(self) -> float:
+        """Builds and compiles; returns the seconds that took."""
+        return float(self._ask("prepare"))
+
+    def run(self) -> Timed:
+        """Runs once."""
+        return Timed(*self._ask("run"))
+
+    def peak_mib(self) -> float:
+        """Peak resident memory so far, MiB."""
+        return float(self._ask("memory"))
+
+    def _ask(self, wish: str) -> Any:  # noqa: ANN401  (goes by the wish)
+        try:
+            self._here.send(wish)
+            good, answer = self._here.recv()
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            self._process.join()
+            raise CandidateError(f"its process ended with code {self._process.exitcode}") from None
+        if not good:
+            raise CandidateError(answer)
+        return answer
+
+
+def _serve(pipe: Connection, prepare: Callable[[], Run]) -> None:
+    """The worker's end: answers wishes until the other end closes."""
+    run: Run | None = None
+    while True:
+        try:
+            wish = pipe.recv()
+        except EOFError:
+            return
+        try:
+            if wish == "memory":
+                answer: Any = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            elif run is None:
+                start = time.perf_counter()
+                run = prepare()
+                answer = time.perf_counter() - start
+            else:
+                answer = _timed(run)
+        except Exception as error:  # noqa: BLE001  (whatever a candidate raises is its result)
+            pipe.send((False, "".join(traceback.format_exception_only(error)).strip()))
+        else:
+            pipe.send((True, answer))
+
+
+def _timed(run: Run) -> Timed:
+    cpu, wall = time.process_time(), time.perf_counter()
+    sample = run()
+    return Timed(time.process_time() - cpu, time.perf_counter() - wall, sample)
+
+
+def measure(
+    benchmark: Benchmark, chosen: Sequence[Candidate], repeats: int, tell: Tell
+) -> list[Outcome]:
+    """Runs the chosen candidates in turn, A B C A B C, and compares them with the reference.
+
+    Args:
+        benchmark: the benchmark.
+        chosen: its candidates that are to be measured now.
+        repeats: rounds.
+        tell: told of the progress, line by line.
+
+    Raises:
+        CandidateError: the reference could not be computed.
+    """
+    tell(f"{benchmark.name}: reference")
+    with Worker(benchmark.reference) as worker:
+        worker.prepare()
+        reference = worker.run().sample.values
+    with ExitStack() as stack:
+        at_work = [_AtWork(one, stack.enter_context(Worker(one.prepare))) for one in chosen]
+        for one in at_work:
+            tell(f"{benchmark.name}: compiling {one.candidate.name}")
+            one.prepare()
+        for round_ in range(repeats):
+            for one in at_work:
+                if one.wants(round_):
+                    one.run()
+                    tell(f"{benchmark.name}: round {round_ + 1} of {repeats}: {one.line()}")
+        return [one.outcome(reference) for one in at_work]
+
+
+class _AtWork:
+    """A candidate under measurement."""
+
+    def __init__(self, candidate: Candidate, worker: Worker) -> None:
+        self.candidate = candidate
+        self._worker = worker
+        self._compile_s = float("nan")
+        self._runs: list[Timed] = []
+        self._failure = ""
+
+    def prepare(self) -> None:
+        try:
+            self._compile_s = self._worker.prepare()
+        except CandidateError as failed:
+            self._failure = str(failed)
+
+    def wants(self, round_: int) -> bool:
+        most = self.candidate.repeats if self.candidate.timed else 1
+        return not self._failure and (most is None or round_ < most)
+
+    def run(self) -> None:
+        try:
+            self._runs.append(self._worker.run())
+        except CandidateError as failed:
+            self._failure = str(failed)
+
+    def line(self) -> str:
+        result = self._failure or f"{self._runs[-1].cpu_s:.3g} s"
+        return f"{self.candidate.name}: {result}"
+
+    def outcome(self, reference: Mapping[str, Floats]) -> Outcome:
+        name, note, share = self.candidate.name, self.candidate.note, self.candidate.share
+        if self._failure or not self._runs:
+            return Outcome(name, note, failure=self._failure or "was not run")
+        timed = self.candidate.timed
+        sample, runs = self._runs[-1].sample, self._runs if timed else []
+        return Outcome(
+            name=name,
+            note=note,
+            compile_s=self._compile_s if timed else float("nan"),
+            cpu_s=tuple(run.cpu_s / share for run in runs),
+            wall_s=tuple(run.wall_s / share for run in runs),
+            errors=errors(sample.values, reference),
+            work=dict(sample.work),
+            peak_mib=self._worker.peak_mib() if timed else float("nan"),
+        )

@@ -1,0 +1,93 @@
+"""Figure 4's loss and gradient at the final load: an equilibrium, against slow damped dynamics."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from benchmarks import baseline, scenes
+from benchmarks.frame import (
+    Benchmark,
+    Candidate,
+    Run,
+    Sample,
+    Target,
+    error_of,
+    seconds_of,
+    speed_up,
+)
+from sim.dynamics import simulate
+from sim.evaluation import structure
+from sim.statics import StaticSolver
+
+OURS, THEIRS, THEIRS_FORWARD = (
+    "ours",
+    "pseudo-dynamics, diffrax Dopri5",
+    "pseudo-dynamics, loss only",
+)
+
+
+def benchmark() -> Benchmark:
+    """The benchmark."""
+    return Benchmark(
+        name="fig4",
+        title="strain energy of a region and its gradient at the final load, 15 x 15 units",
+        reference=_strict,
+        candidates=(
+            Candidate(OURS, _ours),
+            Candidate(THEIRS, _dynamics_gradient, repeats=1, baseline=True),
+            Candidate(THEIRS_FORWARD, _dynamics_loss, repeats=2, baseline=True),
+        ),
+        targets=(
+            Target("final load", seconds_of(OURS), "s", at_most=0.03, aim=0.01),
+            Target("loss error", error_of(OURS, "loss"), at_most=1e-9),
+            Target("gradient error", error_of(OURS, "gradient"), at_most=1e-7),
+            Target("times faster than pseudo-dynamics", speed_up(OURS, THEIRS), at_least=2000),
+        ),
+    )
+
+
+def _strict() -> Run:
+    """Another way to the same equilibrium: 25 loads, each to a hundredth of the usual residual."""
+    return _equilibrium(np.linspace(0.0, 1.0, 26)[1:], 1e-12)
+
+
+def _ours() -> Run:
+    return _equilibrium(np.ones(1), 1e-10)
+
+
+def _equilibrium(loads: scenes.Floats, relative: float) -> Run:
+    scene = scenes.fig4()
+    solver = StaticSolver(scene.topology, loads, relative=relative)
+    of_design, energy = structure(scene), jax.jit(scenes.final_energy(scene).__call__)
+
+    def loss(design: Array) -> Array:
+        values = of_design(design)
+        return energy(simulate(solver, values, scene.drives).displacement[:, -1:], values)[0]
+
+    evaluate, start = jax.value_and_grad(loss), jnp.zeros(scene.space.n_variables)
+    work = scenes.counted(scene, solver, [0])
+
+    def run() -> Sample:
+        value, gradient = evaluate(start)
+        return Sample({"loss": np.asarray(value), "gradient": np.asarray(gradient)}, work)
+
+    run()
+    return run
+
+
+def _dynamics_gradient() -> Run:
+    return baseline.prepare_gradient(_loss(), scenes.fig4().space.n_variables)
+
+
+def _dynamics_loss() -> Run:
+    return baseline.prepare_loss(_loss(), scenes.fig4().space.n_variables)
+
+
+def _loss() -> baseline.Loss:
+    scene = scenes.fig4_as_dynamics()
+    method = baseline.RungeKutta(rtol=1e-8, atol=1e-8)
+    end = np.array([scene.duration])
+    return baseline.loss(scene, 0, method, end, scenes.final_energy(scene))
