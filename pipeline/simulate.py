@@ -87,7 +87,8 @@ def times_of(asked: Problem, scene: Scene) -> Times:
     wanted = (shown, sample_times(scene), np.linspace(0.0, horizon, asked.horizon.samples))
     nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
     every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
-    return Times(np.asarray(every * 1e-9), *np.split(place, np.cumsum([len(t) for t in wanted])[:-1]))
+    ends = np.cumsum([len(times) for times in wanted])[:-1]
+    return Times(np.asarray(every * 1e-9), *np.split(place, ends))
 
 
 class Measured(NamedTuple):

@@ -1,4 +1,4 @@
-"""Banded Cholesky in compiled code: LAPACK's own routines, and an order with a small bandwidth."""
+"""Banded Cholesky in compiled code, and an order of the dofs with a small bandwidth."""
 
 from __future__ import annotations
 
@@ -15,7 +15,11 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from threadpoolctl import threadpool_limits
 
 from sim.arrays import Floats, Ints
+from sim.cholesky import factorise_narrow
 from sim.kernels import compiled
+
+NARROW = 100
+"""Columns of a band up to which the own factorisation beats LAPACK's."""
 
 threadpool_limits(1, user_api="blas")  # threads make factorisations of this size 8-30 times slower
 
@@ -51,6 +55,8 @@ _dpbtrs = _routine(
 @compiled
 def factorise(band: Floats) -> bool:
     """Cholesky factor in place of a lower band (n, width + 1); False if not positive definite."""
+    if band.shape[1] <= NARROW:
+        return factorise_narrow(band)
     uplo = np.full(1, ord("L"), dtype=np.uint8)
     size = np.array([band.shape[0], band.shape[1] - 1, band.shape[1], 0], dtype=np.int32)
     _dpbtrf(

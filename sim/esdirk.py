@@ -31,7 +31,7 @@ from sim.system import Bars, System, Workspace, workspace
 
 MAX_ITERATIONS = 30
 MAX_FACTORS = 12
-REFACTOR_ABOVE = 0.5
+REFACTOR_ABOVE = 0.3
 KEEP_FROM_BARRIER = 0.9
 
 CONVERGED, STALLED, INDEFINITE = 0, 1, 2

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim import grid
-from sim.arrays import Floats, Ints
+from sim.arrays import Floats
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.kickdrift import Outputs, Steps, run, sweep_back
 from sim.model import Topology, Values
+from sim.modes import highest_frequency
 from sim.splitting import BLANES_MOAN, Splitting
 from sim.system import as_values, empty_bars, system_of
 
@@ -25,20 +26,19 @@ class Record:
     Attributes:
         steps: as taken.
         checkpoints: (n_segments, 2, n_dofs) displacement and velocity.
-        touching: ligaments in which contact was computed.
     """
 
     steps: Steps
     checkpoints: Floats
-    touching: Ints
 
 
 @dataclass(frozen=True)
 class ExplicitSolver:
     """Integrates one case explicitly with equal steps (``dynamics.Solver``).
 
-    A run that leaves the admissible states (a void beyond its barrier, or a blow-up) is repeated
-    with half the step, up to MAX_HALVINGS times.
+    The step is halved until it is stable for the structure, at rest and, after a run, in the state
+    of closest contact; and as long as the run leaves the admissible states (a void beyond its
+    barrier, a blow-up), up to MAX_HALVINGS times.
 
     Attributes:
         topology: the structure.
@@ -46,7 +46,6 @@ class ExplicitSolver:
         n_steps: number of steps.
         asked: (n_asked,) times of the output, ascending, s.
         threads: cases solved side by side.
-        touching: ligaments in which contact is computed, None for all.
         splitting: the method.
     """
 
@@ -55,7 +54,6 @@ class ExplicitSolver:
     n_steps: int
     asked: Floats
     threads: int = 1
-    touching: Ints | None = None
     splitting: Splitting = BLANES_MOAN
 
     def refined(self) -> ExplicitSolver:
@@ -64,28 +62,45 @@ class ExplicitSolver:
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
-        top = self.topology
-        touching = np.arange(len(values.void)) if self.touching is None else self.touching
-        system = system_of(top, values, touching)
+        top, failed = self.topology, -1
+        system = system_of(top, values)
+        needed = self._steps_for(highest_frequency(top, values))
         for halving in range(MAX_HALVINGS + 1):
-            steps = self._steps(values, drive, self.n_steps * 2**halving)
-            checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
+            n_steps = self.n_steps * 2**halving
+            if n_steps < needed:
+                continue
+            steps = self._steps(values, drive, n_steps)
+            checkpoints = np.empty((-(-n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
-            failed = run(steps, self._outputs(steps.n_steps), system, checkpoints, u, v)
-            if failed < 0:
-                return u, v, Record(steps, checkpoints, touching)
+            failed = run(steps, self._outputs(n_steps), system, checkpoints, u, v)
+            if failed < 0 and (needed := self._steps_in_contact(values, u)) <= n_steps:
+                return u, v, Record(steps, checkpoints)
         raise SimulationError(
-            f"the explicit run left the admissible states at t = {failed * steps.h:.6g} s even with"
-            f" {steps.n_steps} steps (a void closed beyond its barrier); try a smaller drive",
+            f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
+            f" with {self.n_steps * 2**MAX_HALVINGS} steps (a void closed beyond its barrier); try"
+            " a smaller drive or a larger smallest edge",
             step=failed,
         )
+
+    def _steps_for(self, frequency: float) -> int:
+        """Steps that are stable at an angular eigenfrequency, rad/s."""
+        return int(np.ceil(self.duration * frequency / self.splitting.stability))
+
+    def _steps_in_contact(self, values: Values, states: Floats) -> int:
+        """Steps that are stable in the one of the states whose contact is closest, 0 if none is."""
+        top = self.topology
+        motion = states.reshape(len(states), -1, 3)
+        closest = top.smallest_void_angle(values.void, motion)
+        if closest.min() >= top.cutoff:
+            return 0
+        return self._steps_for(highest_frequency(top, values, motion[closest.argmin()]))
 
     def backward(
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         top, steps = self.topology, record.steps
-        system = system_of(top, values, record.touching)
+        system = system_of(top, values)
         bars = empty_bars(system, steps.drive.shape)
         bar_decay, bar_gain = np.zeros_like(steps.decay), np.zeros_like(steps.gain)
         outputs = self._outputs(steps.n_steps)

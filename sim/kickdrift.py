@@ -15,10 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.kernels import compiled, gradient, hessian_product, mixed, smallest_void
+from sim.kernels import compiled, gradient, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
-
-WATCH_EVERY = 8
 
 
 class Steps(NamedTuple):
@@ -60,8 +58,13 @@ class Outputs(NamedTuple):
 def _step(
     n: int, u: Floats, v: Floats, steps: Steps, system: System, work: Workspace, kept_u: Floats,
     kept_v: Floats,
-) -> None:  # fmt: skip
-    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps the states just before its kicks."""
+) -> float:  # fmt: skip
+    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps the states just before its kicks.
+
+    Returns:
+        the sum of the energies at the kicks: not finite once a void is beyond its barrier.
+    """
+    total = 0.0
     for m in range(len(steps.gain)):
         for d in system.dofs:
             u[d] += steps.drifts[m] * steps.h * v[d]
@@ -69,11 +72,13 @@ def _step(
             u[system.held[i]] = steps.drive[n, m, i]
         kept_u[m] = u
         kept_v[m] = v
-        gradient(u, system.net, work.turn, work.force)
+        strain, contact = gradient(u, system.net, work.turn, work.force)
+        total += strain + contact
         for d in system.dofs:
             v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
     for d in system.dofs:
         u[d] += steps.drifts[len(steps.gain)] * steps.h * v[d]
+    return total
 
 
 @compiled
@@ -104,11 +109,8 @@ def run(
             checkpoints[n // steps.segment, 1] = v
         last_u[:] = u
         last_v[:] = v
-        _step(n, u, v, steps, system, work, kept_u, kept_v)
-        if n % WATCH_EVERY == 0 or n == steps.n_steps - 1:
-            room = smallest_void(kept_u[n_kicks - 1], system.net)[0]
-            if not (room > 0.0 and np.isfinite(v.sum())):
-                return n
+        if not np.isfinite(_step(n, u, v, steps, system, work, kept_u, kept_v)):
+            return n
         while asked < len(outputs.interval) and outputs.interval[asked] == n:
             w, r = outputs.values[asked], outputs.rates[asked]
             out_u[asked] = w[0] * last_u + w[1] * u + w[2] * last_v + w[3] * v

@@ -111,4 +111,6 @@ def held_values(held: Ints, driven: Ints, motion: Motion, times: Numbers) -> Arr
     values = jnp.asarray(motion(jnp.asarray(times)))
     if values.ndim == 2:
         values = jnp.broadcast_to(values[:, None, :], (len(times), len(driven), 3))
-    return jnp.zeros((len(times), len(held))).at[:, place].set(values.reshape(len(times), -1))
+    selection = np.zeros((len(dofs), len(held)))
+    selection[np.arange(len(dofs)), place] = 1.0
+    return values.reshape(len(times), -1) @ selection

@@ -21,13 +21,11 @@ class Record:
     Attributes:
         states: (n_asked, n_dofs) equilibria.
         stable: (n_asked,) whether each is a minimum of the energy.
-        touching: ligaments in which contact was computed.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
     """
 
     states: Floats
     stable: Ints
-    touching: Ints
     counts: Ints
 
 
@@ -43,7 +41,6 @@ class StaticSolver:
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
         threads: cases solved side by side.
-        touching: ligaments in which contact is computed, None for all.
     """
 
     topology: Topology
@@ -51,7 +48,6 @@ class StaticSolver:
     relative: float = 1e-10
     absolute: float = 1e-11
     threads: int = 1
-    touching: Ints | None = None
 
     def refined(self) -> StaticSolver:
         """The same to a hundred times tighter a tolerance, to estimate the error by."""
@@ -60,11 +56,10 @@ class StaticSolver:
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
-        touching = np.arange(len(values.void)) if self.touching is None else self.touching
         loads = drive.values(top.held, self.asked)
         states = np.zeros((len(loads), top.n_dofs))
         stable, counts = np.zeros(len(loads), dtype=np.int64), np.zeros(4, dtype=np.int64)
-        system = system_of(top, values, touching)
+        system = system_of(top, values)
         reached, fraction = follow(
             loads, system, self.relative, self.absolute, states, stable, counts
         )
@@ -75,7 +70,7 @@ class StaticSolver:
                 " more load steps",
                 step=reached,
             )
-        record = Record(states, stable, touching, counts)
+        record = Record(states, stable, counts)
         return states.copy(), np.zeros_like(states), record
 
     def backward(
@@ -84,7 +79,7 @@ class StaticSolver:
         """See ``dynamics.Solver``."""
         del bar_v
         top = self.topology
-        system = system_of(top, values, record.touching)
+        system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
         unstable = adjoint(record.states, bar_u, system, top.designed, bars)
         if unstable >= 0:

@@ -11,34 +11,53 @@ from sim.optimise.qp import reachable, shortest_step
 INSET = 1e-7
 """The projection aims this far inside (mm), so that rounding leaves no constraint violated."""
 
+RETREAT_STEPS = 10
+"""Number of steps in which a retreat deepens."""
 
-def project(problem: Problem, x: Floats, reach: float, rounds: int = 12) -> Place | None:
-    """Design near ``x`` with no violated constraint, or None if the rounds do not find one.
+
+def project(
+    problem: Problem, x: Floats, reach: float, rounds: int = 12, depth: float = 0.0
+) -> Place | None:
+    """Design near ``x`` with every margin at least ``depth``, or None if the rounds find none.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
     more than ``reach``.
     """
     place = problem.place(np.clip(x, problem.lower, problem.upper))
     for _ in range(rounds):
-        if place.violation == 0.0:
+        if place.values.min(initial=np.inf) >= depth:
             return place
-        step = _newton(problem, place, reach)
+        step = _newton(problem, place, reach, depth + INSET)
         if step is None:
             return None
         place = problem.place(np.clip(place.x + step, problem.lower, problem.upper))
-    return place if place.violation == 0.0 else None
+    return place if place.values.min(initial=np.inf) >= depth else None
 
 
-def _newton(problem: Problem, place: Place, reach: float) -> Floats | None:
-    near = reachable(place.values - INSET, place.jacobian, reach)
+def _newton(problem: Problem, place: Place, reach: float, depth: float) -> Floats | None:
+    near = reachable(place.values - depth, place.jacobian, reach)
     found = shortest_step(
         np.zeros_like(place.x),
         place.jacobian[near],
-        INSET - place.values[near],
+        depth - place.values[near],
         np.maximum(problem.lower - place.x, -reach),
         np.minimum(problem.upper - place.x, reach),
     )
     return None if found is None else found.step
+
+
+def retreat(problem: Problem, x: Floats, depth: float, reach: float) -> Place | None:
+    """Design inside the feasible set, with every margin at ``depth`` or as near to it as it goes.
+
+    The way is followed in small steps, so that it leads to the part of the set that ``x`` is in.
+    """
+    place = project(problem, x, reach)
+    for level in np.linspace(0.0, depth, RETREAT_STEPS + 1)[1:]:
+        deeper = None if place is None else project(problem, place.x, reach, depth=level)
+        if deeper is None:
+            break
+        place = deeper
+    return place
 
 
 def feasible_start(problem: Problem, x: Floats, reach: float) -> Place:

@@ -146,6 +146,11 @@ class Problem:
             return "target reached"
         return "evaluations used up" if len(self.evaluations) >= self.budget else None
 
+    @property
+    def left(self) -> int:
+        """Number of evaluations that may follow."""
+        return 0 if self.finished else self.budget - len(self.evaluations)
+
     def place(self, x: Floats) -> Place:
         """Evaluates the constraints."""
         if self.constrain is None:

@@ -7,19 +7,22 @@ set before it is simulated, and the loss alone decides whether it is accepted (W
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.errors import SimulationError
-from sim.optimise.feasibility import feasible_start, project
+from sim.optimise.feasibility import feasible_start, project, retreat
 from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
 
 ACCEPT, SHRINK, GROW = 1e-4, 0.25, 0.75
 """Ratios of actual to predicted reduction: to accept a step, to shrink and to grow the radius."""
+
+RETREAT_COST = 3
+"""A retreat is worth its while if it can take this many times the patience."""
 
 CALM = 0.9
 """Factor of the caution from one evaluation to the next."""
@@ -39,8 +42,9 @@ class SqpOptions:
         residual: KKT residual at which a design counts as optimal.
         patience: the descent has stalled if this many simulations in a row ...
         progress: ... have together reduced the loss by less than this fraction.
-        kicks: how many times to start again from the best design with random shifts ...
-        kick: ... of at most this size.
+        retreats: how many times to start again from inside the feasible set ...
+        depth: ... where every margin is this large, if there is such a place ...
+        kick: ... near the best design with random shifts of at most this size.
         seed: of the shifts.
     """
 
@@ -51,9 +55,10 @@ class SqpOptions:
     caution: float = 0.9
     radius_min: float = 1e-4
     residual: float = 1e-5
-    patience: int = 15
-    progress: float = 1e-3
-    kicks: int = 4
+    patience: int = 8
+    progress: float = 0.01
+    retreats: int = 20
+    depth: float = 2.0
     kick: float = 0.15
     seed: int = 0
 
@@ -76,75 +81,72 @@ class Trial:
 
 
 def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
-    """Runs descents from the start and then from kicked copies of the best design."""
+    """Runs descents from the start and then from inside the feasible set around the best design.
+
+    The optimum is nearly a vertex of the feasible set, and there are many: a descent that starts
+    again from inside chooses another, most often a better one.
+    """
     place = feasible_start(problem, x0, options.radius_max)
     point = problem.simulate(place)
     if isinstance(point, SimulationError):
         raise point
     residual = problem.stationarity(point).residual
     problem.record(place, point, True, options.radius, residual)
-    descent = Descent(problem, point, options)
-    reason = descent.run()
+    reason = Descent(problem, point, options).run()
     random = np.random.default_rng(options.seed)
-    for _ in range(options.kicks):
-        if problem.finished is not None:
+    for _ in range(options.retreats):
+        if problem.left < RETREAT_COST * options.patience:
             break
-        kicked = _kick(problem, options, random)
-        if kicked is not None:
-            descent.go_on_from(kicked)
-            reason = descent.run()
+        inside = _retreat(problem, options, random)
+        if inside is not None:
+            reason = Descent(problem, inside, options).run()
+    if problem.finished is None and options.retreats:
+        reason = _polish(problem, options)
     return problem.result(problem.finished or reason)
 
 
-def _kick(problem: Problem, options: SqpOptions, random: np.random.Generator) -> Point | None:
+def _polish(problem: Problem, options: SqpOptions) -> str:
+    """Spends what is left of the evaluations on the best design."""
+    assert problem.best is not None
+    last = replace(options, caution=0.0, patience=options.evaluations)
+    return Descent(problem, problem.best, last).run()
+
+
+def _retreat(problem: Problem, options: SqpOptions, random: np.random.Generator) -> Point | None:
+    """Simulates a design well inside the constraints, near a kicked copy of the best one."""
     assert problem.best is not None
     shift = random.uniform(-options.kick, options.kick, problem.best.x.shape)
-    place = project(problem, problem.best.x + shift, options.radius_max)
+    place = retreat(problem, problem.best.x + shift, options.depth, options.radius_max)
     if place is None:
         return None
     outcome = problem.simulate(place)
-    problem.record(place, outcome, isinstance(outcome, Point), options.kick, np.nan)
+    problem.record(place, outcome, isinstance(outcome, Point), options.depth, np.nan)
     return outcome if isinstance(outcome, Point) else None
 
 
 class Descent:
-    """Steps downhill from one design until nothing more is gained, restarting the model once."""
+    """Steps downhill from one design until nothing more is gained."""
 
     def __init__(self, problem: Problem, point: Point, options: SqpOptions) -> None:
         self.problem = problem
         self.options = options
         self.point = point
         self.residual = problem.stationarity(point).residual
+        self.steps = 0
+        self.radius = options.radius
         self.losses = [point.loss]
-        self._forget()
+        steepest = float(np.abs(point.gradient).max())
+        self.model = QuasiNewton(len(point.x), max(steepest, 1e-300) / self.radius)
 
     def run(self) -> str:
         """Descends; returns why it stopped."""
-        restarted_at = np.inf
         while self.problem.finished is None:
             if self.residual <= self.options.residual:
                 return "stationary"
             if self._stalled():
-                if self.point.loss > restarted_at * (1 - self.options.progress):
-                    return "no further progress"
-                restarted_at = self.point.loss
-                self._forget()
+                return "no further progress"
             self._step()
         return self.problem.finished
-
-    def go_on_from(self, point: Point) -> None:
-        """Moves elsewhere, keeping what the model has learned."""
-        self.point = point
-        self.residual = self.problem.stationarity(point).residual
-        self.radius = self.options.radius
-        self.losses = [point.loss]
-
-    def _forget(self) -> None:
-        """Starts the model and the radius afresh."""
-        self.radius = self.options.radius
-        steepest = float(np.abs(self.point.gradient).max())
-        self.model = QuasiNewton(len(self.point.x), max(steepest, 1e-300) / self.radius)
-        self.losses = [self.point.loss]
 
     def _stalled(self) -> bool:
         if self.radius < self.options.radius_min:
@@ -168,6 +170,7 @@ class Descent:
             accepted = self._judge(trial, outcome)
         if accepted:
             self.residual = self.problem.stationarity(self.point).residual
+        self.steps += 1
         self.losses.append(self.point.loss)
         self.problem.record(trial.place, outcome, accepted, used, self.residual)
 
@@ -198,7 +201,7 @@ class Descent:
 
         Constraints that become active early steer the descent into poor optima.
         """
-        return self.options.caution * CALM ** len(self.problem.evaluations)
+        return self.options.caution * CALM**self.steps
 
     def _judge(self, trial: Trial, outcome: Point) -> bool:
         """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""
