@@ -148,7 +148,7 @@ def test_only_the_gap_keeps_diagonal_neighbours_apart(gap: float | None) -> None
         value, slope = distance(x)
         return float(value), np.asarray(slope), np.zeros(0)
 
-    options = SqpOptions(evaluations=40, kicks=0, target=-0.5)
+    options = SqpOptions(evaluations=40, retreats=0, target=-0.5)
     found = minimise("sqp", push, constraints, np.zeros(space.n_variables), options=options)
     vertices = constraints.vertices(found.x)
     assert found.violation == 0.0

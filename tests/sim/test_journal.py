@@ -13,7 +13,7 @@ from sim.optimise import Journal, JournalInUseError, SqpOptions, minimise
 from tests.sim.optimise_problems import in_disc, rosenbrock
 
 Complete = tuple[bytes, tuple, int]
-OPTIONS = SqpOptions(evaluations=12, kicks=0)
+OPTIONS = SqpOptions(evaluations=12, retreats=0)
 
 
 class Counted:

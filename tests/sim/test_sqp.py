@@ -31,7 +31,7 @@ from tests.sim.optimise_problems import (
     shifted_bowl,
 )
 
-EXACT = SqpOptions(evaluations=150, kicks=0, residual=1e-6, progress=1e-9)
+EXACT = SqpOptions(evaluations=150, retreats=0, residual=1e-6, progress=1e-9)
 
 
 def solve(known: Known, **changes: float) -> Result:
@@ -131,7 +131,10 @@ def test_losses_that_are_not_finite_count_as_failures(method: Method, bad: float
         value, slope, aux = rosenbrock(x)
         return (bad if x[0] > 0.5 else value), slope, aux
 
-    options: Any = {"sqp": SqpOptions(evaluations=40, kicks=0), "mma": MmaOptions(evaluations=12)}
+    options: Any = {
+        "sqp": SqpOptions(evaluations=40, retreats=0),
+        "mma": MmaOptions(evaluations=12),
+    }
     found = minimise(method, sometimes, in_disc, np.array([-1.0, 0.5]), options=options[method])
     assert np.isfinite(found.loss)
     assert found.x[0] <= 0.5
@@ -169,9 +172,9 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
         return value, 2 * x + 1.5 * np.sin(30 * x), np.zeros(0)
 
     start = np.array([0.45, -0.38])
-    still = minimise("sqp", wavy, None, start, options=SqpOptions(kicks=0, radius=0.02))
+    still = minimise("sqp", wavy, None, start, options=SqpOptions(retreats=0, radius=0.02))
     kicked = minimise(
-        "sqp", wavy, None, start, options=SqpOptions(kicks=8, radius=0.02, evaluations=200)
+        "sqp", wavy, None, start, options=SqpOptions(retreats=8, radius=0.02, evaluations=200)
     )
     assert kicked.loss < still.loss
     assert kicked.loss == min(e.loss for e in kicked.evaluations)
@@ -179,7 +182,7 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
 
 
 def test_runs_are_reproducible_bit_for_bit() -> None:
-    runs = [solve(many(40, 120), kicks=2, evaluations=60) for _ in range(2)]
+    runs = [solve(many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
     assert runs[0].x.tobytes() == runs[1].x.tobytes()
     assert [e.loss for e in runs[0].evaluations] == [e.loss for e in runs[1].evaluations]
 
