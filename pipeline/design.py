@@ -48,6 +48,7 @@ def work(args: argparse.Namespace) -> None:
 
     asked = problem.load(args.problem, args.preset)
     scene = scene_of(asked, args.problem.parent)
+    _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
     result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent)
@@ -55,6 +56,19 @@ def work(args: argparse.Namespace) -> None:
     made = design_dataset(asked, scene, result)
     origin = provenance.attributes(asked, "design", method=args.method, plan=plan.record())
     datasets.write(made, args.out, "design_method", origin)
+
+
+def _check_symmetry(scene: Scene, source: Path) -> None:
+    try:
+        _ = scene.space
+    except ValueError as error:
+        raise UserError(
+            str(error),
+            file=source,
+            key="optimiser.symmetry",
+            value=scene.symmetry,
+            remedy="ask for none, or for one that lattice and cloak have",
+        ) from error
 
 
 def optimise(
@@ -81,7 +95,6 @@ def optimise(
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
-    space = scene.space
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
 
         def show(evaluation: Evaluation) -> None:
@@ -94,8 +107,8 @@ def optimise(
                 return minimise(
                     method,  # type: ignore[arg-type]
                     journal.wrap(evaluator(scene, plan)),
-                    Constraints(space, limits_of(asked)),
-                    np.zeros(space.n_variables),
+                    Constraints(scene.space, limits_of(asked)),
+                    np.zeros(scene.space.n_variables),
                     options=_options(asked, method),
                     callback=show,
                 )

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import cli, problem
+from pipeline.errors import UserError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,7 +126,10 @@ def response_dataset(
             measured[name] = []
             for outcome in run_batch(cases, reduce, threads):
                 if outcome.value is None:
-                    raise RuntimeError(outcome.failure)
+                    raise UserError(
+                        f"the {name} structure cannot be simulated: {outcome.failure}",
+                        remedy="lower drive.amplitude, or ask for solver.accuracy: tight",
+                    )
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
     return _dataset(asked, scene, shapes, times.asked[times.shown], measured), plans
