@@ -151,8 +151,8 @@ class Optimiser(Section):
 
     methods: Methods
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
-    trust_radius: Length = 0.5
-    trust_radius_max: Length = 3.0
+    trust_radius: Length = 0.25
+    trust_radius_max: Length = 1.0
     kick: Length = 0.15
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
