@@ -55,8 +55,8 @@ class SqpOptions:
     caution: float = 0.9
     radius_min: float = 1e-4
     residual: float = 1e-5
-    patience: int = 8
-    progress: float = 0.01
+    patience: int = 6
+    progress: float = 0.02
     retreats: int = 20
     depth: float = 2.0
     kick: float = 0.15
