@@ -158,6 +158,8 @@ def _advance(
         ahead = min(increment, 1.0 - done)
         _predict(motion, load, ahead / (1.0 - done), system, work)
         allowed = min(1.0, KEEP_FROM_BARRIER * barrier_step(motion, system.net, work.step))
+        if allowed * ahead < SMALLEST_INCREMENT:  # held units drive a void into its barrier
+            return done, increment
         motion += allowed * work.step
         last = allowed == 1.0 and ahead == 1.0 - done
         if last:

@@ -12,10 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from sim.arrays import Floats, Ints
 from sim.design import DesignSpace, design_space
 from sim.dynamics import Drive, Solver, simulate
 from sim.geometry import shape
-from sim.kernels import Floats, Ints
 from sim.lattice import Lattice, quads
 from sim.loads import Motion, held_dofs
 from sim.model import Material, Parameters, Topology, damping_of_ratio, parameters, topology
@@ -126,7 +126,7 @@ class Rig:
             contact=jnp.ones(self.lattice.n_ligaments),
             density=jnp.ones(()),
             damping=jnp.ones((self.lattice.n_units, 2)),
-            drive=jax.tree.map(jnp.asarray, self.motion),
+            drive=jax.tree.map(lambda x: jnp.asarray(x, dtype=float), self.motion),
         )
 
     @cached_property

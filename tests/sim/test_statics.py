@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim import kernels
+from sim.arrays import Floats
+from sim.dynamics import Drive, solve_case
+from sim.errors import SimulationError
+from sim.loads import LinearRamp, TimeSeries
+from sim.statics import StaticSolver
+from sim.system import system_of, workspace
+from tests.sim.structures import BARRIER, CUTOFF, NONE, Rig, mixed_polygons, rotating_squares
+
+LEFT = 5 * np.arange(5)
+
+
+def squeezed(depth: float, bias_deg: float = 20.0) -> Rig:
+    """5 x 5 squares between plates, of which one moves in."""
+    return Rig(rotating_squares(5, bias_deg), LEFT, LEFT + 4, LinearRamp(-depth, 1.0))
+
+
+def out_of_balance(rig: Rig, state: Floats) -> Floats:
+    """Forces (n_free,) on the free dofs, N and N mm."""
+    system = system_of(rig.topology, rig.values)
+    work = workspace(system)
+    kernels.gradient(state.ravel(), system.net, work.turn, work.force)
+    return work.force[rig.topology.free_dofs]
+
+
+def void_angles(rig: Rig, states: Floats) -> Floats:
+    motion = states.reshape(len(states), -1, 3)
+    return rig.topology.smallest_void_angles(rig.values.void, motion)
+
+
+def path(rig: Rig, loads: Floats) -> Floats:
+    return solve_case(StaticSolver(rig.topology, loads), rig.values, rig.drive)[0]
+
+
+def test_every_asked_state_is_in_balance_and_follows_the_load() -> None:
+    rig, loads = squeezed(9.0), np.linspace(0.1, 1.0, 7)
+    states = path(rig, loads)
+    assert states.dtype == np.float64
+    for load, state in zip(loads, states, strict=True):
+        assert np.abs(out_of_balance(rig, state)).max() < 1e-8
+        moved = state.reshape(-1, 3)
+        np.testing.assert_allclose(moved[LEFT + 4], [[-9.0 * load, 0.0, 0.0]] * 5)
+        np.testing.assert_array_equal(moved[LEFT], 0.0)
+
+
+def test_states_in_contact_stay_inside_the_barrier() -> None:
+    rig = squeezed(11.0)
+    angles = void_angles(rig, path(rig, np.linspace(0.1, 1.0, 10)))
+    assert angles.min() > BARRIER
+    assert (angles < CUTOFF).sum() > 5
+
+
+def test_the_end_of_a_path_does_not_depend_on_its_steps() -> None:
+    rig = squeezed(9.0)
+    at_once, in_steps = path(rig, np.array([1.0])), path(rig, np.linspace(0.05, 1.0, 20))
+    np.testing.assert_allclose(at_once[-1], in_steps[-1], atol=1e-8)
+
+
+def test_a_structure_that_starts_in_contact_relaxes_first() -> None:
+    """Squares turned so far that their voids are at -12 deg, beyond the cutoff, at the start."""
+    rig = squeezed(1.0, bias_deg=51.0)
+    assert np.rad2deg(rig.values.void.min()) == pytest.approx(-12.0)
+    states = path(rig, np.array([0.0, 1.0]))
+    assert np.abs(states[0]).max() > 1e-5
+    assert np.abs(out_of_balance(rig, states[0])).max() < 1e-8
+    angles = void_angles(rig, states)
+    assert BARRIER < angles.min() < CUTOFF
+
+
+def test_a_whole_turn_and_more() -> None:
+    """A free structure follows the one unit that is turned, rigidly and around several times."""
+    angles = np.linspace(0.0, 9.0, 31)
+    turning = TimeSeries(angles, np.column_stack([np.zeros((31, 2)), angles]))
+    rig = Rig(rotating_squares(3), NONE, np.array([4]), turning)
+    states = path(rig, angles[1:]).reshape(-1, 9, 3)
+    offset = rig.lattice.site - rig.lattice.site[4]
+    for angle, state in zip(angles[1:], states, strict=True):
+        c, s = np.cos(angle), np.sin(angle)
+        np.testing.assert_allclose(state[:, :2], offset @ [[c, s], [-s, c]] - offset, atol=1e-7)
+        np.testing.assert_allclose(state[:, 2], angle, atol=1e-8)
+
+
+def test_winding_of_two_units_against_each_other() -> None:
+    """Voids opened by more than half a turn do not read as closed."""
+    angles = np.linspace(0.0, 1.0, 11)
+    turning = TimeSeries(angles, np.outer(angles, [-3.0, 2.0, 2.6]))
+    rig = Rig(mixed_polygons(), np.array([0]), np.array([7]), turning)
+    states = path(rig, angles[1:])
+    assert np.isfinite(states).all()
+    assert void_angles(rig, states).min() > BARRIER
+
+
+def test_polygons_of_any_kind() -> None:
+    """The mixed network pulled apart: same code, balance, and energy equal to the work done."""
+    loads = np.linspace(0.0, 1.0, 201)
+    rig = Rig(mixed_polygons(), np.array([0]), np.array([4, 7]), LinearRamp(1.5, 1.0, 0.7))
+    states = path(rig, loads)
+    assert np.abs(out_of_balance(rig, states[-1])).max() < 1e-8
+    system = system_of(rig.topology, rig.values)
+    work = workspace(system)
+    energies, forces = [], []
+    for state in states:
+        energies.append(sum(kernels.gradient(state, system.net, work.turn, work.force)))
+        forces.append(work.force.copy())
+    done = np.sum((np.array(forces)[1:] + forces[:-1]) / 2 * np.diff(states, axis=0))
+    assert done == pytest.approx(energies[-1] - energies[0], rel=1e-4)
+
+
+def jammed() -> Rig:
+    """Two neighbours held and turned against each other beyond the barrier of the void between."""
+    closing = TimeSeries(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]))
+    return Rig(rotating_squares(3), np.array([3]), np.array([4]), closing)
+
+
+def test_what_cannot_be_reached_is_an_error_with_its_step_and_a_remedy() -> None:
+    with pytest.raises(SimulationError, match="try ") as failure:
+        path(jammed(), np.array([0.2, 0.4, 1.0]))
+    assert failure.value.step is not None
+
+
+@pytest.mark.parametrize("broken", ["drive", "stiffness", "void", "arm"])
+def test_nan_never_leaves(broken: str) -> None:
+    rig = squeezed(2.0)
+    values, drive = rig.values, rig.drive
+    if broken == "drive":
+        series = TimeSeries(
+            np.array([0.0, 0.5, 1.0]), np.array([[0.0] * 3, [np.nan] * 3, [0.0] * 3])
+        )
+        drive = Drive(rig.driven, series)
+    else:
+        field = "law" if broken == "stiffness" else broken
+        bad = np.array(getattr(values, field))
+        bad.flat[7] = np.nan
+        values = values._replace(**{field: bad})
+    with pytest.raises(SimulationError):
+        solve_case(StaticSolver(rig.topology, np.array([0.6, 1.0])), values, drive)
+
+
+def test_an_unstable_equilibrium_is_known_and_has_no_gradient() -> None:
+    """One unit on two stretched ligaments cannot buckle here; the record says so for each load."""
+    rig = squeezed(9.0)
+    record = StaticSolver(rig.topology, np.array([0.5, 1.0])).forward(rig.values, rig.drive)[2]
+    np.testing.assert_array_equal(record.stable, 1)
