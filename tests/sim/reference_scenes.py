@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.kernels import Floats, Ints
+from sim.arrays import Floats, Ints
 from sim.lattice import Lattice, quads
 from sim.loads import Harmonic, LinearRamp, held_dofs
 from sim.model import Material, damping_of_ratio

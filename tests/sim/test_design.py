@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.design import Symmetry, design_space
-from sim.kernels import Floats, Ints
+from sim.arrays import Floats, Ints
 from sim.lattice import quads
 from tests.sim.structures import mixed_polygons, rotating_squares
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from sim import kernels
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, ligament_energy
 from sim.geometry import shape
-from sim.kernels import Floats, Network
+from sim.arrays import Floats
+from sim.kernels import Network
 from sim.lattice import Lattice
 from sim.model import parameters, topology
 from sim.plan import concrete_parameters

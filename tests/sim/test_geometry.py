@@ -8,7 +8,7 @@ from shapely import Polygon
 from shapely.affinity import rotate
 
 from sim.geometry import block_angles, edge_lengths, inertia, shape, void_angles
-from sim.kernels import Floats
+from sim.arrays import Floats
 from sim.lattice import Lattice
 from tests.sim.structures import mixed_polygons, rotating_squares
 

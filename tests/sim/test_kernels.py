@@ -14,7 +14,8 @@ from sim import kernels
 from sim.band import number_free_dofs
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.geometry import shape
-from sim.kernels import Floats, Network, Sensitivity
+from sim.arrays import Floats, Ints
+from sim.kernels import Network, Sensitivity
 from sim.lattice import Lattice, quads
 from tests.sim.structures import BARRIER, CUTOFF, mixed_polygons
 

@@ -12,7 +12,7 @@ import pytest
 from sim.dynamics import simulate
 from sim.evaluation import structure
 from sim.geometry import shape
-from sim.kernels import Floats
+from sim.arrays import Floats
 from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Accuracy, Scene
