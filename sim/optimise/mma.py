@@ -22,7 +22,7 @@ from sim.optimise.separable import Separable, minimise_separable
 SLOWER, FASTER = 0.7, 1.2
 """Factors of the distance to the poles after a variable has turned, or gone on."""
 
-NEAREST, FARTHEST = 0.01, 10.0
+NEAREST, FARTHEST = 0.01, 1.5
 """Limits of that distance, relative to the range of the variable."""
 
 MOVE = 0.9
@@ -34,7 +34,7 @@ SOFTEN, STIFFEN = 0.1, 10.0
 ENOUGH = 0.1
 """Share of the expected decrease with which a step is kept although the loss was underestimated."""
 
-CORRECTIONS = 10
+CORRECTIONS = 3
 """Largest number of corrections of the constraints before one simulation."""
 
 

@@ -21,6 +21,9 @@ from scipy.linalg import cho_factor, cho_solve
 from sim.arrays import Floats
 from sim.errors import SimulationError
 
+GROWTH = 10.0
+"""Growth of the residual that a Newton step may cause; insisting on descent makes steps tiny."""
+
 WEIGHT = 1000.0
 """Price of violating a constraint, relative to the steepest slope of the objective."""
 
@@ -88,7 +91,7 @@ class _State:
         )
 
 
-def minimise_separable(problem: Separable, tolerance: float = 1e-9) -> tuple[Floats, Floats]:
+def minimise_separable(problem: Separable, tolerance: float = 1e-8) -> tuple[Floats, Floats]:
     """Solves the subproblem; returns x (n,) and the multipliers (m,) of the constraints.
 
     Raises:
@@ -159,7 +162,7 @@ class _InteriorPoint:
         before = np.linalg.norm(self.residual(state, barrier))
         for _ in range(50):
             trial = state.moved(step, length)
-            if np.linalg.norm(self.residual(trial, barrier)) < before:
+            if np.linalg.norm(self.residual(trial, barrier)) < GROWTH * before:
                 break
             length /= 2
         return trial
