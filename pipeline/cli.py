@@ -23,7 +23,7 @@ __all__ = ["parser", "progress", "run"]
 Work = Callable[[argparse.Namespace], None]
 
 LOG = logging.getLogger(__name__)
-_ROOMS = ("sim", "pipeline", "reports")
+_ROOMS = ("sim", "pipeline", "reports", "__main__")  # a stage that is run has the last name
 
 
 def parser(stage: str, description: str, *, study: bool = True) -> argparse.ArgumentParser:

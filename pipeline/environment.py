@@ -12,6 +12,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 CACHE = ROOT / ".cache"
+RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
 
 ONE_THREAD = {
     "MKL_NUM_THREADS": "1",

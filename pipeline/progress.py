@@ -11,11 +11,12 @@ from datetime import timedelta
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from pipeline.environment import RUN_MARK
+
 if TYPE_CHECKING:
     from tqdm import tqdm
 
 LOG = logging.getLogger(__name__)
-WORKFLOW_MARK = "METACLOAK_RUN"  # set for the jobs of a workflow, whose bars would overwrite others
 
 _SECONDS_BETWEEN_LINES = 10.0
 _LINES_PER_JOB = 10
@@ -89,9 +90,8 @@ class Progress:
 
 
 def _may_draw() -> bool:
-    return (
-        LOG.isEnabledFor(logging.INFO) and sys.stderr.isatty() and WORKFLOW_MARK not in os.environ
-    )
+    # In a workflow, the bars of jobs that run side by side would overwrite each other.
+    return LOG.isEnabledFor(logging.INFO) and sys.stderr.isatty() and RUN_MARK not in os.environ
 
 
 def _figure(value: float | str) -> str:

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.environment import ROOT
+from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
-from pipeline.workflow import RUN_MARK, check_problems
+from pipeline.workflow import check_problems
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)

@@ -18,12 +18,11 @@ from tempfile import NamedTemporaryFile
 import yaml
 from snakemake.iocontainers import Wildcards
 
-from pipeline.environment import ROOT
+from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
 from pipeline.problem import Problem, Stage, load, section_hash
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
-RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job
 
 
 @dataclass(frozen=True, order=True)

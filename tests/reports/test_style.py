@@ -45,7 +45,7 @@ def test_oklab_is_inverted() -> None:
 def test_the_font_is_the_one_that_matplotlib_ships() -> None:
     with style.styled():
         found = Path(findfont(FontProperties(family=mpl.rcParams["font.family"])))
-    assert found.is_relative_to(mpl.get_data_path())
+    assert found.resolve().is_relative_to(Path(mpl.get_data_path()).resolve())
 
 
 def test_style_ignores_the_settings_of_the_user() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.workflow import RUN_MARK
+from pipeline.environment import RUN_MARK
 from tests.workflow.conftest import Sandbox
 
 
