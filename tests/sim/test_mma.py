@@ -14,7 +14,7 @@ from tests.sim.optimise_problems import Known, cantilever, corner, many, shifted
 
 
 def solve(known: Known, **changes: float) -> Result:
-    options = replace(MmaOptions(evaluations=60, residual=1e-5), **changes)  # type: ignore[arg-type]
+    options = replace(MmaOptions(evaluations=100, residual=1e-5), **changes)  # type: ignore[arg-type]
     return minimise("mma", known.loss, known.constraints, known.start, known.bounds, options)
 
 
@@ -49,7 +49,7 @@ def by_nlopt(known: Known, evaluations: int = 500) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("known", "tolerance"),
-    [(corner(), 1e-5), (shifted_bowl(), 1e-5), (cantilever(), 5e-3)],
+    [(corner(), 1e-5), (shifted_bowl(), 1e-4), (cantilever(), 5e-3)],
     ids=["corner", "bowl", "cantilever"],
 )
 def test_known_optima_which_are_nlopts_too(known: Known, tolerance: float) -> None:
