@@ -113,13 +113,56 @@ def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Fl
 
 
 @jax.tree_util.register_static
-class _Records:
-    """The solver's records of all cases, opaque to JAX."""
+class Records:
+    """What the reverse sweeps of all cases need, opaque to JAX."""
 
     def __init__(self, values: Values, drives: Sequence[Drive], records: list[Any]) -> None:
         self.values = values
         self.drives = drives
         self.records = records
+
+
+class Pulled(NamedTuple):
+    """Loss derivatives that a reverse sweep returns.
+
+    Attributes:
+        parameters: summed over the cases.
+        times, drive: of each case, the times and the derivatives by the held values there.
+    """
+
+    parameters: Values
+    times: list[Floats]
+    drive: list[Floats]
+
+
+def forward(
+    solver: Solver, values: Values, drives: Sequence[Drive]
+) -> tuple[Floats, Floats, Records]:
+    """Displacement and velocity (n_cases, n_asked, n_units, 3) of all cases, and their records.
+
+    Raises:
+        SimulationError: a step failed.
+    """
+    results = _spread(lambda drive: solve_case(solver, values, drive), drives, solver.threads)
+    shape = (len(drives), -1, solver.topology.n_units, 3)
+    displacement = np.stack([u for u, _, _ in results]).reshape(shape)
+    velocity = np.stack([v for _, v, _ in results]).reshape(shape)
+    return displacement, velocity, Records(values, drives, [record for _, _, record in results])
+
+
+def backward(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Pulled:
+    """Reverse sweep of ``forward`` from loss derivatives shaped as its outputs."""
+    flat_u, flat_v = (bar.reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v))
+    results = _spread(
+        lambda case: solver.backward(
+            records.values, records.records[case], flat_u[case], flat_v[case]
+        ),
+        range(len(flat_u)),
+        solver.threads,
+    )
+    parts, times, drive = zip(*results, strict=True)
+    summed = Values(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
+    return Pulled(summed, list(times), list(drive))
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -136,20 +179,15 @@ def simulate(solver: Solver, parameters: Parameters[Any], drives: tuple[Drive, .
 
 def _forward(
     solver: Solver, parameters: Parameters[Any], drives: tuple[Drive, ...]
-) -> tuple[Response, _Records]:
+) -> tuple[Response, Records]:
     values = Values(*(np.asarray(part) for part in parameters))
-    results = _spread(lambda drive: solve_case(solver, values, drive), drives, solver.threads)
-    shape = (len(drives), -1, solver.topology.n_units, 3)
-    response = Response(
-        jnp.asarray(np.stack([u for u, _, _ in results]).reshape(shape)),
-        jnp.asarray(np.stack([v for _, v, _ in results]).reshape(shape)),
-    )
-    return response, _Records(values, drives, [record for _, _, record in results])
+    displacement, velocity, records = forward(solver, values, drives)
+    return Response(jnp.asarray(displacement), jnp.asarray(velocity)), records
 
 
 def _forward_rule(
     solver: Solver, parameters: Any, drives: Any
-) -> tuple[Response, tuple[_Records, bool]]:
+) -> tuple[Response, tuple[Records, bool]]:
     plain = jax.tree.map(lambda primal: primal.value, (parameters, drives), is_leaf=_is_primal)
     driven = any(leaf.perturbed for leaf in jax.tree.leaves(drives, is_leaf=_is_primal))
     response, records = _forward(solver, *plain)
@@ -161,33 +199,25 @@ def _is_primal(node: Any) -> bool:
 
 
 def _backward_rule(
-    solver: Solver, residual: tuple[_Records, bool], bar: Response
+    solver: Solver, residual: tuple[Records, bool], bar: Response
 ) -> tuple[Parameters[Array], Any]:
     records, driven = residual
-    n_dofs = solver.topology.n_dofs
-    held, cases = solver.topology.held, range(len(records.drives))
-    bar_u, bar_v = (_dense(part).reshape(len(cases), -1, n_dofs).copy() for part in bar)
-    held_u, held_v = bar_u[..., held], bar_v[..., held]
-    bar_u[..., held] = bar_v[..., held] = 0.0
-    results = _spread(
-        lambda case: solver.backward(
-            records.values, records.records[case], bar_u[case], bar_v[case]
-        ),
-        cases,
-        solver.threads,
-    )
-    total = Parameters(
-        *(jnp.asarray(sum(parts)) for parts in zip(*(r[0] for r in results), strict=True))
-    )
+    bar_u, bar_v = (_dense(part) for part in bar)
+    pulled = backward(solver, records, bar_u, bar_v)
+    total = Parameters(*(jnp.asarray(part) for part in pulled.parameters))
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
+    held, n_dofs = solver.topology.held, solver.topology.n_dofs
+    held_u, held_v = (part.reshape(len(part), -1, n_dofs)[..., held] for part in (bar_u, bar_v))
     return total, tuple(
         _drive_cotangent(
-            held, records.drives[case], (results[case][1], solver.asked),
-            (results[case][2], held_u[case], held_v[case]),
+            held,
+            drive,
+            (pulled.times[case], solver.asked),
+            (pulled.drive[case], held_u[case], held_v[case]),
         )
-        for case in cases
-    )  # fmt: skip
+        for case, drive in enumerate(records.drives)
+    )
 
 
 simulate.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)

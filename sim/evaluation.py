@@ -9,11 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.arrays import Floats
-from sim.dynamics import simulate
+from sim import dynamics
+from sim.arrays import Floats, Ints
+from sim.dynamics import Drive, Solver, simulate
 from sim.geometry import shape
 from sim.grid import simpson_weights
-from sim.model import Parameters, parameters
+from sim.model import Parameters, Values, parameters
 from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
 from sim.plan import Plan
 from sim.scene import Scene
@@ -45,8 +46,7 @@ def losses(scene: Scene, plan: Plan) -> Callable[[Array], Array]:
     """Differentiable map from a design vector to the losses (n_cases,) of all load cases."""
     of_design = structure(scene)
     measure = jax.jit(objective(scene).__call__)
-    drives = tuple(scene.drives[case] for case in plan.simulated)
-    place = np.searchsorted(plan.simulated, plan.case_of)
+    drives, place = _simulated(scene, plan)
 
     def of_cases(design: Array) -> Array:
         values = of_design(design)
@@ -61,17 +61,52 @@ def evaluator(scene: Scene, plan: Plan) -> Callable[[Floats], tuple[float, Float
 
     It raises ``SimulationError`` where the simulation fails.
     """
-    of_cases = losses(scene, plan)
-    weights = jnp.asarray(scene.weights)
+    drives, place = _simulated(scene, plan)
+    weights, measure = jnp.asarray(scene.weights), objective(scene)
 
-    def mean(design: Array) -> tuple[Array, Array]:
-        each = of_cases(design)
+    def mean(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
+        each = measure(displacement, values)[place]
         return weights @ each, each
 
-    with_gradient = jax.value_and_grad(mean, has_aux=True)
+    return value_and_gradient(structure(scene), mean, plan.solver, drives)
+
+
+def _simulated(scene: Scene, plan: Plan) -> tuple[tuple[Drive, ...], Ints]:
+    """Drives of the simulated cases, and the one among them that each load case stands for."""
+    drives = tuple(scene.drives[case] for case in plan.simulated)
+    return drives, np.searchsorted(plan.simulated, plan.case_of)
+
+
+def value_and_gradient(
+    of_design: Callable[[Array], Parameters[Array]],
+    measure: Callable[[Array, Parameters[Array]], tuple[Array, Array]],
+    solver: Solver,
+    drives: tuple[Drive, ...],
+) -> Callable[[Floats], tuple[float, Floats, Floats]]:
+    """Compiled chain design -> parameters -> motion -> value, with its gradient.
+
+    The same as ``jax.value_and_grad`` through ``simulate``, without tracing it at every call.
+
+    Args:
+        of_design: differentiable map of a design vector to parameters.
+        measure: value and further numbers of displacements (n_cases, n_asked, n_units, 3) and
+            parameters.
+        solver: of the motion.
+        drives: of the cases.
+    """
+    forwards = jax.jit(of_design)
+    measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
+    pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
 
     def evaluate(design: Floats) -> tuple[float, Floats, Floats]:
-        (loss, each), gradient = with_gradient(jnp.asarray(design))
-        return float(loss), np.asarray(gradient), np.asarray(each)
+        made = forwards(design)
+        values = Values(*(np.asarray(part) for part in made))
+        motion, velocity, records = dynamics.forward(solver, values, drives)
+        (value, more), (bar_motion, direct) = measured(motion, made)
+        through = dynamics.backward(
+            solver, records, np.asarray(bar_motion), np.zeros_like(velocity)
+        ).parameters
+        bar = Parameters(*(one + two for one, two in zip(direct, through, strict=True)))
+        return float(value), np.asarray(pull_back(design, bar)), np.asarray(more)
 
     return evaluate

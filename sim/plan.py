@@ -52,7 +52,7 @@ class GridRule:
 
 
 GRIDS: dict[Accuracy, GridRule] = {
-    "draft": GridRule(2e-3, 1.3, 12, 1e-2, 1e-2),
+    "draft": GridRule(1e-3, 1.3, 16, 1e-2, 1e-2),
     "default": GridRule(5e-4, 1.2, 20, 1e-3, 5e-3),
     "tight": GridRule(1e-4, 1.05, 80, 1e-5, 1e-5),
 }
