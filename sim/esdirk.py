@@ -108,7 +108,7 @@ def _solve_stage(
         the status, whether the factor in the workspace is still good, and the contraction rate.
     """
     previous, factors = 0.0, 0
-    for _ in range(MAX_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS):
         if not fresh:
             factors += 1
             counts[1] += 1
@@ -133,7 +133,8 @@ def _solve_stage(
         settled = likely / (1.0 - likely) * size <= tolerance or size <= 1e-13
         if gap == 0.0 and settled:
             return CONVERGED, rate < REFACTOR_ABOVE, rate
-        if previous > 0.0 and rate > REFACTOR_ABOVE:
+        too_slow = rate ** (MAX_ITERATIONS - iteration) * size > tolerance
+        if previous > 0.0 and (rate > REFACTOR_ABOVE or too_slow):
             fresh = False
         previous = size
     return STALLED, False, rate
@@ -239,6 +240,11 @@ def march(
             status, fresh, rate = _solve_stage(
                 motion, target, base, tolerance * h, system, work, fresh, rate, counts
             )
+            if status != CONVERGED:  # after a kink in the drive the extrapolation leads astray
+                motion[:] = u[n, s - 1]
+                status, fresh, rate = _solve_stage(
+                    motion, target, base, tolerance * h, system, work, False, rate, counts
+                )
             if status != CONVERGED:
                 return status, n, _worst(system, work.step)
             u[n, s] = motion
