@@ -47,13 +47,20 @@ def work(args: argparse.Namespace) -> None:
                 remedy="remove it and run the same command again",
             )
         designs[method] = design
-    best = min(designs, key=lambda method: float(designs[method]["best_loss"]))
+    best = min(designs, key=lambda method: _merit(designs[method]))
+    if overlaps := int(designs[best]["overlaps"]):
+        LOG.warning("warning: %d pairs of units overlap in the shipped design", overlaps)
     for method, design in designs.items():
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)
     parents = {path.stem: path for path in args.designs}
     origin = provenance.attributes(asked, "design", parents=parents, plan={"shipped": best})
     datasets.write(join(designs, best), args.out, "design", origin)
+
+
+def _merit(design: xr.Dataset) -> tuple[int, float]:
+    """Overlapping pairs, found by geometry apart from the constraints, then the loss."""
+    return int(design["overlaps"]), float(design["best_loss"])
 
 
 def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:
