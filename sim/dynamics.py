@@ -19,8 +19,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.custom_derivatives import SymbolicZero
+from jax.flatten_util import ravel_pytree
 
 from sim.arrays import Floats, Ints
+from sim.errors import SimulationError
 from sim.loads import Motion, held_values
 from sim.model import Parameters, Topology, Values
 
@@ -103,13 +105,25 @@ def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Fl
     """One case: displacement and velocity (n_asked, n_dofs), and the solver's record.
 
     Raises:
-        SimulationError: a step failed.
+        SimulationError: a step failed, or there are no finite numbers to start from.
     """
+    _refuse_nan(values, drive)
     displacement, velocity, record = solver.forward(values, drive)
     held = solver.topology.held
     displacement[:, held] = drive.values(held, solver.asked)
     velocity[:, held] = drive.rates(held, solver.asked)
     return displacement, velocity, record
+
+
+def _refuse_nan(values: Values, drive: Drive) -> None:
+    parts = {f"{name} of the structure": part for name, part in values._asdict().items()}
+    parts["motion of the driven units"] = ravel_pytree(drive.motion)[0]
+    for name, part in parts.items():
+        if not np.isfinite(part).all():
+            raise SimulationError(
+                f"the {name} is not everywhere a finite number; try another design (no unit without"
+                " area, no edge without length) or mend the series that drives it"
+            )
 
 
 @jax.tree_util.register_static

@@ -14,6 +14,7 @@ from sim.dynamics import Solver
 from sim.explicit import ExplicitSolver
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
+from sim.loads import Harmonic, LinearRamp, TanhRamp
 from sim.model import Values, parameters
 from sim.modes import highest_frequency, lowest_frequency
 from sim.scene import Accuracy, Scene
@@ -162,8 +163,9 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> Values:
 
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
     every = np.arange(len(scene.motions))
-    directions = [getattr(motion, "direction", None) for motion in scene.motions]
-    if any(direction is None for direction in directions):
+    directed = [m for m in scene.motions if isinstance(m, Harmonic | LinearRamp | TanhRamp)]
+    besides = {motion._replace(direction=0.0) for motion in directed}
+    if len(directed) < len(scene.motions) or len(besides) > 1:
         return every
     image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
     clamped_units = np.unique(scene.clamped // 3)
@@ -172,7 +174,7 @@ def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
         return every
     if not is_invariant(image, clamped_units, scene.driven, scene.region):
         return every
-    return equal_directions(np.asarray(directions, dtype=float))
+    return equal_directions(np.array([motion.direction for motion in directed], dtype=float))
 
 
 def _choose(scene: Scene, values: Values, decisions: list[str]) -> Literal["implicit", "explicit"]:
