@@ -118,7 +118,7 @@ def response_dataset(
     plans: dict[str, object] = {}
     with cli.progress(len(shapes) * len(scene.motions), "response") as bar:
         for name, vertices in shapes.items():
-            plan = make_plan(scene, vertices, times.asked)
+            plan = make_plan(scene, vertices, times.asked, every_case=True)
             plans[name] = plan.record()
             LOG.info("%s: %s", name, plan.describe())
             cases = _cases(scene, vertices, plan)

@@ -96,7 +96,11 @@ class Plan:
 
 
 def make_plan(
-    scene: Scene, vertices: Floats | None = None, asked: Floats | None = None, threads: int = 1
+    scene: Scene,
+    vertices: Floats | None = None,
+    asked: Floats | None = None,
+    threads: int = 1,
+    every_case: bool = False,
 ) -> Plan:
     """Decides how to simulate a scene.
 
@@ -106,6 +110,7 @@ def make_plan(
             from the initial one.
         asked: (n_asked,) output times, s; None for the loss's own samples.
         threads: cases to solve side by side.
+        every_case: whether the motion of each load case is wanted, and not its loss alone.
     """
     structure = scene.lattice.vertices if vertices is None else vertices
     values = concrete_parameters(scene, structure)
@@ -113,16 +118,17 @@ def make_plan(
     decisions: list[str] = []
     skipped = ["simulation of the unloaded reference: it is zero"]
 
-    stays_symmetric = vertices is not None or scene.symmetry == "C4"
-    every_case = np.arange(len(scene.motions))
-    case_of = _equal_cases(scene, structure) if stays_symmetric else every_case
+    may_repeat = not every_case and (vertices is not None or scene.symmetry == "C4")
+    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.motions))
     if len(np.unique(case_of)) < len(case_of):
         skipped.append(
             f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
             " by 90 deg"
         )
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
-    if n_designed < n_ligaments:
+    if vertices is not None:
+        skipped.append("parameter derivatives: none are asked for")
+    elif n_designed < n_ligaments:
         skipped.append(
             f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the"
             " design does not move them"

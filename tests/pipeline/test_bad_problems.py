@@ -180,13 +180,13 @@ ROWS = "  rows: 15\n"
             "below the spacing",
         ),
         ("bias_angle: 20 deg", "bias_angle: 50 deg", "closes", "lattice.bias_angle", "45 deg"),
-        ("symmetry: none", "symmetry: C3", "not one of the", "optimiser.symmetry", "'C4'"),
+        ("symmetry: C4", "symmetry: C3", "not one of the", "optimiser.symmetry", "'C4'"),
         (
-            "trust_radius: 0.5 mm",
+            "trust_radius: 0.25 mm",
             "trust_radius: 5 mm",
             "larger than its maximum",
             "optimiser.trust_radius",
-            "at or below 3 mm",
+            "at or below 1 mm",
         ),
         ("to: 180 deg", "to: 0 deg", "does not ascend", "sweep.direction.to", "above `from`"),
         ("samples: 200", "samples: 1", "too small", "horizon.samples", "at least 2"),
@@ -230,7 +230,7 @@ def test_a_fault_in_a_preset_is_found_there(refusal: Refusal, fig2: Path) -> Non
 def test_an_unknown_preset_lists_those_there_are(fig2: Path) -> None:
     with pytest.raises(UserError, match="no preset 'quik'") as caught:
         load(fig2, "quik")
-    assert caught.value.remedy == "did you mean 'quick'? presets here: edge3, text, quick"
+    assert caught.value.remedy == "did you mean 'quick'? presets here: edge3, free, text, quick"
 
 
 def test_presets_are_mappings(refusal: Refusal) -> None:

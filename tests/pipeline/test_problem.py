@@ -25,7 +25,7 @@ from pipeline.problem import (
 )
 from pipeline.problem.loading import overlaid
 
-PRESETS = (None, "edge3", "quick", "text")
+PRESETS = (None, "edge3", "free", "quick", "text")
 
 
 def edited(fig2: Path, folder: Path, old: str, new: str) -> Problem:
