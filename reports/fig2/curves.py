@@ -66,13 +66,14 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     axes.plot(step[outside], loss[outside], ".", color=colour, ms=2.4, mew=0, alpha=0.4, zorder=2)
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
+    aside = at < loss.size / 2  # where another method's curve may run below
     axes.annotate(
         f"{best:.3f}",
         (at, best),
-        xytext=(0, -4.5),
+        xytext=(3, 2) if aside else (0, -4.5),
         textcoords="offset points",
-        ha="right",
-        va="top",
+        ha="left" if aside else "right",
+        va="bottom" if aside else "top",
         fontsize=style.SMALL,
         color=colour,
     )
