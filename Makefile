@@ -7,12 +7,13 @@ STUDIES := $(notdir $(patsubst %/problem.yaml,%,$(wildcard experiments/*/problem
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup test clients lint format bench lock clean $(STUDIES)
+.PHONY: help setup test test-slow clients lint format bench lock clean $(STUDIES)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make test      run the tests"
+	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need a browser (Chromium)"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
@@ -43,7 +44,10 @@ $(foreach study,$(STUDIES),$(study)@%): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
 test: setup
-	$(BIN)/python -m pytest --ignore tests/clients
+	$(BIN)/python -m pytest --ignore tests/clients --ignore tests/slow
+
+test-slow: setup
+	$(BIN)/python -m pytest tests/slow
 
 clients: setup
 	$(BIN)/python -m pytest tests/clients

@@ -7,6 +7,7 @@ these variables once, when they are imported, so `pipeline` sets them on its own
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -30,12 +31,23 @@ CACHES = {
     "JAX_COMPILATION_CACHE_DIR": str(CACHE / "jax"),
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1",
     "MPLCONFIGDIR": str(CACHE / "matplotlib"),
-    "NUMBA_CACHE_DIR": str(CACHE / "numba"),
 }
 
 
 def pin() -> None:
     """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
     os.environ.update(ONE_THREAD | REPRODUCIBLE)
-    for name, value in CACHES.items():
+    for name, value in (CACHES | {"NUMBA_CACHE_DIR": str(CACHE / "numba" / _kernels())}).items():
         os.environ.setdefault(name, value)
+
+
+def _kernels() -> str:
+    """Hash of the sources of compiled loops.
+
+    Numba takes a cached loop for current as long as its own file is unchanged, even if another
+    file holds what it calls.
+    """
+    digest = hashlib.sha256()
+    for path in sorted((ROOT / "sim").glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

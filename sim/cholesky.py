@@ -17,6 +17,7 @@ PANEL = 4
 STRIDE = 128
 """Room for a column in the panel, more than any band this is meant for is wide."""
 
+
 @compiled
 def _factorise_panel(band: Floats, first: int, count: int) -> bool:
     """Factorises ``count`` columns from ``first`` among themselves; False if not positive."""

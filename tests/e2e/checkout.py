@@ -1,0 +1,215 @@
+"""A checkout of this repository with a study so small that the real stages take seconds."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numba.core.caching
+import psutil
+import yaml
+
+from pipeline.environment import ROOT, RUN_MARK
+
+STUDY = "tiny"
+SMALLER = {
+    "title": "A small study",
+    "lattice": {"columns": 5, "rows": 5},
+    "cloak": {"disc": {"radius": "22 mm"}},
+    "drive": {"amplitude": "2 mm", "directions": ["0 deg", "45 deg"], "weights": [0.5, 0.5]},
+    "horizon": {"periods": 1, "samples": 20},
+    "optimiser": {"methods": {"sqp": {"evaluations": 12}, "mma": {"evaluations": 12}}},
+    "solver": {"accuracy": "draft"},
+    "response": {"cycles": 1, "samples": 21},
+    "sweep": {"direction": {"points": 3}, "frequency": {"points": 2}, "periods": 1},
+    "presets": {},
+}
+ROOMS = ("experiments", "pipeline", "profiles", "reports", "sim")
+FILES = ("Snakefile", "Makefile", "requirements.lock", ".gitignore")
+_NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
+_DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
+_CAP_DAC_OVERRIDE, _PR_CAPBSET_DROP = 1, 24
+
+Ended = subprocess.CompletedProcess[str]
+
+
+@dataclass(frozen=True)
+class Checkout:
+    """A folder that holds the repository, and what a user does there."""
+
+    root: Path
+    shares_not: tuple[str, ...] = ("NUMBA_CACHE_DIR",)  # loops are cached by folder
+
+    @classmethod
+    def made(cls, root: Path) -> Checkout:
+        """A copy of the working tree, its study added, committed as a whole."""
+        for room in ROOMS:
+            shutil.copytree(ROOT / room, root / room, ignore=shutil.ignore_patterns("__pycache__"))
+        for name in FILES:
+            shutil.copy2(ROOT / name, root)
+        (root / ".venv").symlink_to(sys.prefix)
+        problem = yaml.safe_load((ROOT / "experiments/fig2/problem.yaml").read_text())
+        target = root / f"experiments/{STUDY}/problem.yaml"
+        target.parent.mkdir()
+        target.write_text(yaml.safe_dump(_laid_over(problem, SMALLER), sort_keys=False))
+        made = cls(root)
+        made._git("init", "--quiet")
+        made._git("add", "--all")
+        made._git(
+            *("-c", "user.name=Test", "-c", "user.email=test@localhost"),
+            *("commit", "--quiet", "--message", "A copy"),
+        )
+        return made
+
+    def copied(self, root: Path) -> Checkout:
+        """Another checkout of the same commit, in which nothing is built."""
+        built = shutil.ignore_patterns("results", ".snakemake", ".cache")
+        shutil.copytree(self.root, root, symlinks=True, ignore=built)
+        return Checkout(root, self.shares_not)
+
+    def take_kernels(self, root: Path) -> None:
+        """Compiled loops of another checkout with the same sources, which Numba files by folder."""
+        locate = numba.core.caching.UserProvidedCacheLocator.get_suitable_cache_subpath
+        there, here = (locate(str(folder / "sim/band.py")) for folder in (root, self.root))  # type: ignore[no-untyped-call]
+        for folder in root.glob(f".cache/numba/*/{there}"):
+            target = self.root / folder.relative_to(root).with_name(here)
+            shutil.copytree(folder, target, dirs_exist_ok=True)
+
+    @property
+    def problem(self) -> Path:
+        return self.root / f"experiments/{STUDY}/problem.yaml"
+
+    @property
+    def results(self) -> Path:
+        return self.root / f"results/{STUDY}"
+
+    def edit(self, old: str, new: str) -> None:
+        text = self.problem.read_text()
+        assert old in text
+        self.problem.write_text(text.replace(old, new, 1))
+
+    def make(self, target: str = STUDY, before: Callable[[], None] | None = None) -> Ended:
+        return self._run(["make", *_NO_SETUP, target], before)
+
+    def snakemake(self, target: str = STUDY) -> Ended:
+        return self._run([".venv/bin/snakemake", target])
+
+    def stage(self, module: str, *words: str, before: Callable[[], None] | None = None) -> Ended:
+        problem = f"experiments/{STUDY}/problem.yaml"
+        command = [".venv/bin/python", "-m", module, "--problem", problem, *words]
+        return self._run(command, before)
+
+    def start(self, target: str = STUDY) -> subprocess.Popen[str]:
+        """`make` in a process group of its own; the output is a pipe."""
+        return subprocess.Popen(
+            ["make", *_NO_SETUP, target],
+            cwd=self.root,
+            env=self._environment(),
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+
+    def built(self, study: str = STUDY) -> dict[str, bytes]:
+        """Content of all datasets and of the report, by name."""
+        folder = self.root / "results" / study
+        paths = [*folder.glob("*.nc"), *folder.glob("report/**/*")]
+        return {
+            path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in sorted(paths)
+            if path.is_file()
+        }
+
+    def stages(self, name: str) -> list[psutil.Process]:
+        """The running Python processes of a stage, e.g. `pipeline.design`."""
+        return [process for process in self.jobs() if name in _words(process)[1:4]]
+
+    def jobs(self) -> list[psutil.Process]:
+        """All that the workflow of this checkout has started and that still runs."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if process.environ().get(RUN_MARK) == str(self.root):
+                    found.append(process)
+            except psutil.Error:
+                continue
+        return found
+
+    def _git(self, *words: str) -> None:
+        environment = os.environ | _NOBODYS | _DATED
+        subprocess.run(["git", *words], cwd=self.root, env=environment, check=True)
+
+    def _run(self, command: list[str], before: Callable[[], None] | None = None) -> Ended:
+        return subprocess.run(
+            command,
+            cwd=self.root,
+            env=self._environment(),
+            text=True,
+            capture_output=True,
+            check=False,
+            preexec_fn=before,
+        )
+
+    def _environment(self) -> dict[str, str]:
+        """Of a user's shell: the checkout has its own caches."""
+        return {name: value for name, value in os.environ.items() if name not in self.shares_not}
+
+
+_NO_SETUP = ("--old-file=.venv/requirements.lock", "--old-file=setup")
+
+
+def _words(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:
+        return []
+
+
+def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(below)
+    for key, value in above.items():
+        nested = isinstance(value, dict) and value and isinstance(merged.get(key), dict)
+        merged[key] = _laid_over(merged[key], value) if nested else value
+    return merged
+
+
+def wait_until(condition: Callable[[], bool], run: subprocess.Popen[str]) -> None:
+    """Looks a thousand times a second, as long as the run lasts."""
+    end = time.monotonic() + 240
+    while not condition():
+        assert run.poll() is None, f"ended before the moment came: {run.communicate()[0]}"
+        assert time.monotonic() < end, "the moment did not come"
+        time.sleep(0.001)
+
+
+def with_ordinary_rights() -> None:
+    """Takes from root, for the program to be run, the right to write where modes forbid it."""
+    if os.geteuid() == 0:
+        assert ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE) == 0
+
+
+def assert_one_message(ended: Ended, *parts: str) -> None:
+    """The command failed and said why on one screen, with file, key and remedy."""
+    told = ended.stdout + ended.stderr
+    assert ended.returncode != 0
+    assert told.count("error: ") == 1, told
+    assert "Traceback" not in told
+    assert "remedy:" in told
+    assert len(told.splitlines()) <= 24
+    for part in parts:
+        assert part in told, told
+
+
+def assert_plain(text: str) -> None:
+    """No bars, colours or other control characters: readable in a file."""
+    assert not re.search(r"[^\S\n ]|[\x00-\x09\x0b-\x1f\x7f-\x9f]", text), repr(text)

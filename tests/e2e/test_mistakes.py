@@ -1,0 +1,92 @@
+"""Mistakes and refusals meet the real stages: one message, an exit code, and nothing lost."""
+
+from __future__ import annotations
+
+import resource
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from tests.e2e.checkout import STUDY, Checkout, assert_one_message, with_ordinary_rights
+
+BAD_PROBLEMS = {
+    "unknown key": ("spacing: 15 mm", "spacng: 15 mm", "lattice.spacng"),
+    "missing unit": ("spacing: 15 mm", "spacing: 15", "lattice.spacing"),
+    "wrong unit": ("density: 6.18 kg/m^2", "density: 6.18 kg", "material.density"),
+    "negative stiffness": (
+        "axial_stiffness: 120 N/mm",
+        "axial_stiffness: -120 N/mm",
+        "material.axial_stiffness",
+    ),
+    "cloak outside the lattice": ("radius: 22 mm", "radius: 220 mm", "cloak.disc.radius"),
+    "infeasible constraint": ("edge_length: 5 mm", "edge_length: 12 mm", "constraints.edge_length"),
+    "drive on a clamped unit": ("units: centre", "units: corners", "drive.units"),
+}
+DESIGN = ("--method", "mma", "--out")
+
+
+@pytest.mark.parametrize(("old", "new", "key"), BAD_PROBLEMS.values(), ids=BAD_PROBLEMS)
+def test_a_bad_problem(fresh: Checkout, old: str, new: str, key: str) -> None:
+    fresh.edit(old, new)
+    place = f"experiments/{STUDY}/problem.yaml, line"
+    for ended in (fresh.make(), fresh.stage("pipeline.design", *DESIGN, "x.nc")):
+        assert_one_message(ended, place, key, "value:")
+    assert not (fresh.root / "x.nc").exists()
+    assert not fresh.results.exists()
+
+
+def test_a_bad_problem_leaves_results_alone(undisturbed: Checkout) -> None:
+    before, text = undisturbed.built(), undisturbed.problem.read_text()
+    undisturbed.edit("columns: 5", "columns: five")
+    ended = undisturbed.make()
+    undisturbed.problem.write_text(text)
+    assert_one_message(ended, "lattice.columns")
+    assert undisturbed.built() == before
+
+
+def test_a_truncated_or_foreign_design(undisturbed: Checkout, tmp_path: Path) -> None:
+    truncated, foreign = tmp_path / "truncated.nc", tmp_path / "foreign.nc"
+    whole = (undisturbed.results / "design.nc").read_bytes()
+    truncated.write_bytes(whole[: len(whole) // 2])
+    xr.Dataset({"temperature": ("x", np.zeros(3))}).to_netcdf(foreign)
+    for path in (truncated, foreign, tmp_path / "missing.nc"):
+        out = tmp_path / "response.nc"
+        for module, more in (
+            ("pipeline.simulate", ("--out", str(out))),
+            ("reports.build", ("--out-dir", str(tmp_path / "report"))),
+        ):
+            results = undisturbed.results
+            others = ("--response", str(results / "response.nc"), "--sweep")
+            given = (*others, str(results / "sweep.nc")) if module == "reports.build" else ()
+            ended = undisturbed.stage(module, "--design", str(path), *given, *more)
+            assert_one_message(ended, f"file:   {path}")
+        assert not out.exists()
+
+
+def test_a_folder_that_is_read_only(fresh: Checkout) -> None:
+    folder = fresh.root / "results"
+    folder.mkdir(mode=0o555)
+    for ended in (
+        fresh.make(before=with_ordinary_rights),
+        fresh.stage("pipeline.design", *DESIGN, "results/x/x.nc", before=with_ordinary_rights),
+    ):
+        assert_one_message(ended, "results")
+
+
+def test_a_disk_with_too_little_room(undisturbed: Checkout, tmp_path: Path) -> None:
+    def little_room() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (16 << 10, 16 << 10))
+
+    design = str(undisturbed.results / "design.nc")
+    out = tmp_path / "response.nc"
+    out.write_bytes(b"what was there")
+    ended = undisturbed.stage(
+        *("pipeline.simulate", "--design", design, "--out", str(out)), before=little_room
+    )
+    assert_one_message(ended, "the file would be too large", str(tmp_path))
+    assert out.read_bytes() == b"what was there"
+    assert list(tmp_path.iterdir()) == [out]

@@ -1,0 +1,121 @@
+"""Whatever ends `make`, the same command goes on, and ends with the same bytes."""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.e2e.checkout import Checkout, assert_plain, wait_until
+
+HEADER = struct.Struct("<4sQI")
+METHODS = ("sqp", "mma")
+
+Run = subprocess.Popen[str]
+
+
+def records(journal: Path) -> list[bytes]:
+    """The whole records of a journal; the first one is its key."""
+    content, found = journal.read_bytes(), []
+    while len(content) >= HEADER.size:
+        _, length, _ = HEADER.unpack(content[: HEADER.size])
+        if len(content) < HEADER.size + length:
+            break
+        found.append(content[: HEADER.size + length])
+        content = content[HEADER.size + length :]
+    return found
+
+
+def journal(checkout: Checkout, method: str) -> list[bytes]:
+    """Records of a method's journal; none as long as there is no such file."""
+    return [
+        record
+        for path in checkout.results.glob(f".journal/*/{method}.journal")
+        for record in records(path)
+    ]
+
+
+def kill_everything(run: Run, checkout: Checkout) -> None:
+    """As the end of a session, a container or the power does."""
+    del checkout
+    os.killpg(run.pid, signal.SIGKILL)
+    run.communicate()
+
+
+def kill_make(run: Run, checkout: Checkout) -> None:
+    """The stages live on for a while."""
+    del checkout
+    run.kill()
+    run.wait()
+
+
+def kill_stage(run: Run, checkout: Checkout) -> None:
+    """As the kernel does when memory runs out."""
+    stages = checkout.stages("pipeline.design")
+    for stage in stages:
+        stage.kill()
+    told = run.communicate()[0]
+    assert stages
+    assert run.returncode != 0
+    assert "Error in rule design" in told
+    assert "Traceback" not in told
+    assert_plain(told)
+
+
+def press_ctrl_c(run: Run, checkout: Checkout) -> None:
+    os.killpg(run.pid, signal.SIGINT)
+    told = run.communicate(timeout=60)[0]
+    assert run.returncode != 0
+    assert "interrupted: the same command goes on from here" in told
+    assert told.splitlines()[-1].startswith("make: ***")
+    assert "Traceback" not in told
+    assert_plain(told)
+    assert not checkout.jobs()
+    assert not list(checkout.root.glob(".snakemake/locks/*"))
+
+
+def test_no_end_at_any_moment_changes_the_results(undisturbed: Checkout, fresh: Checkout) -> None:
+    def there_is(*patterns: str) -> Callable[[], bool]:
+        return lambda: any(list(fresh.results.glob(pattern)) for pattern in patterns)
+
+    def evaluated(count: int) -> Callable[[], bool]:
+        return lambda: len(journal(fresh, "sqp")) > count
+
+    ends: list[tuple[str, Callable[[], bool], Callable[[Run, Checkout], None]]] = [
+        ("before the first evaluation", there_is("logs/design_sqp.log"), kill_everything),
+        ("early in an optimisation", evaluated(2), kill_stage),
+        ("later in it", evaluated(5), press_ctrl_c),
+        ("still later", evaluated(8), kill_everything),
+        ("while a design is written", there_is(".design_*.nc.part"), kill_everything),
+        ("while it is simulated", there_is("logs/simulate.log", "logs/sweep_*.log"), kill_make),
+        ("while that is written", there_is(".response.nc.part", ".sweep_*.part"), kill_everything),
+        ("while the report is drawn", there_is("logs/report.log"), kill_everything),
+    ]
+    for moment, has_come, end in ends:
+        before = {method: journal(fresh, method) for method in METHODS}
+        run = fresh.start()
+        wait_until(has_come, run)
+        end(run, fresh)
+        for method, known in before.items():
+            assert journal(fresh, method)[: len(known)] == known, f"{moment}: evaluations lost"
+    ended = fresh.make()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert fresh.built() == undisturbed.built()
+    for method in METHODS:
+        assert journal(fresh, method) == journal(undisturbed, method)
+    assert not list(fresh.results.glob("**/*.part"))
+    assert not fresh.jobs()
+
+
+def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:
+    run = fresh.start()
+    wait_until((fresh.results / "logs/design_sqp.log").exists, run)
+    ended = fresh.make()
+    assert ended.returncode != 0
+    assert "snakemake is already at work in this folder" in ended.stderr
+    assert "remedy:" in ended.stderr
+    assert run.poll() is None
+    kill_everything(run, fresh)

@@ -1,0 +1,65 @@
+"""Builds of `fig2@quick` that take minutes: from nothing in two folders, and killed at random."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.e2e.checkout import Checkout
+
+TARGET = "fig2@quick"
+KILLS = 12
+OWN_CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+    """A checkout in which everything was compiled and built from nothing."""
+    made = Checkout.made(tmp_path_factory.mktemp("first") / "checkout")
+    return build(replace(made, shares_not=OWN_CACHES))
+
+
+def build(checkout: Checkout) -> Checkout:
+    ended = checkout.make(TARGET)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return checkout
+
+
+def test_builds_from_nothing_have_the_same_bytes(first: Checkout, tmp_path: Path) -> None:
+    second = build(first.copied(tmp_path / "a deeper folder/größer"))
+    assert second.built(TARGET) == first.built(TARGET)
+
+
+def test_compiled_just_now_or_long_ago_the_bytes_are_the_same(
+    first: Checkout, tmp_path: Path
+) -> None:
+    second = first.copied(tmp_path / "checkout")
+    second.take_kernels(first.root)
+    assert build(second).built(TARGET) == first.built(TARGET)
+
+
+@pytest.mark.parametrize("kill", [os.killpg, os.kill], ids=["everything", "make"])
+def test_kills_at_random_moments(
+    first: Checkout, tmp_path: Path, kill: Callable[[int, int], None]
+) -> None:
+    checkout = first.copied(tmp_path / "checkout")
+    checkout.take_kernels(first.root)
+    moments = random.Random(0)
+    for _ in range(KILLS):
+        run = checkout.start(TARGET)
+        try:
+            run.wait(moments.uniform(1.0, 12.0))
+        except subprocess.TimeoutExpired:
+            kill(run.pid, signal.SIGKILL)
+        if kill is os.kill:
+            run.wait()  # what it started lives on and holds the pipe
+        else:
+            run.communicate()
+    assert build(checkout).built(TARGET) == first.built(TARGET)
