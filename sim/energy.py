@@ -15,17 +15,17 @@ from jax import Array
 class LigamentLaw(NamedTuple):
     """Stiffness of a ligament: axial and shear in N/mm, bending in N mm/rad."""
 
-    axial: Array
-    shear: Array
-    bending: Array
+    axial: float | Array
+    shear: float | Array
+    bending: float | Array
 
 
 class ContactLaw(NamedTuple):
     """Contact of two units on the void angle: N mm/rad^2, rad, rad."""
 
-    stiffness: Array
-    barrier: Array
-    cutoff: Array
+    stiffness: float | Array
+    barrier: float | Array
+    cutoff: float | Array
 
 
 def rotate(vector: Array, angle: Array) -> Array:
@@ -67,7 +67,7 @@ def ligament_energy(
     )
 
 
-def contact_energy(void_angle: Array, law: ContactLaw) -> Array:
+def contact_energy(void_angle: float | Array, law: ContactLaw) -> Array:
     """Energy of one void that closes below the cutoff, infinite at the barrier, N mm.
 
     With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1)

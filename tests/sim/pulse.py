@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Numbers
 from sim.explicit import ExplicitSolver
 from tests.sim.structures import Rig, rotating_squares
 
@@ -24,7 +24,7 @@ class Pulse(NamedTuple):
     duration: float
     direction: float
 
-    def __call__(self, times: Array) -> Array:
+    def __call__(self, times: Numbers) -> Array:
         push = self.amplitude * jnp.sin(jnp.pi * times / (2 * self.duration)) ** 6
         c, s = jnp.cos(self.direction), jnp.sin(self.direction)
         return jnp.stack([c * push, s * push, 0.02 * push], axis=-1)

@@ -38,7 +38,7 @@ def paper_material() -> Material:
     return Material(density, 120.0, shear, bending, 1.5, *damping)
 
 
-def scene_a(directions: tuple[float, ...] = (45.0,), **changes: Any) -> Scene:
+def scene_a(directions: tuple[float, ...] = (45.0,), **changes: Any) -> Scene:  # noqa: ANN401
     """Figure 2: corners clamped, centre driven for two periods."""
     lattice = paper_lattice()
     distance = np.linalg.norm(lattice.site - lattice.site[112], axis=1)
@@ -61,7 +61,7 @@ def scene_a(directions: tuple[float, ...] = (45.0,), **changes: Any) -> Scene:
 
 
 def compressed(name: str) -> Scene:
-    """Scenes B and C: left column clamped, right column pushed in by a load parameter of 1 mm a unit."""
+    """Scenes B and C: left column clamped, right column pushed in by the load parameter, mm."""
     lattice = paper_lattice()
     left = 15 * np.arange(15)
     return Scene(

@@ -39,7 +39,7 @@ def rotating_squares(side: int = 5, bias_deg: float = 20.0) -> Lattice:
 
 
 def mixed_polygons() -> Lattice:
-    """A hexagon with a triangle at each corner, the triangles chained, and a pentagon at one end."""
+    """A hexagon with a triangle at each corner, chained to a ring, and a pentagon at one end."""
     ring = np.deg2rad(60.0) * np.arange(6)
     outward = np.stack([np.cos(ring), np.sin(ring)], axis=1)
     across = np.stack([-np.sin(ring), np.cos(ring)], axis=1)

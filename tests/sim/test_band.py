@@ -5,6 +5,7 @@ import pytest
 
 from sim.arrays import Floats
 from sim.band import factorise, number_free_dofs, solve
+from sim.lattice import Lattice
 from tests.sim.structures import mixed_polygons, rotating_squares
 
 
@@ -45,7 +46,7 @@ def test_a_matrix_with_nan_is_not_positive_definite() -> None:
 @pytest.mark.parametrize(
     "lattice", [rotating_squares(6), mixed_polygons()], ids=["squares", "mixed"]
 )
-def test_numbering_covers_the_free_dofs_within_its_bandwidth(lattice) -> None:
+def test_numbering_covers_the_free_dofs_within_its_bandwidth(lattice: Lattice) -> None:
     held = np.array([0, 1, 2, 9, 13])
     free, width = number_free_dofs(lattice.n_units, lattice.ligament_units, held)
     assert (free[held] == -1).all()

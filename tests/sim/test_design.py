@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.design import Symmetry, design_space
 from sim.arrays import Floats, Ints
+from sim.design import Symmetry, design_space
 from sim.lattice import quads
 from tests.sim.structures import mixed_polygons, rotating_squares
 

@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim import kernels
+from sim.arrays import Floats
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, ligament_energy
 from sim.geometry import shape
-from sim.arrays import Floats
 from sim.kernels import Network
 from sim.lattice import Lattice
-from sim.model import parameters, topology
+from sim.model import Values, parameters, topology
 from sim.plan import concrete_parameters
 from tests.sim.reference_scenes import compressed, reference
 from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, mixed_polygons, rotating_squares
@@ -25,7 +25,8 @@ def network(lattice: Lattice) -> tuple[Network, Floats]:
     """Kernel arrays of a lattice at rest, and its centroids."""
     made = shape(lattice, lattice.vertices)
     top = topology(lattice, np.array([], dtype=np.int64), BARRIER, CUTOFF)
-    return top.network(parameters(lattice, made, MATERIAL)), np.asarray(made.centroid)
+    values = Values(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+    return top.network(values), np.asarray(made.centroid)
 
 
 SQUARES, MIXED = network(rotating_squares()), network(mixed_polygons())

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,8 +9,8 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from shapely.affinity import rotate
 
-from sim.geometry import block_angles, edge_lengths, inertia, shape, void_angles
 from sim.arrays import Floats
+from sim.geometry import block_angles, edge_lengths, inertia, shape, void_angles
 from sim.lattice import Lattice
 from tests.sim.structures import mixed_polygons, rotating_squares
 
@@ -42,7 +44,7 @@ def polar_by_triangles(polygon: Polygon) -> float:
     """Second moment about the centroid: exact quadrature on the fan of triangles about a vertex."""
     ring = np.array(polygon.exterior.coords)[:-1] - polygon.centroid.coords[0]
     total = 0.0
-    for one, two in zip(ring[1:-1], ring[2:], strict=True):
+    for one, two in pairwise(ring[1:]):
         area = 0.5 * np.linalg.det([one - ring[0], two - ring[0]])
         middles = [(ring[0] + one) / 2, (one + two) / 2, (two + ring[0]) / 2]
         total += area * np.mean([m @ m for m in middles])
@@ -79,9 +81,9 @@ def test_void_angles_of_rotating_squares() -> None:
 
 @given(turn=st.floats(-90.0, 90.0))
 def test_void_angles_are_unwrapped_from_minus_45_to_315_degrees(turn: float) -> None:
-    """Two squares at one ligament; the second turns about its end of it and opens a void that wide."""
+    """Two squares at one ligament; the second turns about its end of it."""
     lattice = rotating_squares(2, bias_deg=0.0)
-    first, second = lattice.ligaments[0]
+    second = lattice.ligaments[0, 1]
     unit = lattice.unit == lattice.unit[second]
     corner = lattice.vertices[second]
     angle = 2.0 * turn if turn > 0 else turn

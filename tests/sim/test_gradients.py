@@ -1,9 +1,9 @@
 """Gradients of the solvers are those of the discrete solutions that they return.
 
-Each quantity is varied along a random direction of its own: relative for constants, mm for the design. The
-Taylor test takes the steps of ``TAYLOR``; with contact those of ``TAYLOR_IN_CONTACT``, so small that no void
-of the compared states crosses the contact's cutoff (asserted): there the energy's third derivative jumps.
-The solvers stop their Newton iterations far below the differences that are compared.
+Each quantity is varied along a random direction of its own: relative for constants, mm for the
+design. The Taylor test takes the steps of ``TAYLOR``; with contact those of ``TAYLOR_IN_CONTACT``,
+so small that no void of the compared states crosses the contact's cutoff (asserted): there the
+energy's third derivative jumps. Newton's iterations stop far below the compared differences.
 """
 
 from __future__ import annotations
@@ -144,10 +144,9 @@ class Ray:
         """Which ligaments are in contact when."""
         watching = replace(self.solver, asked=times)  # type: ignore[type-var]
         values = self.rig.parameters(self.at(step))
-        motion = simulate(
-            watching, values, (Drive(self.rig.driven, self.at(step).drive),)
-        ).displacement[0]
-        return self.rig.topology.smallest_void_angles(values.void, motion) < CUTOFF
+        drive = Drive(self.rig.driven, self.at(step).drive)
+        motion = np.asarray(simulate(watching, values, (drive,)).displacement[0])
+        return self.rig.topology.smallest_void_angles(np.asarray(values.void), motion) < CUTOFF
 
 
 def assert_exact(ray: Ray) -> None:

@@ -11,10 +11,10 @@ import pytest
 from jax import Array
 
 from sim import kernels
+from sim.arrays import Floats, Ints, Numbers
 from sim.band import number_free_dofs
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.geometry import shape
-from sim.arrays import Floats, Ints
 from sim.kernels import Network, Sensitivity
 from sim.lattice import Lattice, quads
 from tests.sim.structures import BARRIER, CUTOFF, mixed_polygons
@@ -73,17 +73,24 @@ def random_case(request: pytest.FixtureRequest) -> Case:
     return case(build(), seed)
 
 
-Differentiable = tuple[Array, Array, Array, Array, Array]
+class Differentiable(NamedTuple):
+    """The numbers that a network's energy depends on, besides the motion."""
+
+    arm: Numbers
+    vector: Numbers
+    void: Numbers
+    law: Numbers
+    stiffness: Numbers
 
 
 def numbers(net: Network) -> Differentiable:
-    return tuple(map(jnp.asarray, (net.arm, net.vector, net.void, net.law, net.contact[:, 0])))
+    return Differentiable(net.arm, net.vector, net.void, net.law, net.contact[:, 0])
 
 
-def definition(motion: Array, parts: Differentiable, unit: Floats) -> Array:
+def definition(motion: Numbers, parts: Differentiable, unit: Ints) -> Array:
     """Energy of the network, summed from the law of one ligament and of one contact."""
-    arm, vector, void, law, stiffness = parts
-    of_units = motion.reshape(-1, 3)
+    arm, vector, void, law, stiffness = map(jnp.asarray, parts)
+    of_units = jnp.asarray(motion).reshape(-1, 3)
     a, b = of_units[unit[:, 0]], of_units[unit[:, 1]]
 
     def ligament(a: Array, b: Array, arm: Array, vector: Array, law: Array) -> Array:
@@ -103,7 +110,7 @@ hessian_of_definition = jax.jit(jax.hessian(definition))
 
 @jax.jit
 def mixed_of_definition(
-    motion: Array, parts: Differentiable, unit: Floats, direction: Array
+    motion: Numbers, parts: Differentiable, unit: Ints, direction: Numbers
 ) -> Differentiable:
     def along(parts: Differentiable) -> Array:
         return jnp.dot(jax.grad(definition)(motion, parts, unit), direction)
@@ -173,7 +180,7 @@ def test_mixed_derivatives(random_case: Case) -> None:
         assert_equal(one, np.asarray(other))
 
 
-def mixed(of: Case, which: Floats) -> Sensitivity:
+def mixed(of: Case, which: Ints) -> Sensitivity:
     net = of.net
     parts = (net.arm, net.vector, net.void, net.law, net.contact[:, 0])
     out = Sensitivity(*(np.zeros(part.shape) for part in parts))

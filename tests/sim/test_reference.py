@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import Array
 
+from sim.arrays import Floats
 from sim.dynamics import simulate
 from sim.evaluation import structure
 from sim.geometry import shape
-from sim.arrays import Floats
 from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Accuracy, Scene
@@ -26,7 +27,7 @@ from tests.sim.reference_scenes import (
 )
 
 
-def test_lattice_is_the_references():
+def test_lattice_is_the_references() -> None:
     lattice, stored = paper_lattice(), reference("A")
     made = shape(lattice, lattice.vertices)
     offset = stored["block_centroids_mm"][0]
@@ -40,7 +41,7 @@ def test_lattice_is_the_references():
     )
 
 
-def test_inertia_and_damping_are_the_references():
+def test_inertia_and_damping_are_the_references() -> None:
     scene, stored = scene_a(), reference("A")
     values = concrete_parameters(scene, scene.lattice.vertices)
     np.testing.assert_allclose(
@@ -50,7 +51,7 @@ def test_inertia_and_damping_are_the_references():
     np.testing.assert_allclose(values.damping, np.tile(damping, (225, 1)), rtol=1e-7)
 
 
-def test_regions_are_the_references():
+def test_regions_are_the_references() -> None:
     stored = reference("A")
     np.testing.assert_array_equal(scene_a().region, stored["roi_blocks"])
     designed = sum(int(stored[f"mask_{kind}_design"].sum()) for kind in ("horizontal", "vertical"))
@@ -70,7 +71,7 @@ def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
     measure = DisplacementMimicking(scene.region, scene.lattice.spacing, np.ones(len(SAMPLES)))
     of_design = structure(scene)
 
-    def loss(design):
+    def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
         response = simulate(plan.solver, values, scene.drives)
         return measure(response.displacement, values)[0], response.displacement
@@ -105,12 +106,12 @@ def assert_agrees_with_scene_a(found: Outcome, motion: float, loss: float, gradi
     assert relative(found.gradient, by_shifts) <= gradient
 
 
-def test_scene_a_at_default_accuracy(default_a):
+def test_scene_a_at_default_accuracy(default_a: Outcome) -> None:
     assert default_a.integrator == "implicit"
     assert_agrees_with_scene_a(default_a, motion=3e-3, loss=2e-4, gradient=3e-4)
 
 
-def test_scene_a_at_tight_accuracy(tight_a):
+def test_scene_a_at_tight_accuracy(tight_a: Outcome) -> None:
     assert_agrees_with_scene_a(tight_a, motion=1e-4, loss=1e-6, gradient=5e-5)
 
 
@@ -122,13 +123,13 @@ def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicki
 
 
 @pytest.mark.parametrize("name", ["B", "C"])
-def test_final_equilibrium(name):
+def test_final_equilibrium(name: str) -> None:
     scene, stored = compressed(name), reference(name)
     end = np.array([scene.duration])
     plan = make_plan(scene, asked=end)
     measure, of_design = static_measure(scene, name, 1), structure(scene)
 
-    def loss(design):
+    def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
         response = simulate(plan.solver, values, scene.drives)
         return measure(response.displacement, values)[0], response.displacement
@@ -141,7 +142,7 @@ def test_final_equilibrium(name):
     assert relative(np.asarray(gradient), wanted) <= 1e-7
 
 
-def test_path_of_scene_b():
+def test_path_of_scene_b() -> None:
     scene, stored = compressed("B"), reference("B")
     amplitudes = stored["static_path_amps_mm"]
     plan = make_plan(scene, asked=amplitudes)
