@@ -161,8 +161,9 @@ class Checkout:
         )
 
     def _environment(self) -> dict[str, str]:
-        """Of a user's shell: the checkout has its own caches."""
-        return {name: value for name, value in os.environ.items() if name not in self.shares_not}
+        """Of a user's shell, not of `make test`: and the checkout has its own caches."""
+        unwanted = {*self.shares_not, "MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
+        return {name: value for name, value in os.environ.items() if name not in unwanted}
 
 
 _NO_SETUP = ("--old-file=.venv/requirements.lock", "--old-file=setup")
