@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from sim.batch import Case, Measure
+    from sim.batch import Case, Measure, Solved
     from sim.observables import Observables
     from sim.plan import Plan
     from sim.scene import Scene
@@ -154,9 +154,10 @@ def _measure(scene: Scene, vertices: Floats, times: Times) -> Measure[Measured]:
     integral = objective(scene)
     mean = integral._replace(weights=np.full(len(times.sampled), 1 / len(times.sampled)))
 
-    def reduce(case: Case, displacement: Floats, velocity: Floats) -> Measured:
-        solver = case.solver
-        refined, _, _ = solve_case(solver.refined(), case.values, case.drive)
+    def reduce(solved: Solved) -> Measured:
+        case, displacement = solved.case, solved.displacement
+        finer = case.solver.refined(solved.record)
+        refined, _, _ = solve_case(finer, case.values, case.drive)
         refined = refined.reshape(displacement.shape)
         whole, fine = displacement[times.integrated], refined[times.integrated]
         loss, fine_loss = (
@@ -169,7 +170,7 @@ def _measure(scene: Scene, vertices: Floats, times: Times) -> Measure[Measured]:
         region, fine_region = whole[:, scene.region] / scale, fine[:, scene.region] / scale
         return Measured(
             shown,
-            velocity[times.shown],
+            solved.velocity[times.shown],
             observe(scene.topology, case.values, shown),
             float(found.gap.min()),
             int(found.overlaps.max()),

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from sim.batch import Case, Outcome
+    from sim.batch import Outcome, Solved
     from sim.scene import Scene
 
 LOG = logging.getLogger(__name__)
@@ -155,10 +155,9 @@ def _column(
     values = concrete_parameters(at_frequency, vertices)
     measure = objective(at_frequency)
 
-    def reduce(case: Case, displacement: Floats, velocity: Floats) -> tuple[float, float]:
-        del velocity
-        loss = float(measure(displacement[None], case.values)[0])
-        voids = case.solver.topology.smallest_void_angle(case.values.void, displacement)
+    def reduce(solved: Solved) -> tuple[float, float]:
+        loss = float(measure(solved.displacement[None], values)[0])
+        voids = at_frequency.topology.smallest_void_angle(values.void, solved.displacement)
         return loss, float(voids.min())
 
     cases = (Case(values, at_frequency.drives[k], plan.solver) for k in plan.simulated)

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from sim.arrays import Floats
 from sim.dynamics import Drive, Solver, solve_case
@@ -26,6 +26,22 @@ class Case:
 
 
 @dataclass(frozen=True)
+class Solved:
+    """A case that was simulated.
+
+    Attributes:
+        case: the case.
+        displacement, velocity: (n_asked, n_units, 3).
+        record: the solver's.
+    """
+
+    case: Case
+    displacement: Floats
+    velocity: Floats
+    record: Any
+
+
+@dataclass(frozen=True)
 class Outcome(Generic[R]):
     """What came of a case: the measure's value, or why there is none."""
 
@@ -33,8 +49,8 @@ class Outcome(Generic[R]):
     failure: str | None = None
 
 
-Measure = Callable[[Case, Floats, Floats], R]
-"""Reduces a case's displacement and velocity (n_asked, n_units, 3) to what is kept of it."""
+Measure = Callable[[Solved], R]
+"""Reduces a simulated case to what is kept of it."""
 
 
 def run_batch(cases: Iterable[Case], measure: Measure[R], threads: int = 1) -> Iterator[Outcome[R]]:
@@ -59,7 +75,8 @@ def run_batch(cases: Iterable[Case], measure: Measure[R], threads: int = 1) -> I
 def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
     shape = (-1, case.solver.topology.n_units, 3)
     try:
-        displacement, velocity, _ = solve_case(case.solver, case.values, case.drive)
+        displacement, velocity, record = solve_case(case.solver, case.values, case.drive)
     except SimulationError as error:
         return Outcome(None, str(error))
-    return Outcome(measure(case, displacement.reshape(shape), velocity.reshape(shape)))
+    solved = Solved(case, displacement.reshape(shape), velocity.reshape(shape), record)
+    return Outcome(measure(solved))

@@ -80,8 +80,8 @@ class Solver(Protocol):
         """Cases solved side by side."""
         ...
 
-    def refined(self) -> Solver:
-        """A more accurate one of the same kind, to estimate the error by."""
+    def refined(self, record: Any) -> Solver:
+        """One with half the steps that a record was made with, to estimate its error by."""
         ...
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Any]:

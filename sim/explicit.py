@@ -16,7 +16,8 @@ from sim.modes import highest_frequency
 from sim.splitting import BLANES_MOAN, Splitting
 from sim.system import as_values, empty_bars, system_of
 
-MAX_HALVINGS = 6
+MAX_REFINEMENTS = 7
+KEEP_FROM_LIMIT = 0.95
 
 
 @dataclass(frozen=True)
@@ -36,14 +37,14 @@ class Record:
 class ExplicitSolver:
     """Integrates one case explicitly with equal steps (``dynamics.Solver``).
 
-    The step is halved until it is stable for the structure, at rest and, after a run, in the state
-    of closest contact; and as long as the run leaves the admissible states (a void beyond its
-    barrier, a blow-up), up to MAX_HALVINGS times.
+    The step is cut to one that is stable for the structure at rest and, after a run, in the state
+    of closest contact; and halved as long as the run leaves the admissible states (a void beyond
+    its barrier, a blow-up), MAX_REFINEMENTS runs in all.
 
     Attributes:
         topology: the structure.
         duration: s.
-        n_steps: number of steps.
+        n_steps: number of steps to take if that is stable.
         asked: (n_asked,) times of the output, ascending, s.
         threads: cases solved side by side.
         splitting: the method.
@@ -56,35 +57,35 @@ class ExplicitSolver:
     threads: int = 1
     splitting: Splitting = BLANES_MOAN
 
-    def refined(self) -> ExplicitSolver:
-        """The same with twice the steps, to estimate the error by."""
-        return replace(self, n_steps=2 * self.n_steps)
+    def refined(self, record: Record) -> ExplicitSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, n_steps=2 * record.steps.n_steps)
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
-        top, failed = self.topology, -1
+        top = self.topology
         system = system_of(top, values)
-        needed = self._steps_for(highest_frequency(top, values))
-        for halving in range(MAX_HALVINGS + 1):
-            n_steps = self.n_steps * 2**halving
-            if n_steps < needed:
-                continue
-            steps = self._steps(values, drive, n_steps)
-            checkpoints = np.empty((-(-n_steps // steps.segment), 2, top.n_dofs))
+        stable = max(self.n_steps, self._steps_for(highest_frequency(top, values)))
+        for _ in range(MAX_REFINEMENTS):
+            steps = self._steps(values, drive, stable)
+            checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
-            failed = run(steps, self._outputs(n_steps), system, checkpoints, u, v)
-            if failed < 0 and (needed := self._steps_in_contact(values, u)) <= n_steps:
+            failed = run(steps, self._outputs(steps.n_steps), system, checkpoints, u, v)
+            needed = 2 * stable if failed >= 0 else self._steps_in_contact(values, u)
+            if needed <= stable:
                 return u, v, Record(steps, checkpoints)
+            stable = needed
         raise SimulationError(
             f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
-            f" with {self.n_steps * 2**MAX_HALVINGS} steps (a void closed beyond its barrier); try"
-            " a smaller drive or a larger smallest edge",
+            f" with {steps.n_steps} steps (a void closed beyond its barrier); try a smaller drive"
+            " or a larger smallest edge",
             step=failed,
         )
 
     def _steps_for(self, frequency: float) -> int:
         """Steps that are stable at an angular eigenfrequency, rad/s."""
-        return int(np.ceil(self.duration * frequency / self.splitting.stability))
+        limit = KEEP_FROM_LIMIT * self.splitting.stability
+        return int(np.ceil(self.duration * frequency / limit))
 
     def _steps_in_contact(self, values: Values, states: Floats) -> int:
         """Steps that are stable in the one of the states whose contact is closest, 0 if none is."""

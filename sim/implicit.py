@@ -63,9 +63,9 @@ class ImplicitSolver:
     turn_allowance: float = np.inf
     tableau: Tableau = ESDIRK3
 
-    def refined(self) -> ImplicitSolver:
-        """The same with every step cut in two, to estimate the error by."""
-        return replace(self, times=grid.halved(self.times))
+    def refined(self, record: Record) -> ImplicitSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, times=grid.halved(record.times))
 
     def touching(self, values: Values) -> Ints:
         """Ligaments in which contact is computed."""

@@ -49,8 +49,9 @@ class StaticSolver:
     absolute: float = 1e-11
     threads: int = 1
 
-    def refined(self) -> StaticSolver:
-        """The same to a hundred times tighter a tolerance, to estimate the error by."""
+    def refined(self, record: Record) -> StaticSolver:
+        """The same to a hundred times tighter a tolerance: equilibria have no steps to halve."""
+        del record
         return replace(self, relative=self.relative / 100)
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:

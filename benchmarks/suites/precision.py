@@ -16,6 +16,8 @@ from benchmarks.frame import Benchmark, Candidate, Run, Sample, Target, error_of
 from sim.dynamics import Solver, simulate
 from sim.evaluation import structure
 from sim.explicit import ExplicitSolver
+from sim.grid import halved
+from sim.implicit import ImplicitSolver
 from sim.objectives import DisplacementMimicking
 from sim.plan import make_plan
 from sim.scene import Accuracy, Scene
@@ -84,9 +86,11 @@ def _scene() -> Scene:
 def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
     asked = replace(scene, accuracy=accuracy, integrator="implicit")
     solver = make_plan(asked, asked=SAMPLES).solver
+    assert isinstance(solver, ImplicitSolver)
+    times = solver.times
     for _ in range(halvings):
-        solver = solver.refined()
-    return solver
+        times = halved(times)
+    return replace(solver, times=times)
 
 
 def _explicit(method: str, n_steps: int, scene: Scene) -> Solver:
