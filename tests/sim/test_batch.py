@@ -39,7 +39,8 @@ def test_outcomes_come_in_order(threads: int) -> None:
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_failed_case_is_kept_with_its_reason(threads: int) -> None:
-    outcomes: list[Outcome[float]] = list(run_batch(cases([0.1, float("nan"), 0.2]), largest, threads))
+    three = cases([0.1, float("nan"), 0.2])
+    outcomes: list[Outcome[float]] = list(run_batch(three, largest, threads))
     assert [outcome.value is None for outcome in outcomes] == [False, True, False]
     assert "finite" in str(outcomes[1].failure)
 
