@@ -50,11 +50,18 @@ class Drive(NamedTuple):
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
-        return np.asarray(held_values(held, self.units, self.motion, times))
+        every = held_values(held, self.units, self.motion, _padded(times))
+        return np.asarray(every)[: len(times)]
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """Their rates of change, per s."""
-        return np.asarray(_held_rates(held, self.units, self.motion, times))
+        every = _held_rates(held, self.units, self.motion, _padded(times))
+        return np.asarray(every)[: len(times)]
+
+
+def _padded(times: Floats) -> Floats:
+    """The times, up to a power of 2 with copies of the last: JAX compiles for every new length."""
+    return np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
 
 
 def _held_rates(held: Ints, units: Ints, motion: Motion, times: Floats) -> Array:

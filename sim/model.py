@@ -151,10 +151,10 @@ class Topology:
         contact[:, 1], contact[:, 2] = self.barrier, self.cutoff
         return Network(
             unit=self.ligament_units,
-            arm=np.array(values.arm, dtype=float),
-            vector=np.array(values.vector, dtype=float),
-            void=np.array(values.void, dtype=float),
-            law=np.array(values.law, dtype=float),
+            arm=np.array(values.arm, dtype=float, order="C"),
+            vector=np.array(values.vector, dtype=float, order="C"),
+            void=np.array(values.void, dtype=float, order="C"),
+            law=np.array(values.law, dtype=float, order="C"),
             contact=contact,
             touching=np.arange(n) if touching is None else touching,
         )

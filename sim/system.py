@@ -86,8 +86,8 @@ def system_of(topology: Topology, values: Values, touching: Ints | None = None) 
     free, width = topology.numbering
     return System(
         net=topology.network(values, touching),
-        mass=np.array(values.mass, dtype=float).ravel(),
-        damping=np.array(values.damping, dtype=float).ravel(),
+        mass=np.array(values.mass, dtype=float, order="C").ravel(),
+        damping=np.array(values.damping, dtype=float, order="C").ravel(),
         free=free,
         dofs=topology.free_dofs,
         held=topology.held,

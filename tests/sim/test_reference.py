@@ -11,7 +11,7 @@ import pytest
 from jax import Array
 
 from sim.arrays import Floats
-from sim.dynamics import simulate
+from sim.dynamics import simulate, solve_case
 from sim.evaluation import structure
 from sim.geometry import shape
 from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
@@ -113,6 +113,25 @@ def test_scene_a_at_default_accuracy(default_a: Outcome) -> None:
 
 def test_scene_a_at_tight_accuracy(tight_a: Outcome) -> None:
     assert_agrees_with_scene_a(tight_a, motion=1e-4, loss=1e-6, gradient=5e-5)
+
+
+def test_error_estimate_by_halving_the_steps() -> None:
+    """Each step cut in two: what changes is the true error within a factor of 3."""
+    scene, stored = scene_a(), reference("A")
+    solver = make_plan(scene, asked=SAMPLES).solver
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    scale = np.array([15.0, 15.0, 1.0])
+
+    def in_region(motion: Floats) -> Floats:
+        return motion.reshape(len(SAMPLES), -1, 3)[:, scene.region] / scale
+
+    coarse, _, record = solve_case(solver, values, scene.drives[0])
+    fine = solve_case(solver.refined(record), values, scene.drives[0])[0]
+    found, finer = in_region(coarse), in_region(fine)
+    exact = stored["roi_displacement_tight_mm_mm_rad"] / scale
+    assert 1 / 3 < relative(found, finer) / relative(found, exact) < 3
+    losses = [float(np.sum(motion**2)) for motion in (found, finer, exact)]
+    assert 1 / 3 < (losses[0] - losses[1]) / (losses[0] - losses[2]) < 3
 
 
 def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicking:
