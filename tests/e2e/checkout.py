@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import re
 import shutil
@@ -37,7 +36,6 @@ ROOMS = ("experiments", "pipeline", "profiles", "reports", "sim")
 FILES = ("Snakefile", "Makefile", "requirements.lock", ".gitignore")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
-_CAP_DAC_OVERRIDE, _PR_CAPBSET_DROP = 1, 24
 
 Ended = subprocess.CompletedProcess[str]
 
@@ -97,16 +95,16 @@ class Checkout:
         assert old in text
         self.problem.write_text(text.replace(old, new, 1))
 
-    def make(self, target: str = STUDY, before: Callable[[], None] | None = None) -> Ended:
-        return self._run(["make", *_NO_SETUP, target], before)
+    def make(self, target: str = STUDY, first: str = "") -> Ended:
+        return self._run(["make", *_NO_SETUP, target], first)
 
     def snakemake(self, target: str = STUDY) -> Ended:
         return self._run([".venv/bin/snakemake", target])
 
-    def stage(self, module: str, *words: str, before: Callable[[], None] | None = None) -> Ended:
+    def stage(self, module: str, *words: str, first: str = "") -> Ended:
         problem = f"experiments/{STUDY}/problem.yaml"
         command = [".venv/bin/python", "-m", module, "--problem", problem, *words]
-        return self._run(command, before)
+        return self._run(command, first)
 
     def start(self, target: str = STUDY) -> subprocess.Popen[str]:
         """`make` in a process group of its own; the output is a pipe."""
@@ -149,15 +147,16 @@ class Checkout:
         environment = os.environ | _NOBODYS | _DATED
         subprocess.run(["git", *words], cwd=self.root, env=environment, check=True)
 
-    def _run(self, command: list[str], before: Callable[[], None] | None = None) -> Ended:
+    def _run(self, command: list[str], first: str = "") -> Ended:
+        """Runs a command, by a process that obeys the Python statements `first`."""
+        then = "\nimport os, sys\nos.execvp(sys.argv[1], sys.argv[1:])"
         return subprocess.run(
-            command,
+            [sys.executable, "-c", first + then, *command] if first else command,
             cwd=self.root,
             env=self._environment(),
             text=True,
             capture_output=True,
             check=False,
-            preexec_fn=before,
         )
 
     def _environment(self) -> dict[str, str]:
@@ -191,12 +190,6 @@ def wait_until(condition: Callable[[], bool], run: subprocess.Popen[str]) -> Non
         assert run.poll() is None, f"ended before the moment came: {run.communicate()[0]}"
         assert time.monotonic() < end, "the moment did not come"
         time.sleep(0.001)
-
-
-def with_ordinary_rights() -> None:
-    """Takes from root, for the program to be run, the right to write where modes forbid it."""
-    if os.geteuid() == 0:
-        assert ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE) == 0
 
 
 def assert_one_message(ended: Ended, *parts: str) -> None:
