@@ -15,7 +15,7 @@ from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 from sim.tableau import ESDIRK3, Tableau
 
-MAX_SPLITS = 40
+MAX_SPLITS = 100
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ class Record:
 class StaticSolver:
     """Finds the equilibria of one case at the asked load parameters (``dynamics.Solver``).
 
-    The load parameter takes the place of time; velocities are zero and of no account.
+    The load parameter takes the place of time; the velocities of free dofs are zero.
 
     Attributes:
         topology: the structure.
