@@ -42,7 +42,7 @@ def test_keys_are_unique_and_everything_has_a_group(study: Study) -> None:
         ("mean_reduction", 88.0, "88.0 %"),
         ("mean_reduction_all", 88.0, "88.0 %"),
         ("peak_to_peak_reduction", 88.0, "88.0 %"),
-        ("evaluations_sqp", 120, "120"),
+        ("evaluations_sqp", 160, "160"),
         ("evaluations_mma", 60, "60"),
         ("kkt_sqp", 2e-4, "0.0002"),
         ("map_max", 0.05 + 0.06 * 1.25, "0.1250"),
