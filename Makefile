@@ -44,7 +44,7 @@ $(foreach study,$(STUDIES),$(study)@%): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
 test: setup
-	$(BIN)/python -m pytest -n auto --dist loadfile --ignore tests/clients --ignore tests/slow
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/slow
 
 test-slow: setup
 	$(BIN)/python -m pytest tests/slow
