@@ -21,7 +21,7 @@ class Scene:
 
     Lengths in mm, times in s, frequencies in Hz, directions in degrees. The loss is taken over
     `horizon`, with `weights` of the load cases; `radii` bound the cloak; `middle` is the lattice's
-    centre.
+    centre; `symmetry` is the one imposed on the design.
     """
 
     title: str
@@ -35,6 +35,7 @@ class Scene:
     horizon: float
     radii: tuple[float, ...]
     middle: tuple[float, float]
+    symmetry: str
 
     @property
     def period(self) -> float:
@@ -80,6 +81,7 @@ def of(problem: Problem) -> Scene:
         horizon=problem.horizon_time,
         radii=tuple(radius for radius in (inner, outer) if radius > 0),
         middle=lattice.centre_site,
+        symmetry=problem.optimiser.symmetry,
     )
 
 

@@ -128,7 +128,8 @@ def shape_facts(scene: Scene, design: xr.Dataset) -> Iterator[Fact]:
     rms = float(np.sqrt(np.mean(distances**2)))
     note = (
         "RMS distance of the cloak's vertices from those of the design turned by 90°; "
-        f"largest {worded(float(distances.max()), 'mm', 2)}"
+        f"largest {worded(float(distances.max()), 'mm', 2)}; "
+        + ("imposed here, not in the paper" if scene.symmetry == "C4" else "not imposed")
     )
     yield number(
         "asymmetry",
