@@ -9,13 +9,15 @@ from typing import Any, Literal
 from pipeline.problem.model import Problem
 from pipeline.problem.quantities import SIM_UNITS
 
-Stage = Literal["design", "simulate", "sweep", "report"]
+Stage = Literal["design", "simulate", "sweep", "scatter", "verify", "report"]
 
-_WORDS = ("title", "doc")
+_WORDS = ("title", "doc", "report")
 _UNUSED: dict[Stage, tuple[str, ...]] = {
-    "design": (*_WORDS, "response", "sweep"),
-    "simulate": (*_WORDS, "sweep"),
-    "sweep": (*_WORDS, "response"),
+    "design": (*_WORDS, "response", "sweep", "robustness"),
+    "simulate": (*_WORDS, "sweep", "robustness"),
+    "sweep": (*_WORDS, "response", "robustness"),
+    "scatter": (*_WORDS, "response", "sweep"),
+    "verify": (*_WORDS, "response", "sweep", "robustness"),
     "report": (),
 }
 

@@ -26,6 +26,7 @@ from pipeline.problem.quantities import (
     Stiffness,
     fault,
 )
+from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Lattice, Region, Selector
 
@@ -213,6 +214,8 @@ class Problem(Section):
     solver: Solver = Solver()
     response: Response = Response()
     sweep: Sweep | None = None
+    robustness: Robustness | None = None
+    report: Report = Report()
 
     @property
     def frequency(self) -> float | None:

@@ -1,0 +1,44 @@
+"""Sections of a problem that no design depends on: how robust it is, and what the report tells."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.problem.quantities import Count, Gap, Positive, Ratio
+from pipeline.problem.section import Section
+
+
+class Robustness(Section):
+    """Imperfect copies of the shipped design, each simulated.
+
+    `geometry` are the largest shifts of a vertex along x and y, either way and evenly spread, as
+    shares of the spacing; `stiffness` the standard deviations of every ligament's stiffnesses, as
+    shares of them.
+    """
+
+    samples: Count = 200
+    geometry: tuple[Ratio, ...] = (0.03, 0.05)
+    stiffness: tuple[Ratio, ...] = (0.1,)
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class Paper(Section):
+    """What a publication tells of this study, to stand beside the numbers computed here.
+
+    `figure` is its figure, `variant` names which of its sets of values is run, `strain` is its
+    label of the full load, `values` the words that it uses for the facts of the report, by key.
+    """
+
+    figure: str
+    variant: str = ""
+    strain: Positive | None = None
+    values: dict[str, str] = Field(default_factory=dict)
+
+
+class Report(Section):
+    """Choices of the report: the driven displacements of the snapshots, and the paper's numbers."""
+
+    snapshots: tuple[Gap, ...] = ()
+    paper: Paper | None = None
