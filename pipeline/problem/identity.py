@@ -9,15 +9,16 @@ from typing import Any, Literal
 from pipeline.problem.model import Problem
 from pipeline.problem.quantities import SIM_UNITS
 
-Stage = Literal["design", "simulate", "sweep", "scatter", "verify", "report"]
+Stage = Literal["design", "simulate", "sweep", "scatter", "verify", "fabricate", "report"]
 
 _WORDS = ("title", "doc", "report")
 _UNUSED: dict[Stage, tuple[str, ...]] = {
-    "design": (*_WORDS, "response", "sweep", "robustness"),
-    "simulate": (*_WORDS, "sweep", "robustness"),
-    "sweep": (*_WORDS, "response", "robustness"),
-    "scatter": (*_WORDS, "response", "sweep"),
-    "verify": (*_WORDS, "response", "sweep", "robustness"),
+    "design": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
+    "simulate": (*_WORDS, "sweep", "robustness", "fabrication"),
+    "sweep": (*_WORDS, "response", "robustness", "fabrication"),
+    "scatter": (*_WORDS, "response", "sweep", "fabrication"),
+    "verify": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
+    "fabricate": ("doc", "report", "solver", "response", "sweep", "robustness"),
     "report": (),
 }
 

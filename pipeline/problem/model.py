@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.problem.drives import Drive, Harmonic, RampHarmonic
+from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.quantities import (
     Angle,
     BendingStiffness,
@@ -216,6 +217,7 @@ class Problem(Section):
     sweep: Sweep | None = None
     robustness: Robustness | None = None
     report: Report = Report()
+    fabrication: Fabrication = Fabrication()
 
     @property
     def frequency(self) -> float | None:

@@ -1,0 +1,231 @@
+"""What is made, as data: units with their slots, shims, and any other flat part.
+
+All lengths in mm. Units lie in the specimen frame (origin at the lattice point of unit (0, 0), x to
+the right, y up, seen from the top); z = 0 is the underside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon
+
+Floats = NDArray[np.float64]
+Strokes = tuple[Floats, ...]
+"""Open polylines (n, 2)."""
+
+
+@dataclass(frozen=True)
+class Hole:
+    """A round hole."""
+
+    centre: tuple[float, float]
+    diameter: float
+
+
+@dataclass(frozen=True)
+class Part:
+    """A flat part: one outline that is cut, round holes, strokes that are engraved.
+
+    Attributes:
+        id: unique in the package; the name of its files and objects.
+        outline: the outer loop, without holes, at nominal size.
+        height: thickness of the sheet or of the printed part.
+        holes: inside the outline.
+        engraving: lettering and orientation mark, to be read from the top.
+        scores: lines to fold or to mark along.
+    """
+
+    id: str
+    outline: Polygon
+    height: float
+    holes: tuple[Hole, ...] = ()
+    engraving: Strokes = ()
+    scores: Strokes = ()
+
+    @cached_property
+    def size(self) -> tuple[float, float]:
+        """Width and height of its bounding box."""
+        x0, y0, x1, y1 = self.outline.bounds
+        return x1 - x0, y1 - y0
+
+    def moved(self, x: float, y: float) -> Part:
+        """The part with the lower left corner of its bounding box at (x, y)."""
+        x0, y0, _, _ = self.outline.bounds
+        shift = np.array([x - x0, y - y0])
+        return Part(
+            self.id,
+            shapely.transform(self.outline, lambda points: points + shift),
+            self.height,
+            tuple(
+                Hole((hole.centre[0] + shift[0], hole.centre[1] + shift[1]), hole.diameter)
+                for hole in self.holes
+            ),
+            tuple(stroke + shift for stroke in self.engraving),
+            tuple(stroke + shift for stroke in self.scores),
+        )
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A slot at a vertex of a unit, for the end of one shim.
+
+    Attributes:
+        vertex: which of the unit's vertices.
+        ligament: id of the ligament.
+        mouth: (2,) the vertex as designed.
+        direction: (2,) unit vector from the mouth to the inner end.
+        depth: from the vertex as designed to the inner end.
+        width: shim thickness + 2 clearance.
+        truncation: how far the tip beside the mouth is cut back, along the slot.
+        wall: thinnest wall around the inner end, to the outline or to another slot.
+    """
+
+    vertex: int
+    ligament: int
+    mouth: Floats
+    direction: Floats
+    depth: float
+    width: float
+    truncation: float
+    wall: float
+
+    @property
+    def end(self) -> Floats:
+        """(2,) the middle of the inner end."""
+        return self.mouth + self.depth * self.direction
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One unit of the specimen, where it stands before any load.
+
+    Attributes:
+        number: id in the datasets.
+        label: id on the part and in all files: column letter and row number, from the lower left.
+        column, row: lattice indices (i, j), from zero.
+        design: the polygon as designed.
+        outline: the polygon as made: slots cut, tips truncated, corners filleted.
+        slots: one for each ligament that ends here.
+        lettering: strokes of the label, seen from the top.
+        mark: strokes of the arrow that points to +y.
+        markers: (n, 2) centres of the tracking dots.
+    """
+
+    number: int
+    label: str
+    column: int
+    row: int
+    design: Polygon
+    outline: Polygon
+    slots: tuple[Slot, ...]
+    lettering: Strokes
+    mark: Strokes
+    markers: Floats
+    height: float
+
+    @property
+    def part(self) -> Part:
+        """The unit as a part to be cut."""
+        return Part(self.label, self.outline, self.height, engraving=self.lettering + self.mark)
+
+
+@dataclass(frozen=True)
+class Ligament:
+    """One ligament of the specimen and the shim that it takes.
+
+    Attributes:
+        number: id in the datasets.
+        labels: the units that it joins.
+        length: of the shim: distance of the vertices and both depths.
+        free: of the shim between the truncated mouths.
+        bend: between the slots at its two ends, rad; zero for a straight shim.
+    """
+
+    number: int
+    labels: tuple[str, str]
+    length: float
+    free: float
+    bend: float
+
+
+@dataclass(frozen=True)
+class Shim:
+    """All shims of one length.
+
+    Attributes:
+        id: "S" and the length.
+        length, width: of a piece; the width is the thickness of the units.
+        ligaments: that take it.
+        spares: pieces more than ligaments.
+    """
+
+    id: str
+    length: float
+    width: float
+    ligaments: tuple[int, ...]
+    spares: int
+
+    @property
+    def count(self) -> int:
+        """Pieces to cut."""
+        return len(self.ligaments) + self.spares
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """One structure of a study as it is built.
+
+    Attributes:
+        study: name of the study.
+        structure: intact, altered or cloaked.
+        units: those present, in ascending order of their numbers.
+        ligaments: those present.
+        shims: in ascending order of their lengths.
+        clamped, driven: labels of the units that fixtures hold.
+    """
+
+    study: str
+    structure: str
+    units: tuple[Unit, ...]
+    ligaments: tuple[Ligament, ...]
+    shims: tuple[Shim, ...]
+    clamped: tuple[str, ...] = ()
+    driven: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def by_label(self) -> dict[str, Unit]:
+        """Units by label."""
+        return {unit.label: unit for unit in self.units}
+
+
+def column_letters(column: int) -> str:
+    """A, B, ... Z, AA, AB, ... for columns from zero, as in a spreadsheet."""
+    letters = ""
+    column += 1
+    while column:
+        column, digit = divmod(column - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
+def labels(indices: Iterable[tuple[int, int]]) -> list[str]:
+    """A unique label for each lattice index (i, j): "C7" is column 2, row 6.
+
+    Units that share an index (the two triangles of a kagome cell) get a, b, ... behind it.
+    """
+    pairs = [(int(i), int(j)) for i, j in indices]
+    shared = len(set(pairs)) < len(pairs)
+    seen: dict[tuple[int, int], int] = {}
+    made = []
+    for pair in pairs:
+        nth = seen.get(pair, 0)
+        seen[pair] = nth + 1
+        suffix = chr(ord("a") + nth) if shared else ""
+        made.append(f"{column_letters(pair[0])}{pair[1] + 1}{suffix}")
+    return made
