@@ -11,7 +11,8 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.band import factorise, solve
-from sim.kernels import barrier_step, compiled, gradient, hessian_product, mixed, tangent
+from sim.kernels import compiled
+from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
 from sim.system import Bars, System, Workspace, workspace
 
 KEEP_FROM_BARRIER = 0.9
@@ -29,7 +30,7 @@ GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
 @compiled
 def _residual(motion: Floats, system: System, work: Workspace) -> tuple[float, float, float]:
     """Energy, and the largest out-of-balance and reaction force (moments over the scale), N."""
-    strain, contact = gradient(motion, system.net, work.turn, work.force)
+    strain, contact = gradient(motion, system, work.turn, work.force)
     residual, reaction = 0.0, 0.0
     for d in system.dofs:
         residual = max(residual, abs(work.force[d]) / system.scale[d])
@@ -41,7 +42,7 @@ def _residual(motion: Floats, system: System, work: Workspace) -> tuple[float, f
 @compiled
 def _factorise(motion: Floats, system: System, work: Workspace, shift: float) -> bool:
     work.band[:] = 0.0
-    tangent(motion, system.net, work.turn, system.free, work.band)
+    tangent(motion, system, work.turn, work.band)
     work.band[:, 0] += shift
     return factorise(work.band)
 
@@ -54,7 +55,7 @@ def _factorise_shifted(motion: Floats, system: System, work: Workspace, counts: 
         return 0
     counts[SHIFTED] += 1
     work.band[:] = 0.0
-    tangent(motion, system.net, work.turn, system.free, work.band)
+    tangent(motion, system, work.turn, work.band)
     shift = 1e-5 * np.abs(work.band[:, 0]).max()
     for tries in range(1, MAX_SHIFTS):
         counts[FACTORS] += 1
@@ -79,7 +80,7 @@ def _descend(
     slope = 0.0
     for d in system.dofs:
         slope += work.step[d] * work.force[d]
-    length = min(1.0, KEEP_FROM_BARRIER * barrier_step(motion, system.net, work.step))
+    length = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
     for _ in range(MAX_BACKTRACKS):
         trial[:] = motion + length * work.step
         new_energy, new_residual, reaction = _residual(trial, system, work)
@@ -134,7 +135,7 @@ def _predict(motion: Floats, load: Floats, share: float, system: System, work: W
     for i in range(len(system.held)):
         d = system.held[i]
         work.product[d] = (load[i] - motion[d]) * share
-    hessian_product(motion, system.net, work.turn, work.product, work.force)
+    hessian_product(motion, system, work.turn, work.product, work.force)
     _solve_free(system, work, -1.0)
     for d in system.held:
         work.step[d] = work.product[d]
@@ -157,7 +158,7 @@ def _advance(
         usable = _factorise_shifted(motion, system, work, counts) >= 0
         ahead = min(increment, 1.0 - done)
         _predict(motion, load, ahead / (1.0 - done), system, work)
-        allowed = min(1.0, KEEP_FROM_BARRIER * barrier_step(motion, system.net, work.step))
+        allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
         if allowed * ahead < SMALLEST_INCREMENT:  # held units drive a void into its barrier
             return done, increment
         motion += allowed * work.step
@@ -226,8 +227,8 @@ def adjoint(states: Floats, bar: Floats, system: System, which: Ints, bars: Bars
             return p
         work.force[:] = bar[p]
         _solve_free(system, work, -1.0)
-        mixed(states[p], system.net, work.turn, work.step, which, bars.sensitivity)
-        hessian_product(states[p], system.net, work.turn, work.step, work.product)
+        mixed(states[p], system, work.turn, work.step, which, bars.sensitivity)
+        hessian_product(states[p], system, work.turn, work.step, work.product)
         for i in range(len(system.held)):
             bars.drive[p, i] += work.product[system.held[i]]
     return -1

@@ -18,15 +18,8 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.band import factorise, solve
-from sim.kernels import (
-    barrier_step,
-    compiled,
-    gradient,
-    hessian_product,
-    mixed,
-    smallest_void,
-    tangent,
-)
+from sim.kernels import compiled, smallest_void
+from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
 from sim.system import Bars, System, Workspace, workspace
 
 MAX_ITERATIONS = 30
@@ -49,7 +42,7 @@ class Base(NamedTuple):
 def _factorise_stage(motion: Floats, system: System, work: Workspace, k: float) -> bool:
     """Factor of a stage's tangent M/k^2 + C/k + K in the workspace; False if not positive."""
     work.band[:] = 0.0
-    tangent(motion, system.net, work.turn, system.free, work.band)
+    tangent(motion, system, work.turn, work.band)
     for i in range(len(system.dofs)):
         d = system.dofs[i]
         work.band[i, 0] += (system.mass[d] / k + system.damping[d]) / k
@@ -65,7 +58,7 @@ def _newton_step(
     Returns:
         the largest move of a held dof and the (scaled) largest of a free one.
     """
-    gradient(motion, system.net, work.turn, work.force)
+    gradient(motion, system, work.turn, work.force)
     gap = 0.0
     work.step[:] = 0.0
     for i in range(len(system.held)):
@@ -73,7 +66,7 @@ def _newton_step(
         work.step[d] = target[i] - motion[d]
         gap = max(gap, abs(work.step[d]))
     if gap > 0.0:
-        hessian_product(motion, system.net, work.turn, work.step, work.product)
+        hessian_product(motion, system, work.turn, work.step, work.product)
         for d in system.dofs:
             work.force[d] += work.product[d]
     for i in range(len(system.dofs)):
@@ -120,7 +113,7 @@ def _solve_stage(
         gap, size = _newton_step(motion, target, base, system, work)
         counts[0] += 1
         counts[2] += 1
-        allowed = KEEP_FROM_BARRIER * barrier_step(motion, system.net, work.step)
+        allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.step)
         motion += min(1.0, allowed) * work.step
         if not size < 1e6:
             return STALLED, False, 1.0
@@ -176,7 +169,7 @@ def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats,
     for i in range(len(system.held)):
         u[system.held[i]] = drive[i]
     a[:] = 0.0
-    gradient(u, system.net, work.turn, work.force)
+    gradient(u, system, work.turn, work.force)
     for d in system.dofs:
         a[d] = -(work.force[d] + system.damping[d] * v[d]) / system.mass[d]
 
@@ -274,8 +267,8 @@ def _gather(
         work.step[d] = -work.right[i]
         bars.mass[d] -= work.right[i] * acceleration[d]
         bars.damping[d] -= work.right[i] * velocity[d]
-    mixed(motion, system.net, work.turn, work.step, which, bars.sensitivity)
-    hessian_product(motion, system.net, work.turn, work.step, work.product)
+    mixed(motion, system, work.turn, work.step, which, bars.sensitivity)
+    hessian_product(motion, system, work.turn, work.step, work.product)
     for i in range(len(system.held)):
         drive[i] += work.product[system.held[i]]
 

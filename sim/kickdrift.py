@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.kernels import compiled, gradient, hessian_product, mixed
+from sim.kernels import compiled
+from sim.potential import gradient, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
 
 
@@ -72,7 +73,7 @@ def _step(
             u[system.held[i]] = steps.drive[n, m, i]
         kept_u[m] = u
         kept_v[m] = v
-        strain, contact = gradient(u, system.net, work.turn, work.force)
+        strain, contact = gradient(u, system, work.turn, work.force)
         total += strain + contact
         for d in system.dofs:
             v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
@@ -136,8 +137,8 @@ def _step_back(
             bar_gain[m, d] -= bar_v[d] * (steps.decay[m, d] * before - v[d]) / gain
             bar_v[d] *= steps.decay[m, d]
             v[d] = before
-        hessian_product(kept_u[m], system.net, work.turn, work.step, work.product)
-        mixed(kept_u[m], system.net, work.turn, work.step, which, bars.sensitivity)
+        hessian_product(kept_u[m], system, work.turn, work.step, work.product)
+        mixed(kept_u[m], system, work.turn, work.step, which, bars.sensitivity)
         for d in system.dofs:
             bar_u[d] += work.product[d]
         for i in range(len(system.held)):

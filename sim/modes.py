@@ -9,13 +9,14 @@ import scipy.sparse.linalg as spla
 
 from sim.arrays import Floats
 from sim.band import factorise, solve
-from sim.kernels import hessian_product, tangent
 from sim.model import Topology, Values
+from sim.potential import hessian_product, tangent
+from sim.system import system_of
 
 
 def highest_frequency(topology: Topology, values: Values, motion: Floats | None = None) -> float:
     """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration."""
-    network = topology.network(values)
+    system = system_of(topology, values)
     state = np.zeros(topology.n_dofs) if motion is None else motion.ravel()
     turn = np.empty((topology.n_units, 4))
     free, root = topology.free_dofs, _root_mass(topology, values)
@@ -23,7 +24,7 @@ def highest_frequency(topology: Topology, values: Values, motion: Floats | None 
     def product(x: Floats) -> Floats:
         full, out = np.zeros(topology.n_dofs), np.empty(topology.n_dofs)
         full[free] = np.ravel(x) / root
-        hessian_product(state, network, turn, full, out)
+        hessian_product(state, system, turn, full, out)
         return np.asarray(out[free] / root)
 
     return float(np.sqrt(abs(_largest(product, topology.n_free, 1e-2))))
@@ -31,10 +32,10 @@ def highest_frequency(topology: Topology, values: Values, motion: Floats | None 
 
 def lowest_frequency(topology: Topology, values: Values) -> float:
     """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
-    number, width = topology.numbering
-    band = np.zeros((topology.n_free, width + 1))
+    system = system_of(topology, values)
+    band = np.zeros((topology.n_free, system.width + 1))
     turn = np.empty((topology.n_units, 4))
-    tangent(np.zeros(topology.n_dofs), topology.network(values), turn, number, band)
+    tangent(np.zeros(topology.n_dofs), system, turn, band)
     if not factorise(band):
         return 0.0
     root = _root_mass(topology, values)

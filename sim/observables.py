@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats
-from sim.kernels import Network, compiled, gradient
+from sim.kernels import compiled
 from sim.model import Topology, Values
+from sim.potential import gradient
+from sim.system import System, system_of
 
 
 class Observables(NamedTuple):
@@ -28,17 +30,17 @@ class Observables(NamedTuple):
 
 
 @compiled
-def _visit(states: Floats, net: Network, energies: Floats, forces: Floats) -> None:
+def _visit(states: Floats, system: System, energies: Floats, forces: Floats) -> None:
     turn = np.empty((states.shape[1] // 3, 4))
     for n in range(len(states)):
-        energies[n] = gradient(states[n], net, turn, forces[n])
+        energies[n] = gradient(states[n], system, turn, forces[n])
 
 
 def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
     """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
-    _visit(states, topology.network(values), energies, forces)
+    _visit(states, system_of(topology, values), energies, forces)
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
     return Observables(
