@@ -1,0 +1,39 @@
+"""The manifest of a package: what it was made from, with which parameters, and what is in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from pipeline.fabrication.parts import Specimen
+from pipeline.problem import Problem, section_hash
+from pipeline.provenance import file_hash, git_commit, package_versions
+
+NAME = "manifest.json"
+
+
+def write(folder: Path, specimen: Specimen, asked: Problem, design: Path) -> None:
+    """Write the manifest of all other files in a package's folder.
+
+    Args:
+        folder: the package, complete but for its manifest.
+        specimen: what is built.
+        asked: the problem whose section `fabrication` holds.
+        design: the design dataset.
+    """
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != NAME)
+    told = {
+        "study": specimen.study,
+        "structure": specimen.structure,
+        "design_sha256": file_hash(design),
+        "problem_hash": section_hash(asked, "fabricate"),
+        "parameters": asked.fabrication.model_dump(mode="json"),
+        "parameters_note": "lengths in mm; spares is a ratio",
+        "units": [unit.label for unit in specimen.units],
+        "shims": {shim.id: shim.count for shim in specimen.shims},
+        "packages": dict(package_versions()),
+        "git_commit": git_commit(),
+        "files": {path.relative_to(folder).as_posix(): file_hash(path) for path in files},
+    }
+    text = json.dumps(told, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    (folder / NAME).write_text(text + "\n", encoding="utf-8", newline="\n")

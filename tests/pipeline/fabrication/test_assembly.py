@@ -1,0 +1,148 @@
+"""The assembly sheet, the bill of materials and the manifest."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline import problem
+from pipeline.fabrication import assembly, bom, manifest
+from pipeline.fabrication.assembly.paper import SIZES, room
+from pipeline.fabrication.assembly.tiles import OVERLAP, tiles
+from pipeline.fabrication.checks import pages
+from pipeline.fabrication.parts import Specimen
+from tests.pipeline.fabrication import handmade
+from tests.pipeline.fabrication.handmade import ASKED
+
+DENSITY = 6.18e-9  # tonne/mm^2
+PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
+
+
+def written(folder: Path, specimen: Specimen | None = None) -> Path:
+    path = folder / "assembly.pdf"
+    assembly.write(path, specimen or handmade.specimen(), ASKED)
+    return path
+
+
+def test_the_plan_names_every_unit_row_and_column(tmp_path: Path) -> None:
+    (plan,) = (page for page in pages.words(written(tmp_path)) if "1:1" in page[0])
+    for name in ("A1", "B1", "C1", "A2", "B2", "C2", "A", "B", "C", "1", "2"):
+        assert name in plan
+
+
+def test_all_pages_carry_a_check_bar_and_a_number(tmp_path: Path) -> None:
+    for number, page in enumerate(pages.words(written(tmp_path)), 1):
+        assert page[1] == str(number)
+        assert page[2].startswith("100 mm: measure")
+
+
+def test_the_shim_list_counts_spares(tmp_path: Path) -> None:
+    (shims,) = (page for page in pages.words(written(tmp_path)) if "shims" in page[0])
+    assert "shims: 8 pieces of 1 lengths" in shims[0]
+    assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
+
+
+def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
+    one = handmade.specimen()
+    (kind,) = one.shims
+    other = dataclasses.replace(kind, id="S9.00", length=9.0, ligaments=(6,))
+    kinds = (dataclasses.replace(kind, ligaments=tuple(range(6))), other)
+    found = pages.words(written(tmp_path, dataclasses.replace(one, shims=kinds)))
+    assert "which shim joins which units" in found[-1][0]
+    last = found[-1].index("B2 - C2")
+    assert found[-1][last + 1 : last + 3] == ["2", "S9.00"]
+
+
+def test_fixtures_are_named_in_the_order_of_work(tmp_path: Path) -> None:
+    first = " ".join(pages.words(written(tmp_path))[0])
+    assert "Set the clamped units into their pads: A1, C2." in first
+
+
+@pytest.mark.parametrize("paper", ["A4", "Letter"])
+@pytest.mark.parametrize("size", [40.0, 190.0, 240.75, 483.0])
+def test_tiles_fit_the_paper_and_cover_the_drawing(paper: str, size: float) -> None:
+    width, height = SIZES[paper]  # type: ignore[index]
+    page = room(width, height)[2:]
+    found = tiles((-5.0, -7.0, size, size), page)
+    for tile in found:
+        assert tile.window[2] <= page[0] + 1e-9
+        assert tile.window[3] <= page[1] + 1e-9
+    left = min(tile.window[0] for tile in found)
+    right = max(tile.window[0] + tile.window[2] for tile in found)
+    low = min(tile.window[1] for tile in found)
+    assert (left, right, low) == pytest.approx((-5.0, size - 5.0, -7.0))
+    assert len({tile.name for tile in found}) == len(found)
+
+
+def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
+    first, second = tiles((0.0, 0.0, 300.0, 100.0), (190.0, 240.0))
+    assert first.window[0] + first.window[2] - second.window[0] == pytest.approx(OVERLAP)
+    (mine,), (other,) = list(first.joints()), list(second.joints())
+    assert mine[0] == other[0] == "x"
+    assert mine[1] == pytest.approx(other[1])
+
+
+def test_a_page_without_a_unit_is_caught(tmp_path: Path) -> None:
+    (fault,) = pages.check(written(tmp_path), ["A1", "Z9"])
+    assert fault.part == "unit Z9"
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
+    specimen = handmade.specimen()
+    contents = {
+        "laser/units_01_nominal.dxf": [unit.label for unit in specimen.units],
+        "print/plate_01.3mf": ["A1", "B1"],
+    }
+    bom.write(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents)
+    found = rows(tmp_path / "bom.csv")
+    assert [row["id"] for row in found if row["item"] == "unit"] == [
+        unit.label for unit in specimen.units
+    ]
+    first = found[0]
+    assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
+    area = specimen.units[0].design.area
+    assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2
+    assert float(first["volume_mm3"]) == pytest.approx(specimen.units[0].outline.area * 8.1)
+    (shim,) = (row for row in found if row["item"] == "shim")
+    assert (shim["count"], shim["length_mm"], shim["width_mm"]) == ("8", "8.2500", "8.1000")
+    assert [row["item"] for row in found if "/" in row["id"]] == ["sheet", "plate"]
+    total = next(row for row in found if row["item"] == "total")
+    assert float(total["mass_g"]) == pytest.approx(
+        sum(float(row["mass_g"]) for row in found if row["item"] == "unit"), abs=1e-3
+    )
+    assert "print 6" in total["note"]  # 6.18 mg/mm^2 of 8.1 mm PLA: some 62 % full
+
+
+def test_the_manifest_holds_parameters_and_hashes(tmp_path: Path) -> None:
+    asked = problem.load(PROBLEM)
+    design = tmp_path / "design.nc"
+    design.write_bytes(b"a design")
+    package = tmp_path / "package"
+    (package / "laser").mkdir(parents=True)
+    (package / "laser/a.dxf").write_bytes(b"drawing")
+    for _ in range(2):  # a manifest does not count itself
+        manifest.write(package, handmade.specimen(), asked, design)
+    told = json.loads((package / "manifest.json").read_text())
+    assert told["files"] == {"laser/a.dxf": hashlib.sha256(b"drawing").hexdigest()}
+    assert told["design_sha256"] == hashlib.sha256(b"a design").hexdigest()
+    assert told["parameters"]["shims"]["thickness"] == 0.25
+    assert told["units"] == ["A1", "B1", "C1", "A2", "B2", "C2"]
+
+
+def test_the_same_specimen_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name)
+        bom.write(tmp_path / name / "bom.csv", handmade.specimen(), ASKED, DENSITY, {})
+    for name in ("assembly.pdf", "bom.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
