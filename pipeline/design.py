@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
+    from pipeline.structures import Floats
     from sim.optimise import Evaluation, MmaOptions, Result, SqpOptions
     from sim.plan import Plan
     from sim.scene import Scene
@@ -137,22 +138,28 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     import numpy as np
     import xarray as xr
 
-    from pipeline.scenes import limits_of
-    from pipeline.structures import network_variables, unit_coordinates
+    from pipeline.responses import case_directions, loss_units
+    from pipeline.scenes import lattice_of, limits_of
+    from pipeline.structures import network_variables, spread, unit_coordinates
     from sim.clearance import overlapping_pairs, smallest_gap
     from sim.constraints import KIND_NAMES, margins
     from sim.geometry import shape
 
     lattice, history = scene.lattice, result.evaluations
+    intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))
     found = margins(lattice, vertices, limits_of(asked))
     cases = len(scene.motions)
     nothing = np.full(cases, np.nan)
+
+    def whole(values: Floats) -> Floats:
+        return spread(values, lattice, intact.n_units)
+
     variables = {
         **network_variables(asked, scene),
-        "vertices": (("unit", "vertex", "xy"), lattice.padded(vertices)),
-        "vertices_initial": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
-        "centroid": (("unit", "xy"), np.asarray(shape(lattice, vertices).centroid)),
+        "vertices": (("unit", "vertex", "xy"), whole(lattice.padded(vertices))),
+        "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+        "centroid": (("unit", "xy"), whole(np.asarray(shape(lattice, vertices).centroid))),
         "constraint_margin": (
             ("constraint",),
             [found[kind].value if kind in found else np.nan for kind in KIND_NAMES],
@@ -172,7 +179,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         "kkt_residual": ((), result.stationarity.residual),
     }
     coordinates = {
-        **unit_coordinates(lattice),
+        **unit_coordinates(intact),
         "direction": (("case",), np.rad2deg(case_directions(asked))),
         "evaluation": (("evaluation",), np.arange(len(history))),
         "constraint": (("constraint",), list(KIND_NAMES)),
@@ -181,12 +188,10 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
             ["mm" if kind in ("edge_length", "gap") else "rad" for kind in KIND_NAMES],
         ),
     }
-    return xr.Dataset(variables, coordinates)
-
-
-def case_directions(asked: Problem) -> list[float]:
-    """Direction of each load case in rad; zero for a measured drive."""
-    return list(getattr(asked.drive, "directions", (0.0,)))
+    made = xr.Dataset(variables, coordinates)
+    for name in ("loss", "loss_case", "best_loss"):
+        made[name].attrs["units"] = loss_units(asked)
+    return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,11 +24,16 @@ TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
 
 
 def lattice_of(problem: Problem) -> Lattice:
-    """The initial network of a problem."""
+    """The intact initial network of a problem."""
     wanted = problem.lattice
     return quads(
         wanted.columns, wanted.rows, wanted.spacing, wanted.ligament_length, wanted.bias_angle
     )
+
+
+def altered_lattice_of(problem: Problem) -> Lattice:
+    """The initial network of a problem with its void."""
+    return lattice_of(problem).without(_units(problems.void_units(problem)))
 
 
 def scene_of(
@@ -44,27 +51,46 @@ def scene_of(
     """
     made = motions_of(problem, folder) if motions is None else motions
     weights = problem.drive.case_weights if motions is None else np.full(len(made), 1 / len(made))
+    intact, altered = lattice_of(problem), altered_lattice_of(problem)
+    interest = _units(problems.interest_units(problem))
     samples = problem.horizon.samples
-    return Scene(
-        lattice=lattice_of(problem),
-        material=_material(problem),
+    material = _material(problem)
+    scene = Scene(
+        lattice=intact,
+        material=material,
         barrier=problem.contact.barrier_angle,
         cutoff=problem.contact.cutoff_angle,
-        clamped=clamped_dofs(problem),
-        driven=driven_units(problem),
+        clamped=clamped_dofs(problem, intact),
+        driven=driven_units(problem, intact),
         motions=made,
         weights=np.asarray(weights),
         duration=problem.horizon_time,
         frequency=problem.frequency,
         static=isinstance(problem.drive, LinearRamp | TanhRamp),
-        cloak=np.array(problems.cloak_units(problem), dtype=np.int64),
-        region=np.array(problems.interest_units(problem), dtype=np.int64),
+        cloak=_units(()),
+        region=interest,
         objective=problem.objective.kind,
         samples=samples + 1 - samples % 2,
-        symmetry=problem.optimiser.symmetry,
+        steps=problem.horizon.steps,
         accuracy=problem.solver.accuracy,
         integrator=problem.solver.integrator,
     )
+    return replace(
+        scene,
+        lattice=altered,
+        material=_stiffened(problem, altered, material),
+        clamped=clamped_dofs(problem, altered),
+        driven=driven_units(problem, altered),
+        cloak=altered.positions(_units(problems.cloak_units(problem))),
+        region=altered.positions(interest),
+        frozen=altered.positions(_units(problems.source_units(problem))),
+        reference=scene if problem.objective.target == "intact" else None,
+        symmetry=problem.optimiser.symmetry,
+    )
+
+
+def _units(ids: Iterable[int]) -> NDArray[np.int64]:
+    return np.array(sorted(ids), dtype=np.int64)
 
 
 def limits_of(problem: Problem) -> Limits:
@@ -79,20 +105,20 @@ def limits_of(problem: Problem) -> Limits:
     )
 
 
-def clamped_dofs(problem: Problem) -> NDArray[np.int64]:
-    """Ids (3 unit + dof) of the dofs that the supports hold, ascending."""
-    ids = {
-        3 * unit + DOFS.index(dof)
+def clamped_dofs(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
+    """Dofs (3 place of the unit + dof) of a network that the supports hold, ascending."""
+    dofs = [
+        3 * lattice.positions(_units(problems.selected_units(support.units, problem.lattice)))
+        + DOFS.index(dof)
         for support in problem.supports
-        for unit in problems.selected_units(support.units, problem.lattice)
         for dof in support.clamp
-    }
-    return np.array(sorted(ids), dtype=np.int64)
+    ]
+    return np.unique(np.concatenate([_units(()), *dofs]))
 
 
-def driven_units(problem: Problem) -> NDArray[np.int64]:
-    """Ids of the units that follow the drive."""
-    return np.array(problems.selected_units(problem.drive.units, problem.lattice), dtype=np.int64)
+def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
+    """Places of the units of a network that follow the drive."""
+    return lattice.positions(_units(problems.selected_units(problem.drive.units, problem.lattice)))
 
 
 def _material(problem: Problem) -> Material:
@@ -106,6 +132,20 @@ def _material(problem: Problem) -> Material:
         contact=problem.contact.stiffness,
         damping_translation=translation,
         damping_rotation=rotation,
+    )
+
+
+def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Material:
+    """The material with the ligaments of an inclusion's units as much stiffer as asked for."""
+    if problem.inclusion is None:
+        return material
+    stiff = lattice.positions(_units(problems.inclusion_units(problem)))
+    touched = np.isin(lattice.ligament_units, stiff).any(axis=1)
+    factor = np.where(touched, problem.inclusion.stiffness_factor, 1.0)
+    return material._replace(
+        axial=material.axial * factor,
+        shear=material.shear * factor,
+        bending=material.bending * factor,
     )
 
 

@@ -8,50 +8,74 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline import problem as problems
 from pipeline.problem import Problem
-from pipeline.scenes import clamped_dofs, driven_units
+from pipeline.scenes import lattice_of
 from sim.lattice import Lattice
 from sim.scene import Scene
 
 Floats = NDArray[np.float64]
-Variables = dict[str, tuple[tuple[str, ...], Any]]
+Variables = dict[str, tuple[Any, ...]]
 
-SURROUNDINGS, CLOAK, SOURCE = 0, 1, 2
-FREE, CLAMPED, DRIVEN = 0, 1, 2
+SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
+FREE, CLAMPED, DRIVEN = range(3)
 
 
-def unit_coordinates(lattice: Lattice) -> Variables:
-    """Labels of the units and of the specimen frame's axes."""
+def unit_coordinates(intact: Lattice) -> Variables:
+    """Labels of the units, removed ones too, and of the specimen frame's axes."""
     return {
-        "unit": (("unit",), np.arange(lattice.n_units)),
-        "i": (("unit",), lattice.index[:, 0]),
-        "j": (("unit",), lattice.index[:, 1]),
+        "unit": (("unit",), intact.id),
+        "i": (("unit",), intact.index[:, 0]),
+        "j": (("unit",), intact.index[:, 1]),
         "xy": (("xy",), ["x", "y"]),
     }
 
 
 def network_variables(problem: Problem, scene: Scene) -> Variables:
-    """Regions, supports and ligaments of a scene."""
-    lattice = scene.lattice
-    region = np.full(lattice.n_units, SURROUNDINGS, dtype=np.int8)
-    region[scene.cloak] = CLOAK
-    region[scene.driven] = SOURCE
-    interest = np.zeros(lattice.n_units, dtype=np.int8)
-    interest[scene.region] = 1
-    support = np.full(lattice.n_units, FREE, dtype=np.int8)
-    support[np.unique(clamped_dofs(problem) // 3)] = CLAMPED
-    support[driven_units(problem)] = DRIVEN
-    local = lattice.ligaments - lattice.first_vertex[lattice.ligament_units]
+    """Regions, supports and ligaments of the intact network of a scene."""
+    intact, kept = lattice_of(problem), scene.lattice.id
+    region = np.full(intact.n_units, VOID, dtype=np.int8)
+    region[kept] = SURROUNDINGS
+    region[list(problems.inclusion_units(problem))] = INCLUSION
+    region[kept[scene.cloak]] = CLOAK
+    region[kept[scene.driven]] = SOURCE
+    interest = np.zeros(intact.n_units, dtype=np.int8)
+    interest[kept[scene.region]] = 1
+    support = np.full(intact.n_units, FREE, dtype=np.int8)
+    support[kept[np.unique(scene.clamped // 3)]] = CLAMPED
+    support[kept[scene.driven]] = DRIVEN
+    local = intact.ligaments - intact.first_vertex[intact.ligament_units]
     return {
         "region": (("unit",), region),
         "roi": (("unit",), interest),
         "support": (("unit",), support),
-        "ligament_unit": (("ligament", "end"), lattice.ligament_units),
+        "ligament_unit": (("ligament", "end"), intact.ligament_units),
         "ligament_vertex": (("ligament", "end"), local),
     }
+
+
+def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:
+    """Which of the ligaments (n_ligaments,) of the intact network a structure has.
+
+    Args:
+        network: a design or a response.
+        structure: intact, altered or cloaked.
+    """
+    gone = (network["region"].values == VOID) & (structure != "intact")
+    place = np.searchsorted(network["unit"].values, network["ligament_unit"].values)
+    return ~gone[place].any(axis=1)
 
 
 def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:
     """Vertices (n_vertices, 2) of a padded array (unit, vertex, xy), in the lattice's order."""
     local = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
-    return np.asarray(vertices.transpose("unit", "vertex", "xy").values[lattice.unit, local])
+    unit = lattice.id[lattice.unit]
+    return np.asarray(vertices.transpose("unit", "vertex", "xy").values[unit, local])
+
+
+def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:
+    """An array over the units of a network as one over all ``size`` units, NaN where removed."""
+    inner = np.moveaxis(np.asarray(values), axis, 0)
+    out = np.full((size, *inner.shape[1:]), np.nan)
+    out[lattice.id] = inner
+    return np.moveaxis(out, 0, axis)

@@ -6,7 +6,6 @@ import argparse
 import logging
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -72,7 +71,7 @@ def _run(args: argparse.Namespace) -> None:
     design = datasets.read(args.design, "design")
     scene = scene_of(asked, args.problem.parent)
     shapes = {
-        "loss_altered": flat_vertices(scene.lattice, design["vertices_initial"]),
+        "loss_altered": scene.lattice.vertices,
         "loss": flat_vertices(scene.lattice, design["vertices"]),
     }
     directions, frequencies = axes(asked)
@@ -135,32 +134,32 @@ def _column(
 ) -> Iterator[Outcome[tuple[float, float]]]:
     """Loss and smallest void angle for each direction at one frequency."""
     from sim.batch import Case, run_batch
-    from sim.evaluation import objective
+    from sim.evaluation import objective, target_motion
     from sim.loads import Harmonic
     from sim.plan import concrete_parameters, make_plan
 
     assert asked.sweep is not None
-    at_frequency = replace(
-        scene,
-        motions=tuple(
+    at_frequency = scene.under(
+        tuple(
             Harmonic(asked.drive.amplitude, frequency, angle)  # type: ignore[union-attr]
             for angle in directions
         ),
-        weights=np.full(len(directions), 1 / len(directions)),
-        duration=asked.sweep.periods / frequency,
-        frequency=frequency,
+        asked.sweep.periods / frequency,
+        frequency,
     )
     plan = make_plan(at_frequency, vertices, threads=threads)
     LOG.debug("%.6g Hz: %s", frequency, plan.describe())
     values = concrete_parameters(at_frequency, vertices)
-    measure = objective(at_frequency)
+    target = None if scene.reference is None else target_motion(at_frequency, threads)
 
     def reduce(solved: Solved) -> tuple[float, float]:
+        number = solved.case.number
+        measure = objective(at_frequency, None if target is None else target[number : number + 1])
         loss = float(measure(solved.displacement[None], values)[0])
         voids = at_frequency.topology.smallest_void_angle(values.void, solved.displacement)
         return loss, float(voids.min())
 
-    cases = (Case(values, at_frequency.drives[k], plan.solver) for k in plan.simulated)
+    cases = (Case(values, at_frequency.drives[k], plan.solver, int(k)) for k in plan.simulated)
     outcomes = list(run_batch(cases, reduce, threads))
     return (outcomes[k] for k in np.searchsorted(plan.simulated, plan.case_of))
 

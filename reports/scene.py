@@ -68,7 +68,7 @@ def of(problem: Problem) -> Scene:
             value=drive.kind,
             remedy="give kind: harmonic, or take the datasets without this report",
         )
-    _, inner, outer = problem.cloak.bounds
+    _, inner, outer = problem.cloak.bounds or ("centre", 0.0, 0.0)
     return Scene(
         title=problem.title,
         columns=lattice.columns,

@@ -18,11 +18,12 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Case:
-    """One structure under one drive, and the solver to use."""
+    """One structure under one drive, the solver to use, and its number among the load cases."""
 
     values: Values
     drive: Drive
     solver: Solver
+    number: int = 0
 
 
 @dataclass(frozen=True)

@@ -15,20 +15,65 @@ from sim.dynamics import Drive, Solver, simulate
 from sim.geometry import shape
 from sim.grid import simpson_weights
 from sim.model import Parameters, Values, parameters
-from sim.objectives import DisplacementMimicking, StrainEnergyMimicking
-from sim.plan import Plan
+from sim.objectives import (
+    DisplacementMimicking,
+    RelativeMimicking,
+    StrainEnergyMimicking,
+    extent,
+)
+from sim.plan import Plan, concrete_parameters, make_plan
 from sim.scene import Scene
 
-Objective = DisplacementMimicking | StrainEnergyMimicking
+Objective = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
 
 
-def objective(scene: Scene) -> Objective:
-    """The scene's loss as the mean over its duration, by Simpson's rule on its samples."""
-    weights = simpson_weights(scene.samples, 1.0)
-    if scene.objective == "displacement":
-        return DisplacementMimicking(scene.region, scene.lattice.spacing, weights)
-    ligaments = scene.region_ligaments
-    return StrainEnergyMimicking(ligaments, scene.lattice.ligament_units[ligaments], weights)
+def objective(
+    scene: Scene, target: Floats | None = None, weights: Floats | None = None
+) -> Objective:
+    """The scene's loss.
+
+    On samples it is the mean over the duration, by Simpson's rule; on load steps an energy is
+    averaged. A motion to mimic gives a relative error: on samples the root of the mean square over
+    the target's greatest size, on load steps the root of the sum of squares over its size at the
+    last step (the authors' measure).
+
+    Args:
+        scene: the scene.
+        target: (n_cases, n_asked, n_region, 3) what ``target_motion`` returned; it is simulated
+            anew if a scene with a reference comes without.
+        weights: (n_asked,) of other samples than the scene's own.
+    """
+    lattice, given = scene.lattice, _weights(scene) if weights is None else weights
+    if scene.objective == "strain_energy":
+        ligaments = scene.region_ligaments
+        return StrainEnergyMimicking(ligaments, lattice.ligament_units[ligaments], given)
+    if scene.reference is None:
+        return DisplacementMimicking(scene.region, lattice.spacing, given)
+    aim = target_motion(scene) if target is None else target
+    size = extent(aim, lattice.spacing)
+    whole = size.max(axis=1) if scene.steps is None else size[:, -1] / np.sqrt(scene.steps)
+    return RelativeMimicking(scene.region, lattice.spacing, given, aim, whole)
+
+
+def _weights(scene: Scene) -> Floats:
+    if scene.steps is None:
+        return simpson_weights(scene.samples, 1.0)
+    return np.full(scene.steps, 1 / scene.steps)
+
+
+def target_motion(scene: Scene, threads: int = 1) -> Floats:
+    """Motion (n_cases, n_asked, n_region, 3) of the reference's region at the loss's samples.
+
+    Raises:
+        SimulationError: the reference cannot be simulated.
+    """
+    reference = scene.reference
+    if reference is None:
+        raise ValueError("the scene has no reference: it is compared with rest")
+    plan = make_plan(reference, reference.lattice.vertices, threads=threads, every_case=True)
+    values = concrete_parameters(reference, reference.lattice.vertices)
+    motion, _, _ = dynamics.forward(plan.solver, values, reference.drives)
+    return motion[:, :, reference.region]
 
 
 def structure(scene: Scene) -> Callable[[Array], Parameters]:

@@ -26,6 +26,7 @@ class Lattice:
         site: (n_units, 2) lattice points.
         index: (n_units, 2) lattice indices (i, j).
         spacing: distance of neighbouring lattice points.
+        id: (n_units,) the units' ids, ascending; where units were removed, those of the whole.
     """
 
     vertices: Floats
@@ -35,6 +36,7 @@ class Lattice:
     site: Floats
     index: Ints
     spacing: float
+    id: Ints
 
     @property
     def n_units(self) -> int:
@@ -87,6 +89,38 @@ class Lattice:
         ends = self.vertices[self.ligaments]
         return ends[:, 1] - ends[:, 0]
 
+    def positions(self, ids: Ints) -> Ints:
+        """Where in the arrays over units those with the given ids are.
+
+        Raises:
+            KeyError: the network has no such unit.
+        """
+        found = np.searchsorted(self.id, ids)
+        known = np.append(self.id, -1)[found] == ids
+        if not np.all(known):
+            raise KeyError(f"no unit {np.asarray(ids)[~known][0]}")
+        return found
+
+    def without(self, ids: Ints) -> Lattice:
+        """The network without some units and the ligaments that end at them.
+
+        A vertex whose ligament is gone is a design group by itself.
+        """
+        kept = ~np.isin(self.id, ids)
+        vertex = kept[self.unit]
+        new_unit, new_vertex = np.cumsum(kept) - 1, np.cumsum(vertex) - 1
+        ligaments = new_vertex[self.ligaments[vertex[self.ligaments].all(axis=1)]]
+        return Lattice(
+            vertices=self.vertices[vertex],
+            unit=new_unit[self.unit[vertex]],
+            ligaments=ligaments,
+            group=_groups(int(vertex.sum()), ligaments),
+            site=self.site[kept],
+            index=self.index[kept],
+            spacing=self.spacing,
+            id=self.id[kept],
+        )
+
     def padded(self, values: Floats) -> Floats:
         """Rearranges a per-vertex array (n_vertices, k) by units (n_units, most, k), NaN padded."""
         counts = np.diff(self.first_vertex)
@@ -126,6 +160,7 @@ def quads(
         site=site,
         index=np.stack([i, j], axis=1),
         spacing=spacing,
+        id=np.arange(columns * rows),
     )
 
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.arrays import Floats, Ints
+from sim.arrays import Floats, Ints, Numbers
 from sim.band import number_free_dofs
 from sim.geometry import Shape
 from sim.kernels import Network
@@ -31,13 +31,13 @@ class Material(NamedTuple):
         damping_rotation: to ground, per unit, tonne mm^2/s.
     """
 
-    density: float | Array
-    axial: float | Array
-    shear: float | Array
-    bending: float | Array
-    contact: float | Array
-    damping_translation: float | Array
-    damping_rotation: float | Array
+    density: float | Numbers
+    axial: float | Numbers
+    shear: float | Numbers
+    bending: float | Numbers
+    contact: float | Numbers
+    damping_translation: float | Numbers
+    damping_rotation: float | Numbers
 
 
 class Parameters(NamedTuple, Generic[A]):

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from sim.arrays import Floats, Ints, Numbers
@@ -14,28 +15,57 @@ from sim.model import Parameters
 
 
 class DisplacementMimicking(NamedTuple):
-    """Weighted sum of |U - U_target|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1).
+    """Weighted sum of |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest).
 
     Attributes:
         units: (n,) region of interest.
         spacing: s, mm.
         weights: (n_asked,) quadrature weights.
-        target: (n_cases, n_asked, n, 3) displacement to mimic, or None for rest.
     """
 
     units: Ints
     spacing: float
     weights: Floats
-    target: Array | None = None
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
         del parameters
-        motion = displacement[:, :, self.units]
-        if self.target is not None:
-            motion = motion - self.target
-        normalised = motion / jnp.array([self.spacing, self.spacing, 1.0])
+        normalised = displacement[:, :, self.units] / scales(self.spacing)
         return jnp.einsum("ctud,ctud,t->c", normalised, normalised, self.weights)
+
+
+class RelativeMimicking(NamedTuple):
+    """Root of the weighted sum of |U - U_target|^2, relative to the size of U_target (Eq. 1).
+
+    Attributes:
+        units: (n,) region of interest.
+        spacing: s, mm.
+        weights: (n_asked,) quadrature weights.
+        target: (n_cases, n_asked, n, 3) displacement to mimic, mm, mm, rad.
+        size: (n_cases,) what counts as 1.
+    """
+
+    units: Ints
+    spacing: float
+    weights: Floats
+    target: Floats
+    size: Floats
+
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        del parameters
+        missed = (displacement[:, :, self.units] - self.target) / scales(self.spacing)
+        return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
+
+
+def scales(spacing: float) -> Floats:
+    """(3,) divisors of ux, uy (mm) and theta (rad) that make them comparable."""
+    return np.array([spacing, spacing, 1.0])
+
+
+def extent(motion: Floats, spacing: float) -> Floats:
+    """Size |U| (n_cases, n_asked) of a region's motion (n_cases, n_asked, n, 3)."""
+    return np.asarray(np.linalg.norm(motion / scales(spacing), axis=(2, 3)))
 
 
 class StrainEnergyMimicking(NamedTuple):

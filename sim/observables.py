@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
+from sim.energy import LigamentStrain, ligament_strain
 from sim.kernels import compiled
 from sim.model import Topology, Values
 from sim.potential import gradient
@@ -21,12 +25,19 @@ class Observables(NamedTuple):
         reaction: (n_states, n_units, 3) elastic and contact force on the held dofs, N and N mm; NaN
             on free ones.
         void_angle: (n_states,) smallest void angle, rad.
+        contact_pairs: (n_states,) ligaments whose units touch on either side.
+        stretch: (n_states,) largest elongation or shortening of a ligament over its length.
+        shear, bend: (n_states,) largest shear angle and relative rotation, rad.
     """
 
     strain_energy: Floats
     contact_energy: Floats
     reaction: Floats
     void_angle: Floats
+    contact_pairs: Ints
+    stretch: Floats
+    shear: Floats
+    bend: Floats
 
 
 @compiled
@@ -43,9 +54,31 @@ def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
     _visit(states, system_of(topology, values), energies, forces)
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
+    voids = topology.smallest_void_angles(values.void, motion)
+    given = (jnp.asarray(part) for part in (values.arm, values.vector, motion))
+    strain = _largest_strains(topology.ligament_units, *given)
     return Observables(
         energies[:, 0],
         energies[:, 1],
         reaction.reshape(motion.shape),
-        topology.smallest_void_angle(values.void, motion),
+        voids.min(axis=1, initial=np.pi),
+        (voids < topology.cutoff).sum(axis=1),
+        *(np.asarray(part) for part in strain),
     )
+
+
+@jax.jit
+def _largest_strains(
+    ligament_units: Ints, arm: Array, vector: Array, motion: Array
+) -> LigamentStrain:
+    """Largest magnitudes (n_states,) over the ligaments; the stretch relative to the length."""
+    of_all = jax.vmap(ligament_strain)
+    length = jnp.linalg.norm(vector, axis=1)
+
+    def of_state(state: Array) -> LigamentStrain:
+        ends = state[ligament_units]
+        found = of_all(ends[:, 0], ends[:, 1], arm[:, 0], arm[:, 1], vector)
+        relative = found._replace(stretch=found.stretch / length)
+        return LigamentStrain(*(jnp.abs(part).max(initial=0.0) for part in relative))
+
+    return jax.lax.map(of_state, motion)

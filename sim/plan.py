@@ -116,7 +116,7 @@ def make_plan(
     values = concrete_parameters(scene, structure)
     times = sample_times(scene) if asked is None else asked
     decisions: list[str] = []
-    skipped = ["simulation of the unloaded reference: it is zero"]
+    skipped = [_reference_line(scene)]
 
     may_repeat = not every_case and (vertices is not None or scene.symmetry == "C4")
     case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.motions))
@@ -156,8 +156,16 @@ def make_plan(
     return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
 
 
+def _reference_line(scene: Scene) -> str:
+    if scene.reference is None:
+        return "simulation of the unloaded reference: it is zero"
+    return "simulation of the intact reference in every evaluation: once will do"
+
+
 def sample_times(scene: Scene) -> Floats:
-    """Times (scene.samples,) over which the loss is integrated."""
+    """Times (n_asked,) of the samples or load steps that the loss is taken at."""
+    if scene.steps is not None:
+        return scene.duration * np.arange(1, scene.steps + 1) / scene.steps
     return np.linspace(0.0, scene.duration, scene.samples)
 
 
@@ -171,7 +179,7 @@ def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
     every = np.arange(len(scene.motions))
     directed = [m for m in scene.motions if isinstance(m, Harmonic | LinearRamp | TanhRamp)]
     besides = {motion._replace(direction=0.0) for motion in directed}
-    if len(directed) < len(scene.motions) or len(besides) > 1:
+    if len(directed) < len(scene.motions) or len(besides) > 1 or scene.reference is not None:
         return every
     image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
     clamped_units = np.unique(scene.clamped // 3)

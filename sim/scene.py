@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -36,8 +36,12 @@ class Scene:
         static: whether inertia plays no part.
         cloak: units to redesign.
         region: units of interest.
-        objective: what is compared with rest.
+        objective: what is compared with the target.
         samples: number of samples that the loss is integrated over.
+        steps: number of equal load steps that it is taken at instead; the start is none of them.
+        reference: the scene whose region should move alike, its units in the same order; None to
+            compare with rest.
+        frozen: units whose vertices stay, whoever shares them; None for the driven ones.
         symmetry: imposed on the design.
         accuracy, integrator: as asked for.
     """
@@ -57,14 +61,30 @@ class Scene:
     region: Ints
     objective: Literal["displacement", "strain_energy"] = "displacement"
     samples: int = 201
+    steps: int | None = None
+    reference: Scene | None = None
+    frozen: Ints | None = None
     symmetry: Symmetry = "none"
     accuracy: Accuracy = "default"
     integrator: Integrator = "auto"
 
     @cached_property
     def space(self) -> DesignSpace:
-        """Shifts of the cloak's vertices; those of the driven units stay."""
-        return design_space(self.lattice, self.cloak, self.driven, self.symmetry)
+        """Shifts of the cloak's vertices; those of frozen units stay."""
+        frozen = self.driven if self.frozen is None else self.frozen
+        return design_space(self.lattice, self.cloak, frozen, self.symmetry)
+
+    def under(self, motions: tuple[Motion, ...], duration: float, frequency: float) -> Scene:
+        """The scene and its reference under other drives, weighted equally."""
+        reference = self.reference
+        return replace(
+            self,
+            motions=motions,
+            weights=np.full(len(motions), 1 / len(motions)),
+            duration=duration,
+            frequency=frequency,
+            reference=reference and reference.under(motions, duration, frequency),
+        )
 
     @cached_property
     def drives(self) -> tuple[Drive, ...]:

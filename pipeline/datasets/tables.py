@@ -27,7 +27,9 @@ class Variable:
         dtype: type in the file.
         gaps: whether NaN is a value it may take (padding, free degrees of freedom, failed cases).
         flags: meanings of its integer values.
-        values: all values of a coordinate that is the same in each file.
+        values: all values of a coordinate, in their order.
+        subset: whether it may have some of them only.
+        also: units of equal right, where the quantity depends on the problem.
         coordinate: whether it labels dimensions.
     """
 
@@ -38,6 +40,8 @@ class Variable:
     gaps: bool = False
     flags: Mapping[str, int] = field(default_factory=dict)
     values: tuple[str, ...] = ()
+    subset: bool = False
+    also: tuple[str, ...] = ()
     coordinate: bool = False
 
 
@@ -69,7 +73,7 @@ _NETWORK: Table = {
         "1",
         "region of the unit",
         "int8",
-        flags={"surroundings": 0, "cloak": 1, "source": 2, "void": 3},
+        flags={"surroundings": 0, "cloak": 1, "source": 2, "void": 3, "inclusion": 4},
     ),
     "roi": Variable(
         ("unit",),
@@ -85,7 +89,9 @@ _NETWORK: Table = {
         "int8",
         flags={"free": 0, "clamped": 1, "driven": 2},
     ),
-    "ligament_unit": Variable(("ligament", "end"), "1", "units that the ligament joins", "int64"),
+    "ligament_unit": Variable(
+        ("ligament", "end"), "1", "units that the ligament of the intact lattice joins", "int64"
+    ),
     "ligament_vertex": Variable(
         ("ligament", "end"), "1", "vertex within the unit at either end of the ligament", "int64"
     ),
@@ -96,9 +102,9 @@ _SHAPE: Table = {
         ("unit", "vertex", "xy"), "mm", "vertices of the design, counter-clockwise", gaps=True
     ),
     "vertices_initial": Variable(
-        ("unit", "vertex", "xy"), "mm", "vertices before the optimisation", gaps=True
+        ("unit", "vertex", "xy"), "mm", "vertices of the intact lattice at the start", gaps=True
     ),
-    "centroid": Variable(("unit", "xy"), "mm", "centroid of the unit"),
+    "centroid": Variable(("unit", "xy"), "mm", "centroid of the unit", gaps=True),
     "constraint": _names("constraint", "kind of constraint"),
     "constraint_units": _label(("constraint",), "1", "unit of the constraint's margin", "str"),
     "constraint_margin": Variable(
@@ -111,10 +117,16 @@ _SHAPE: Table = {
     "overlaps": Variable((), "1", "number of overlapping pairs of units", "int64"),
 }
 
+ENERGY = ("N mm",)
+
 _HISTORY: Table = {
     "evaluation": _label(("evaluation",), "1", "number of the evaluation, from zero", "int64"),
-    "loss": Variable(("evaluation",), "1", "loss, weighted mean of the load cases", gaps=True),
-    "loss_case": Variable(("evaluation", "case"), "1", "loss of the load case", gaps=True),
+    "loss": Variable(
+        ("evaluation",), "1", "loss, weighted mean of the load cases", gaps=True, also=ENERGY
+    ),
+    "loss_case": Variable(
+        ("evaluation", "case"), "1", "loss of the load case", gaps=True, also=ENERGY
+    ),
     "violation": Variable(
         ("evaluation",), "1", "largest scaled constraint violation, zero if feasible", gaps=True
     ),
@@ -129,7 +141,7 @@ _HISTORY: Table = {
         ("evaluation", "variable"), "mm", "shifts of the free vertices from the start", gaps=True
     ),
     "best_evaluation": Variable((), "1", "evaluation of the best feasible design", "int64"),
-    "best_loss": Variable((), "1", "loss of the best feasible design"),
+    "best_loss": Variable((), "1", "loss of the best feasible design", also=ENERGY),
     "kkt_residual": Variable(
         (), "1", "residual of the optimality conditions at the best feasible design", gaps=True
     ),
@@ -148,7 +160,15 @@ def _per_method(table: Table) -> Table:
 
 
 _RESPONSE_LABELS: Table = {
-    "structure": _names("structure", "structure", "altered", "cloaked"),
+    "structure": Variable(
+        ("structure",),
+        "1",
+        "structure: intact, altered (void or inclusion, no cloak), cloaked",
+        "str",
+        values=("intact", "altered", "cloaked"),
+        subset=True,
+        coordinate=True,
+    ),
     "frequency": Variable(("case",), "Hz", "frequency of the drive", gaps=True, coordinate=True),
     "amplitude": Variable(("case",), "mm", "amplitude of the drive", gaps=True, coordinate=True),
     "time": _label(("time",), "s", "time since the start of the drive"),
@@ -156,7 +176,7 @@ _RESPONSE_LABELS: Table = {
 }
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
-_HISTORY_OF_CASE = ("structure", "case", "time")
+_STEP = ("structure", "case", "time")
 _OF_CASE = ("structure", "case")
 
 _RESPONSE: Table = {
@@ -166,19 +186,49 @@ _RESPONSE: Table = {
         "vertices at rest, counter-clockwise",
         gaps=True,
     ),
-    "displacement": Variable(_MOTION, "mm (ux, uy), rad (theta)", "displacement of the units"),
-    "velocity": Variable(_MOTION, "mm/s (ux, uy), rad/s (theta)", "velocity of the units"),
+    "displacement": Variable(
+        _MOTION, "mm (ux, uy), rad (theta)", "displacement of the units", gaps=True
+    ),
+    "velocity": Variable(
+        _MOTION, "mm/s (ux, uy), rad/s (theta)", "velocity of the units", gaps=True
+    ),
     "reaction_force": Variable(
         _MOTION, "N (ux, uy), N mm (theta)", "force of the supports and drives", gaps=True
     ),
-    "strain_energy": Variable(_HISTORY_OF_CASE, "N mm", "strain energy of the ligaments"),
-    "contact_energy": Variable(_HISTORY_OF_CASE, "N mm", "energy of the contacts"),
-    "min_void_angle": Variable(_HISTORY_OF_CASE, "rad", "smallest void angle"),
+    "drive_displacement": Variable(
+        ("case", "time", "xy"), "mm", "displacement of the driven units, mean"
+    ),
+    "drive_force": Variable((*_STEP, "xy"), "N", "force of the drive on all driven units together"),
+    "strain_energy": Variable(_STEP, "N mm", "strain energy of the ligaments"),
+    "contact_energy": Variable(_STEP, "N mm", "energy of the contacts"),
+    "min_void_angle": Variable(_STEP, "rad", "smallest void angle"),
+    "roi_energy": Variable(
+        _STEP, "N mm", "strain energy of the ligaments that touch the region of interest"
+    ),
+    "contact_pairs": Variable(_STEP, "1", "pairs of units in contact", "int64"),
+    "max_stretch": Variable(_STEP, "1", "largest |elongation| of a ligament over its length"),
+    "max_shear": Variable(_STEP, "rad", "largest |shear angle| of a ligament"),
+    "max_bend": Variable(_STEP, "rad", "largest |relative rotation| over a ligament"),
+    "gap": Variable(_STEP, "mm", "smallest gap between units, where it was looked for", gaps=True),
+    "overlapping": Variable(
+        _STEP, "1", "overlapping pairs of units, where they were looked for", gaps=True
+    ),
+    "stability": Variable(
+        _STEP,
+        "1",
+        "whether a state of equilibrium is a minimum of the energy",
+        "int8",
+        flags={"not_asked": -1, "unstable": 0, "stable": 1},
+    ),
     "min_gap": Variable(_OF_CASE, "mm", "smallest gap between units over the history"),
     "overlaps": Variable(_OF_CASE, "1", "overlapping pairs of units over the history", "int64"),
-    "loss": Variable(_OF_CASE, "1", "loss, time integral"),
-    "loss_samples": Variable(_OF_CASE, "1", "loss, mean of the samples as the authors plot it"),
-    "loss_error": Variable(_OF_CASE, "1", "estimated relative error of the loss"),
+    "loss": Variable(_OF_CASE, "1", "loss: time integral, or over the load steps", also=ENERGY),
+    "loss_samples": Variable(
+        _OF_CASE, "1", "loss, mean of the samples as the authors plot it", also=ENERGY
+    ),
+    "loss_error": Variable(
+        _OF_CASE, "1", "estimated error of the loss, relative; absolute where it is a ratio itself"
+    ),
     "displacement_error": Variable(
         _OF_CASE, "1", "estimated relative error of the displacement in the region of interest"
     ),

@@ -42,14 +42,14 @@ def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator
         yield Fault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
     elif found.dtype.kind not in _KINDS[table.dtype]:
         yield Fault(f"its type is not {table.dtype}", name, str(found.dtype))
-    elif (units := found.attrs.get("units", table.units)) != table.units:
+    elif (units := found.attrs.get("units", table.units)) not in (table.units, *table.also):
         yield Fault(f"its unit is not {table.units!r}", name, units)
     else:
         yield from _value_faults(found.values, name, table)
 
 
 def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fault]:
-    if table.values and tuple(values.tolist()) != table.values:
+    if table.values and tuple(values.tolist()) != _expected(values, table):
         yield Fault(f"its values are not {_tuple(table.values)}", name, _tuple(values.tolist()))
     if table.flags and not np.isin(values, list(table.flags.values())).all():
         meanings = ", ".join(f"{value} {flag}" for flag, value in table.flags.items())
@@ -59,6 +59,13 @@ def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fa
             yield Fault("infinite values", name)
         if not table.gaps and np.isnan(values).any():
             yield Fault("NaN where every value is needed", name)
+
+
+def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:
+    """The values that a coordinate should have: all, or those that are there, in their order."""
+    if not table.subset:
+        return table.values
+    return tuple(value for value in table.values if value in values)
 
 
 def _tuple(names: object) -> str:

@@ -1,6 +1,12 @@
 """The problem file: typed, with units, checked. `load` is the way in."""
 
-from pipeline.problem.checks import cloak_units, interest_units
+from pipeline.problem.checks import (
+    cloak_units,
+    inclusion_units,
+    interest_units,
+    source_units,
+    void_units,
+)
 from pipeline.problem.identity import (
     Stage,
     canonical_json,
@@ -19,10 +25,13 @@ __all__ = [
     "cloak_units",
     "content_hash",
     "from_canonical",
+    "inclusion_units",
     "interest_units",
     "load",
     "preset_names",
     "section_hash",
     "selected_units",
+    "source_units",
     "units_within",
+    "void_units",
 ]

@@ -6,14 +6,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from pipeline.problem.drives import LinearRamp
 from pipeline.problem.model import Problem
-from pipeline.problem.selection import (
-    Region,
-    Selector,
-    centre_of,
-    selected_units,
-    units_within,
-)
+from pipeline.problem.regions import Region, at
+from pipeline.problem.selection import Lattice, Selector, selected_units, units_within
 from pipeline.problem.yamlfile import KeyPath
 
 
@@ -83,8 +79,7 @@ def _drive_is_free(problem: Problem) -> Findings:
     driven = set(selected_units(problem.drive.units, problem.lattice))
     for support in problem.supports:
         if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
-            j, i = divmod(both[0], problem.lattice.columns)
-            what = f"unit [{i}, {j}] is driven and clamped"
+            what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
             yield Finding(what, ("drive", "units"), "drive or clamp it, not both")
 
 
@@ -95,12 +90,17 @@ def _horizon(problem: Problem) -> Findings:
     if problem.sweep is not None and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no frequency to sweep"
         yield Finding(what, ("sweep",), "leave the sweep out, or drive harmonically")
+    if problem.horizon.steps is not None and not isinstance(problem.drive, LinearRamp):
+        what = f"a {problem.drive.kind} drive does not load in equal steps"
+        yield Finding(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
 
 def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     lattice = problem.lattice
-    x, y = centre_of(region, lattice)
-    _, inner, outer = region.bounds
+    if region.bounds is None:
+        return
+    centre, inner, outer = region.bounds
+    x, y = at(centre, lattice.centre_site)
     margin = 0.5 * lattice.spacing
     right, top = (lattice.columns - 1) * lattice.spacing, (lattice.rows - 1) * lattice.spacing
     room = margin + min(x, y, right - x, top - y)
@@ -116,6 +116,10 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
 
 
 def _regions(problem: Problem) -> Findings:
+    if problem.void is not None:
+        yield from _region_fits(problem, problem.void, ("void",))
+    if problem.inclusion is not None:
+        yield from _region_fits(problem, problem.inclusion.region, ("inclusion", "region"))
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"
@@ -127,9 +131,99 @@ def _regions(problem: Problem) -> Findings:
         yield Finding("no unit lies in the region of interest", key, "leave units outside it")
 
 
+def _void(problem: Problem) -> Findings:
+    if problem.void is None:
+        return
+    removed = void_units(problem)
+    if not removed:
+        yield Finding("no unit lies in the void", ("void",), "enlarge it, or move its centre")
+    yield from _void_and_supports(problem, set(removed))
+    yield from _void_and_rest(problem, set(removed))
+
+
+def _inclusion(problem: Problem) -> Findings:
+    if problem.inclusion is None:
+        return
+    stiff = set(inclusion_units(problem))
+    if not stiff:
+        what = "no unit lies in the inclusion"
+        yield Finding(what, ("inclusion", "region"), "enlarge it, or move its centre")
+    if both := sorted(stiff & set(void_units(problem))):
+        what = f"unit {problem.lattice.name(both[0])} is in the void and in the inclusion"
+        yield Finding(what, ("inclusion", "region"), "keep the two apart")
+
+
+def _target(problem: Problem) -> Findings:
+    if problem.objective.target == "rest":
+        return
+    if problem.objective.kind == "strain_energy":
+        what = "an energy is compared with that at rest"
+        yield Finding(what, ("objective", "target"), "give `rest`, or kind: displacement")
+    if problem.void or problem.inclusion:
+        return
+    what = "nothing is altered, so there is nothing to mimic"
+    yield Finding(what, ("objective", "target"), "add `void:` or `inclusion:`, or give rest")
+
+
+def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
+    lattice = problem.lattice
+    for keys, selector in _selectors(problem):
+        if both := sorted(removed & set(selected_units(selector, lattice))):
+            held = "driven" if keys[0] == "drive" else "clamped"
+            what = f"the void touches the {held} units: it removes unit {lattice.name(both[0])}"
+            yield Finding(what, ("void",), f"make it smaller, or move it off the {held} units")
+
+
+def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
+    lattice = problem.lattice
+    kept = {unit for unit, _, _ in lattice.sites()} - removed
+    joined = _joined_to(min(kept), kept, lattice) if kept else set()
+    if other := kept - joined:
+        first = min(other if len(other) < len(joined) else joined)
+        what = f"the void splits the lattice: unit {lattice.name(first)} is cut off from the rest"
+        yield Finding(what, ("void",), "change its shape so that all other units stay joined")
+
+
+def _joined_to(start: int, kept: set[int], lattice: Lattice) -> set[int]:
+    """The kept units that ligaments join to `start`, at any distance."""
+    neighbours: dict[int, list[int]] = {unit: [] for unit in kept}
+    for one, other in lattice.bonds():
+        if one in kept and other in kept:
+            neighbours[one].append(other)
+            neighbours[other].append(one)
+    found, waiting = {start}, [start]
+    while waiting:
+        new = set(neighbours[waiting.pop()]) - found
+        found |= new
+        waiting += new
+    return found
+
+
+def void_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units that the void removes."""
+    return () if problem.void is None else units_within(problem.void, problem.lattice)
+
+
+def inclusion_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the units that are made rigid."""
+    inclusion = problem.inclusion
+    return () if inclusion is None else units_within(inclusion.region, problem.lattice)
+
+
+def altered_units(problem: Problem) -> set[int]:
+    """Ids of the units that are removed or made rigid: neither cloak nor surroundings."""
+    return {*void_units(problem), *inclusion_units(problem)}
+
+
+def source_units(problem: Problem) -> tuple[int, ...]:
+    """Ids of the driven units within the cloak: they keep their shape to fit what drives them."""
+    driven = selected_units(problem.drive.units, problem.lattice)
+    return tuple(sorted(set(driven) & set(units_within(problem.cloak, problem.lattice))))
+
+
 def cloak_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units to design: the cloak without driven units and the region of interest."""
-    taken = set(selected_units(problem.drive.units, problem.lattice))
+    """Ids of the units to design: the cloak's that nothing else claims."""
+    taken = {*selected_units(problem.drive.units, problem.lattice), *altered_units(problem)}
     if isinstance(problem.objective.region, Region):
         taken |= set(units_within(problem.objective.region, problem.lattice))
     inside = units_within(problem.cloak, problem.lattice)
@@ -137,10 +231,17 @@ def cloak_units(problem: Problem) -> tuple[int, ...]:
 
 
 def interest_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units that the objective looks at; driven units are no surroundings."""
+    """Ids of the units that the objective looks at.
+
+    Driven units are no surroundings to keep at rest, but they belong to those that are mimicked.
+    """
+    taken = altered_units(problem)
     if isinstance(problem.objective.region, Region):
-        return units_within(problem.objective.region, problem.lattice)
-    taken = set(cloak_units(problem)) | set(selected_units(problem.drive.units, problem.lattice))
+        inside = units_within(problem.objective.region, problem.lattice)
+        return tuple(unit for unit in inside if unit not in taken)
+    taken |= set(cloak_units(problem))
+    if problem.objective.target == "rest":
+        taken |= set(selected_units(problem.drive.units, problem.lattice))
     return tuple(unit for unit, _, _ in problem.lattice.sites() if unit not in taken)
 
 
@@ -195,6 +296,9 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _units_exist,
     _drive_is_free,
     _horizon,
+    _void,
+    _inclusion,
+    _target,
     _regions,
     _start_is_feasible,
     _symmetry,

@@ -27,9 +27,10 @@ from pipeline.problem.quantities import (
     Stiffness,
     fault,
 )
+from pipeline.problem.regions import Region
 from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
-from pipeline.problem.selection import Lattice, Region, Selector
+from pipeline.problem.selection import Lattice, Selector
 
 _UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
 _UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
@@ -98,12 +99,24 @@ class Support(Section):
     )
 
 
+class Inclusion(Section):
+    """Units made rigid: every ligament that touches one is so many times stiffer."""
+
+    region: Region
+    stiffness_factor: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = 200.0
+
+
 class Horizon(Section):
-    """How long the loss looks, in periods of the drive or in time, and in how many samples."""
+    """How long the loss looks, in periods of the drive or in time, and at how many instants.
+
+    `samples` are spread over a motion in time, both ends included; `steps` are the equal load steps
+    of a static path, the unloaded start left out.
+    """
 
     periods: Positive | None = None
     duration: Duration | None = None
     samples: Samples = 200
+    steps: Count | None = None
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -112,10 +125,10 @@ class Horizon(Section):
 
 
 class Objective(Section):
-    """What the surroundings or a region should do."""
+    """What the surroundings or a region should do: rest, or move as in the intact lattice."""
 
     kind: Literal["displacement", "strain_energy"]
-    target: Literal["rest"]
+    target: Literal["rest", "intact"]
     region: Literal["surroundings"] | Region = "surroundings"
 
 
@@ -208,6 +221,8 @@ class Problem(Section):
     supports: tuple[Support, ...] = ()
     drive: Drive
     horizon: Horizon
+    void: Region | None = None
+    inclusion: Inclusion | None = None
     cloak: Region
     objective: Objective
     constraints: Constraints = Constraints()

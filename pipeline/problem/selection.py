@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from functools import lru_cache
+from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
-from pipeline.problem.quantities import Angle, Coordinate, Gap, Length
-from pipeline.problem.section import Section, exactly_one
-
-_HAIR = 1e-9  # relative; keeps sites that lie on a circle on its inner side
+from pipeline.problem.quantities import Angle, Length
+from pipeline.problem.regions import HAIR, Region
+from pipeline.problem.section import Section
 
 Index = Annotated[int, Field(ge=0, strict=True)]
 Size = Annotated[int, Field(ge=1, le=1000, strict=True)]
@@ -51,6 +51,19 @@ class Lattice(Section):
             for i in range(self.columns):
                 yield self.unit(i, j), i * self.spacing, j * self.spacing
 
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """The units that each ligament joins."""
+        for unit in range(self.columns * self.rows):
+            if (unit + 1) % self.columns:
+                yield unit, unit + 1
+            if unit + self.columns < self.columns * self.rows:
+                yield unit, unit + self.columns
+
+    def name(self, unit: int) -> str:
+        """A unit by its lattice indices."""
+        j, i = divmod(unit, self.columns)
+        return f"[{i}, {j}]"
+
 
 class ListedUnits(Section):
     """Units by their lattice indices (i, j), counted from zero."""
@@ -69,68 +82,11 @@ Selector = Annotated[
 ]
 
 
-def _centre_tag(value: object) -> str:
-    return "named" if isinstance(value, str) else "listed"
-
-
-Centre = Annotated[
-    Annotated[Literal["centre"], Tag("named")]
-    | Annotated[tuple[Coordinate, Coordinate], Tag("listed")],
-    Discriminator(_centre_tag),
-]
-
-
-class Disc(Section):
-    """Units whose site lies within `radius` of `centre`, the rim included."""
-
-    centre: Centre = "centre"
-    radius: Length
-
-
-class Ring(Section):
-    """Units whose site lies beyond `inner` and within `outer` of `centre`."""
-
-    centre: Centre = "centre"
-    inner: Gap
-    outer: Length
-
-
-class Region(Section):
-    """A disc or a ring of units."""
-
-    disc: Disc | None = None
-    ring: Ring | None = None
-
-    @model_validator(mode="after")
-    def _one_shape(self) -> Self:
-        exactly_one(self, "disc", "ring")
-        return self
-
-    @property
-    def bounds(self) -> tuple[Centre, float, float]:
-        """Centre, inner radius (-1 for a disc, which holds its own centre) and outer radius, mm."""
-        if self.ring is not None:
-            return self.ring.centre, self.ring.inner, self.ring.outer
-        assert self.disc is not None
-        return self.disc.centre, -1.0, self.disc.radius
-
-
-def centre_of(region: Region, lattice: Lattice) -> tuple[float, float]:
-    """The centre of a region in mm, specimen frame."""
-    centre, _, _ = region.bounds
-    return lattice.centre_site if isinstance(centre, str) else centre
-
-
+@lru_cache(maxsize=64)
 def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
     """The ids of the units whose site lies in the region, ascending."""
-    x0, y0 = centre_of(region, lattice)
-    _, inner, outer = region.bounds
-    hair = _HAIR * lattice.spacing
-    return tuple(
-        unit
-        for unit, x, y in lattice.sites()
-        if inner + hair < math.hypot(x - x0, y - y0) <= outer + hair
-    )
+    within = region.membership(lattice.centre_site, HAIR * lattice.spacing)
+    return tuple(unit for unit, x, y in lattice.sites() if within((x, y)))
 
 
 def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:

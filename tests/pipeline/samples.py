@@ -18,7 +18,7 @@ SIZES = {
     "case": 4,
     "variable": 80,
     "constraint": 5,
-    "structure": 2,
+    "structure": 3,
     "time": 11,
     "dof": 3,
     "direction": 3,

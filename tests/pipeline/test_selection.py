@@ -7,13 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.problem.quantities import SIM_UNITS
+from pipeline.problem.regions import Disc, Region, Ring
 from pipeline.problem.selection import (
-    Disc,
     Lattice,
     ListedUnits,
     NamedUnits,
-    Region,
-    Ring,
     selected_units,
     units_within,
 )

@@ -95,7 +95,8 @@ def _labels(chosen: Problem, lattice: Lattice) -> dict[str, Any]:
 def cloaked(chosen: Problem, lattice: Lattice) -> np.ndarray:
     """Vertices of a four-fold symmetric design: a harder turn of the units around the source."""
     ends = lattice.vertices[lattice.ligaments].mean(axis=1) - np.array(chosen.lattice.centre_site)
-    away = np.linalg.norm(ends, axis=1) / chosen.cloak.bounds[2]
+    assert chosen.cloak.disc is not None
+    away = np.linalg.norm(ends, axis=1) / chosen.cloak.disc.radius
     strength = np.where(away < 0.98, np.sin(np.pi * away) * (away - 0.4) * 3.0, 0.0)
     turn = strength[:, None] * np.stack([-ends[:, 1], ends[:, 0]], axis=1)
     turn /= np.maximum(np.linalg.norm(ends, axis=1), 1.0)[:, None]
@@ -183,6 +184,16 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
             "strain_energy": (per_time, zeros),
             "contact_energy": (per_time, zeros),
             "min_void_angle": (per_time, zeros + 0.2 - 0.1 * time),
+            "roi_energy": (per_time, zeros),
+            "contact_pairs": (per_time, zeros.astype(int)),
+            "max_stretch": (per_time, zeros),
+            "max_shear": (per_time, zeros),
+            "max_bend": (per_time, zeros),
+            "gap": (per_time, zeros + 0.08),
+            "overlapping": (per_time, zeros),
+            "stability": (per_time, np.full(zeros.shape, -1)),
+            "drive_displacement": (("case", "time", "xy"), np.zeros((*motion.shape[1:3], 2))),
+            "drive_force": ((*per_time, "xy"), np.zeros((*motion.shape[:3], 2))),
             "min_gap": (per_case, np.full(loss.shape, 0.08)),
             "overlaps": (per_case, np.zeros(loss.shape, int)),
             "loss": (per_case, loss),

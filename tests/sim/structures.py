@@ -71,6 +71,7 @@ def hand_made(polygons: list[Floats], ligaments: Ints) -> Lattice:
         site=np.array([polygon.mean(axis=0) for polygon in polygons]),
         index=np.stack([np.arange(n_units), np.zeros(n_units, dtype=int)], axis=1),
         spacing=15.0,
+        id=np.arange(n_units),
     )
 
 

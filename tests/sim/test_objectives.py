@@ -7,7 +7,13 @@ import pytest
 from sim.grid import simpson_weights
 from sim.kernels import ligament_energies
 from sim.loads import Harmonic
-from sim.objectives import DisplacementMimicking, StrainEnergyMimicking, strain_energies
+from sim.objectives import (
+    DisplacementMimicking,
+    RelativeMimicking,
+    StrainEnergyMimicking,
+    extent,
+    strain_energies,
+)
 from tests.sim.structures import Rig, rotating_squares
 
 RIG = Rig(rotating_squares(), np.array([0, 4]), np.array([12]), Harmonic(1.0, 2.0))
@@ -28,8 +34,19 @@ def test_displacement_mimicking_is_the_papers_sum() -> None:
 
 def test_a_target_that_is_met_costs_nothing() -> None:
     units = np.array([3, 7, 20])
-    measure = DisplacementMimicking(units, 15.0, WEIGHTS, jnp.asarray(MOTION[:, :, units]))
+    size = np.ones(2)
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, MOTION[:, :, units], size)
     np.testing.assert_array_equal(measure(jnp.asarray(MOTION), RIG.values), 0.0)
+
+
+def test_a_missed_target_is_relative_to_its_size() -> None:
+    units = np.array([3, 7, 20])
+    target = MOTION[:, :, units]
+    size = extent(target, 15.0)[:, -1]
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, target, size)
+    losses = measure(jnp.zeros_like(MOTION), RIG.values)
+    every = DisplacementMimicking(units, 15.0, WEIGHTS)(jnp.asarray(MOTION), RIG.values)
+    np.testing.assert_allclose(losses, np.sqrt(every) / size, rtol=1e-13)
 
 
 def test_strain_energies_are_the_kernels() -> None:

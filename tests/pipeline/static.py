@@ -1,0 +1,64 @@
+"""Text of static problems: the authors' scenes, and small ones that are quick to solve."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_TEXT = """
+lattice:
+  kind: quads
+  columns: {size}
+  rows: {size}
+  spacing: 15 mm
+  ligament_length: 2.25 mm
+  bias_angle: 20 deg
+material:
+  density: 6.18 kg/m^2
+  axial_stiffness: 120 N/mm
+  shear_stiffness: 1.19 N/mm
+  bending_stiffness: 1.5 N mm/rad
+  damping: {{ ratio: 0.0186 }}
+contact: {{ law: angle, stiffness: 1.5 N mm/rad^2, barrier_angle: -15 deg, cutoff_angle: -10 deg }}
+supports:
+  - units: left
+drive:
+  kind: linear_ramp
+  units: right
+  amplitude: {amplitude} mm
+  directions: [180 deg]
+  duration: 1 s
+horizon: {{ duration: 1 s, steps: 4 }}
+constraints: {{ edge_length: 3 mm, block_angle: 30 deg, void_angle: 0 deg }}
+optimiser: {{ methods: {{ sqp: {{ evaluations: 4 }} }} }}
+response: {{ samples: 9 }}
+{more}
+"""
+
+MIMIC = "objective: { kind: displacement, target: intact }\n"
+
+SMILE = (
+    "void: { curve: { kind: smile, centre: [105 mm, 97.5 mm], inner_radius: 45 mm,"
+    " inner_rise: 30 mm, outer_radius: 60 mm, outer_rise: 15 mm } }\n"
+    "cloak: { disc: { centre: [105 mm, 97.5 mm], radius: 73.5 mm } }\n" + MIMIC
+)
+HEART = (
+    "void: { curve: { kind: heart, size: [270 mm, 198 mm], centre: [225 mm, 221.25 mm] } }\n"
+    "cloak: { disc: { centre: [225 mm, 221.25 mm], radius: 154 mm } }\n" + MIMIC
+)
+RIGID_HEART = (
+    "inclusion: { region: { curve: { kind: heart, size: [105 mm, 90 mm],"
+    " centre: [112.5 mm, 105 mm], points: 30 } } }\n"
+    "cloak: { disc: { centre: [112.5 mm, 105 mm], radius: 77 mm } }\n" + MIMIC
+)
+SHIELD = (
+    "cloak: { disc: { radius: 91 mm } }\n"
+    "objective: { kind: strain_energy, target: rest, region: { disc: { radius: 67.5 mm } } }\n"
+)
+HOLE = "void: { disc: { radius: 7 mm } }\ncloak: { disc: { radius: 22 mm } }\n" + MIMIC
+
+
+def write(folder: Path, more: str, size: int = 15, amplitude: float = 15.0) -> Path:
+    """Writes a static problem of `size` x `size` units into `folder`."""
+    path = folder / "problem.yaml"
+    path.write_text(_TEXT.format(size=size, amplitude=amplitude, more=more), encoding="utf-8")
+    return path

@@ -1,0 +1,129 @@
+"""Voids, inclusions and targets, from the problem file to the response."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets, design, select, simulate
+from pipeline.errors import UserError
+from pipeline.problem import cloak_units, interest_units, load, void_units
+from pipeline.scenes import scene_of
+from pipeline.structures import present_ligaments
+from sim.evaluation import evaluator
+from sim.plan import make_plan
+from tests.pipeline.static import HEART, HOLE, MIMIC, RIGID_HEART, SHIELD, SMILE, write
+
+
+@pytest.mark.parametrize(
+    ("more", "size", "removed", "cloak", "interest", "variables", "ligaments"),
+    [
+        (SMILE, 15, 18, 56, 151, 292, 369),
+        (HEART, 30, 142, 193, 565, 922, 1423),
+        (RIGID_HEART, 15, 0, 60, 143, 306, 420),
+        (SHIELD, 15, 0, 44, 69, 264, 420),
+    ],
+    ids=["smile", "heart", "rigid heart", "shield"],
+)
+def test_counts_are_the_authors(
+    tmp_path: Path,
+    more: str,
+    size: int,
+    removed: int,
+    cloak: int,
+    interest: int,
+    variables: int,
+    ligaments: int,
+) -> None:
+    problem = load(write(tmp_path, more, size))
+    assert len(void_units(problem)) == removed
+    assert len(cloak_units(problem)) == cloak
+    assert len(interest_units(problem)) == interest
+    scene = scene_of(problem, tmp_path)
+    assert scene.space.n_variables == variables
+    assert scene.lattice.n_ligaments == ligaments
+
+
+def test_losses_at_the_start_are_the_papers(tmp_path: Path) -> None:
+    for more, steps, loss in ((SMILE, 20, 0.920), (SHIELD, 10, 13.13)):
+        path = write(tmp_path, more)
+        path.write_text(path.read_text().replace("steps: 4", f"steps: {steps}"))
+        scene = scene_of(load(path), tmp_path)
+        found, _, _ = evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
+        assert found == pytest.approx(loss, abs=5e-3 * loss)
+
+
+@pytest.mark.parametrize(
+    ("more", "what", "key"),
+    [
+        (
+            "void: { disc: { centre: [15 mm, 60 mm], radius: 20 mm } }\n",
+            "the void touches the clamped units: it removes unit [0, 4]",
+            "void",
+        ),
+        (
+            "void: { disc: { centre: [105 mm, 60 mm], radius: 20 mm } }\n",
+            "the void touches the driven units: it removes unit [8, 4]",
+            "void",
+        ),
+        (
+            "void: { polygon: { vertices: [[50 mm, -5 mm], [70 mm, -5 mm], [70 mm, 125 mm],"
+            " [50 mm, 125 mm]] } }\n",
+            "the void splits the lattice: unit [0, 0] is cut off from the rest",
+            "void",
+        ),
+        (
+            "void: { disc: { centre: [66 mm, 66 mm], radius: 5 mm } }\n",
+            "no unit lies in the void",
+            "void",
+        ),
+        ("", "nothing is altered, so there is nothing to mimic", "objective.target"),
+        (
+            "void: { disc: { radius: 20 mm }, ring: { inner: 1 mm, outer: 2 mm } }\n",
+            "disc and ring exclude each other",
+            "void",
+        ),
+        ("void: { curve: { kind: hart } }\n", "unknown kind", "void.curve"),
+    ],
+    ids=["clamped", "driven", "split", "empty", "nothing", "two shapes", "kind"],
+)
+def test_a_bad_void_is_told(tmp_path: Path, more: str, what: str, key: str) -> None:
+    cloak = "cloak: { disc: { centre: [75 mm, 60 mm], radius: 30 mm } }\n" + MIMIC
+    with pytest.raises(UserError) as caught:
+        load(write(tmp_path, more + cloak, size=9))
+    assert what in caught.value.what
+    assert caught.value.key == key
+    assert caught.value.remedy
+
+
+def test_a_small_void_from_problem_to_response(tmp_path: Path) -> None:
+    problem = write(tmp_path, HOLE, size=5, amplitude=3.0)
+    study = ["--problem", str(problem), "--quiet", "--out"]
+    made, chosen, response = (str(tmp_path / f"{name}.nc") for name in ("design_sqp", "d", "r"))
+    assert design.main([*study, made, "--method", "sqp"]) == 0
+    assert select.main([*study, chosen, "--designs", made]) == 0
+    assert simulate.main([*study, response, "--design", chosen]) == 0
+
+    shipped, moved = datasets.read(chosen, "design"), datasets.read(response, "response")
+    void = shipped["region"].values == 3
+    assert np.flatnonzero(void).tolist() == [12]
+    np.testing.assert_array_equal(np.isnan(shipped["vertices"].values).all(axis=(1, 2)), void)
+    assert not np.isnan(shipped["vertices_initial"]).any()
+    assert np.count_nonzero(~present_ligaments(shipped)) == 4
+    assert present_ligaments(shipped, "intact").all()
+
+    assert moved["structure"].values.tolist() == ["intact", "altered", "cloaked"]
+    gone = np.isnan(moved["displacement"].values).all(axis=(1, 2, 4))
+    np.testing.assert_array_equal(gone, [np.zeros(25, bool), void, void])
+    intact, altered, cloaked = moved["loss"].values[:, 0]
+    assert intact == 0.0
+    assert cloaked < 0.9 * altered
+    assert cloaked == pytest.approx(float(shipped["best_loss"][0]), rel=1e-9)
+    assert (moved["stability"] == 1).all()
+    push = moved["drive_displacement"].sel(xy="x").values[0]
+    np.testing.assert_allclose(push, -3.0 * moved["time"])
+    work = np.trapezoid(moved["drive_force"].sel(xy="x").values, push, axis=-1)
+    energy = (moved["strain_energy"] + moved["contact_energy"]).values[..., -1]
+    np.testing.assert_allclose(work, energy, rtol=0.02)
