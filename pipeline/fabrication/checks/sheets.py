@@ -1,0 +1,193 @@
+"""Checks what lies on a sheet: parts inside its margin, apart, cut to size, legible, to scale."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from shapely import Geometry, Polygon, STRtree
+
+from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, OUTER, line, named
+from pipeline.fabrication.checks.curves import polygon as bounded
+from pipeline.fabrication.checks.drawings import MILLIMETRES, Curve, Drawing
+from pipeline.fabrication.checks.faults import Fault
+from pipeline.problem.fabrication import Laser
+
+TOLERANCE = 1e-3
+"""Lengths of a drawing are right to this, mm."""
+
+LEAST_LETTER = 2.0
+_KERF_TOLERANCE = 2e-3
+_JOINED = 0.05  # mm; strokes so near to each other make one letter
+_HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
+_BUG = "run the same command again; if it stays, the exporter has a bug"
+_SVG = re.compile(r"<svg[^>]*>", re.DOTALL)
+
+
+def check(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fault]:
+    """Faults of a sheet: its scale, the place of its parts, its holes and its letters.
+
+    Args:
+        drawing: a written sheet.
+        laser: what was asked for.
+        thickness: of the material, mm; no hole may be smaller.
+    """
+    yield from _scale(drawing, laser)
+    yield from _places(drawing, laser)
+    yield from _holes(drawing, thickness)
+    yield from _letters(drawing)
+
+
+def outlines(drawing: Drawing) -> list[tuple[str, Polygon]]:
+    """Part and outer cut, in the order of the file."""
+    found = (curve for curve in drawing.curves if curve.layer == OUTER and curve.closed)
+    return [(curve.part, bounded(curve)) for curve in found]
+
+
+def _scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
+    """The file is in millimetres and as large as the sheet."""
+    if drawing.file.suffix == ".svg":
+        yield from _page(drawing, laser)
+    elif drawing.version != "AC1009" and drawing.units != MILLIMETRES:
+        yield _whole(drawing, f"$INSUNITS is {drawing.units}, not {MILLIMETRES} (millimetres)")
+    points = np.concatenate([curve.points for curve in drawing.curves])
+    low, high = points.min(axis=0), points.max(axis=0)
+    if np.abs([*low, *(high - laser.sheet)]).max() > TOLERANCE:
+        size = f"{low[0]:.3f} to {high[0]:.3f} and {low[1]:.3f} to {high[1]:.3f} mm"
+        yield _whole(drawing, f"it spans {size}, not the sheet from zero", "laser.sheet")
+
+
+def _page(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
+    """The SVG's own words: width and height in mm, and a view box of as many units."""
+    width, height = (f"{length:g}" for length in laser.sheet)
+    head = _SVG.search(drawing.file.read_text(encoding="utf-8"))
+    wanted = (f'width="{width}mm"', f'height="{height}mm"', f'viewBox="0 0 {width} {height}"')
+    for words in wanted:
+        if head is None or words not in head.group():
+            yield _whole(drawing, f"the page does not say {words}", "laser.sheet")
+
+
+def _places(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
+    """Parts on the sheet less its margin, and apart."""
+    room = shapely.box(0.0, 0.0, *laser.sheet).buffer(-laser.margin, join_style="mitre")
+    parts = outlines(drawing)
+    for part, outline in parts:
+        if not room.buffer(TOLERANCE).covers(outline):
+            what = f"it does not lie on the sheet less its margin of {laser.margin:g} mm"
+            remedy = "give a larger sheet or a smaller margin"
+            yield _on(drawing, part, what, "laser.sheet", remedy, (outline, room))
+    shapes = np.array([outline for _, outline in parts])
+    for first, second, gap in closest(shapes, laser.gap - TOLERANCE):
+        what = f"{gap:.3f} mm from part {parts[second][0]}, less than {laser.gap:g} mm"
+        shown = (shapes[first], shapes[second])
+        yield _on(drawing, parts[first][0], what, "laser.gap", _BUG, shown)
+
+
+def closest(shapes: np.ndarray, gap: float) -> Iterator[tuple[int, int, float]]:
+    """Pairs of shapes nearer to each other than `gap`, and their distance."""
+    if len(shapes) == 0:
+        return
+    pairs = STRtree(shapes).query(shapes, predicate="dwithin", distance=gap).T
+    for first, second in pairs[pairs[:, 0] < pairs[:, 1]]:
+        yield int(first), int(second), float(shapely.distance(shapes[first], shapes[second]))
+
+
+def _holes(drawing: Drawing, thickness: float) -> Iterator[Fault]:
+    """Holes that a laser can cut: no smaller than the material is thick."""
+    for curve in drawing.curves:
+        if curve.layer != INNER or not curve.closed:
+            continue
+        width = narrowest(bounded(curve))
+        if width < thickness - _HAIRLINE:
+            what = f"a hole {width:.2f} mm wide in material of {thickness:g} mm"
+            remedy = "make the hole wider or take thinner material"
+            yield _on(drawing, curve.part, what, "laser", remedy, (line(curve),))
+
+
+def narrowest(shape: Geometry) -> float:
+    """The smaller side of the smallest rectangle around a shape."""
+    return min(_sides(shape))
+
+
+def widest(shape: Geometry) -> float:
+    """The larger side of the smallest rectangle around a shape."""
+    return max(_sides(shape))
+
+
+def _sides(shape: Geometry) -> tuple[float, float]:
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape))
+    sides = np.linalg.norm(np.diff(corners[:3], axis=0), axis=1)
+    return float(sides[0]), float(sides[1])
+
+
+def _letters(drawing: Drawing) -> Iterator[Fault]:
+    """Engraved letters of each part: two millimetres high, inside of the part."""
+    for part, curves in drawing.parts().items():
+        strokes = [curve for curve in curves if curve.layer == ENGRAVE]
+        outer = [bounded(curve) for curve in curves if curve.layer == OUTER and curve.closed]
+        if not strokes or not outer:
+            continue
+        yield from _legible(drawing, part, strokes, shapely.union_all(outer))
+
+
+def _legible(
+    drawing: Drawing, part: str, strokes: list[Curve], outline: Geometry
+) -> Iterator[Fault]:
+    written = shapely.MultiLineString([line(curve) for curve in strokes if len(curve.points) > 1])
+    letters = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
+    height = min(widest(letter) - 2 * _JOINED for letter in letters)
+    if height < LEAST_LETTER - TOLERANCE:
+        what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
+        yield _on(drawing, part, what, "labels.height", "give larger letters", (outline, written))
+    if not outline.covers(written):
+        what = "engraving beyond its outline"
+        yield _on(drawing, part, what, "labels.height", "give smaller letters", (outline, written))
+
+
+def compensation(cut: Drawing, nominal: Drawing, kerf: float) -> Iterator[Fault]:
+    """Faults of a compensated sheet against the nominal one: outer cuts k/2 out, inner ones in."""
+    pairs = (
+        [curve for curve in drawing.curves if curve.layer in CUTS] for drawing in (cut, nominal)
+    )
+    made, wanted = pairs
+    if [(c.part, c.layer) for c in made] != [(c.part, c.layer) for c in wanted]:
+        yield _whole(cut, f"other parts or another order than in {nominal.file.name}")
+        return
+    for curve, drawn in zip(made, wanted, strict=True):
+        shift = kerf / 2 if curve.layer == OUTER else -kerf / 2
+        if not _offset(curve, drawn, shift):
+            what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
+            shown = (line(curve), line(drawn))
+            yield _on(cut, curve.part, what, "laser.kerf", _BUG, shown)
+
+
+def _offset(curve: Curve, drawn: Curve, shift: float) -> bool:
+    """Whether a cut is the nominal one moved by `shift`; corners may be round or sharp."""
+    made, nominal = bounded(curve), bounded(drawn)
+    nominal = shapely.affinity.translate(nominal, *_between(nominal, made))
+    least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=32)
+    most = nominal.buffer(shift + _KERF_TOLERANCE, join_style="mitre", mitre_limit=10.0)
+    return bool(made.covers(least) and most.covers(made))
+
+
+def _between(nominal: Geometry, made: Geometry) -> tuple[float, float]:
+    """Shift from one shape's place on its sheet to that of the other."""
+    before, after = (np.array(shape.bounds).reshape(2, 2).mean(axis=0) for shape in (nominal, made))
+    return float(after[0] - before[0]), float(after[1] - before[1])
+
+
+def _on(
+    drawing: Drawing,
+    part: str,
+    what: str,
+    key: str,
+    remedy: str,
+    shown: tuple[Geometry, ...],
+) -> Fault:
+    return Fault(named(part), what, key, remedy, drawing.file, shown, shown[-1])
+
+
+def _whole(drawing: Drawing, what: str, key: str = "laser") -> Fault:
+    return Fault("the drawing", what, key, _BUG, drawing.file)

@@ -1,0 +1,197 @@
+"""Every way in which a drawing can be wrong is made in a file, and found there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.fabrication.checks import curves, drawings, sheets
+from pipeline.fabrication.checks.drawings import Curve, Drawing
+from pipeline.problem.fabrication import Laser
+from tests.pipeline.fabrication.files import rectangle, sheet, stroke, write_dxf, write_svg
+
+SIZE = (100.0, 60.0)
+LASER = Laser.model_construct(kerf=0.2, sheet=SIZE, margin=5.0, gap=2.0, template_thickness=1.5)
+THICKNESS = 4.0
+REFERENCE, LETTER, HOLE, OUTER = 0, 1, 3, 4  # places in the sheet of two plates
+OTHER = 8
+
+Damage = Callable[[list[Curve]], list[Curve]]
+
+
+def found(drawing: Drawing) -> list[str]:
+    faults = [*curves.check(drawing), *sheets.check(drawing, LASER, THICKNESS)]
+    return [f"{fault.part}: {fault.what}" for fault in faults]
+
+
+def changed(place: int, **values: object) -> Damage:
+    def damage(kept: list[Curve]) -> list[Curve]:
+        kept[place] = replace(kept[place], **values)  # type: ignore[arg-type]
+        return kept
+
+    return damage
+
+
+def moved(place: int, x: float, y: float = 0.0) -> Damage:
+    return lambda kept: changed(place, points=np.add(kept[place].points, [x, y]))(kept)
+
+
+def added(curve: Curve) -> Damage:
+    return lambda kept: [*kept, curve]
+
+
+def bow_tie(kept: list[Curve]) -> list[Curve]:
+    return changed(OUTER, points=kept[OUTER].points[[0, 2, 1, 3]])(kept)
+
+
+def stutter(kept: list[Curve]) -> list[Curve]:
+    return changed(OUTER, points=kept[OUTER].points[[0, 0, 1, 2, 3]])(kept)
+
+
+def outer_first(kept: list[Curve]) -> list[Curve]:
+    kept[HOLE], kept[OUTER] = kept[OUTER], kept[HOLE]
+    return kept
+
+
+def shrunk(place: int, factor: float) -> Damage:
+    def damage(kept: list[Curve]) -> list[Curve]:
+        points = kept[place].points
+        middle = points.mean(axis=0)
+        return changed(place, points=middle + factor * (points - middle))(kept)
+
+    return damage
+
+
+DAMAGES: dict[str, tuple[Damage, str]] = {
+    "open": (changed(OUTER, closed=False), "part A1: an open curve on layer CUT_OUTER"),
+    "bow tie": (bow_tie, "part A1: a cut that crosses or repeats itself"),
+    "zero length": (stutter, "part A1: a segment of no length"),
+    "spline": (changed(OUTER, kind="SPLINE"), "part A1: a SPLINE on layer CUT_OUTER"),
+    "text": (changed(LETTER, kind="TEXT"), "part A1: a TEXT on layer ENGRAVE"),
+    "layer 0": (changed(OUTER, layer="0"), "a layer of name '0'"),
+    "own colour": (changed(OUTER, own_colour=True), "with a colour of its own"),
+    "no part": (changed(OUTER, part=""), "part A1: an inner cut outside of A1"),
+    "hole outside": (moved(HOLE, 15.0, 20.0), "part A1: an inner cut outside of A1"),
+    "hole across": (moved(HOLE, 7.0), "part A1: a cut meets one of A1"),
+    "drawn twice": (lambda kept: [*kept, kept[OUTER]], "part A1: a cut meets one of A1"),
+    "parts cross": (moved(OTHER, -12.0), "part A1: a cut meets one of B1"),
+    "parts too near": (moved(OTHER, -9.0), "part A1: 1.000 mm from part B1"),
+    "outer first": (outer_first, "part A1: an inner cut comes after the outer one"),
+    "off the sheet": (moved(OTHER, 38.0), "part B1: it does not lie on the sheet less its margin"),
+    "sheet grown": (changed(REFERENCE, points=rectangle(0, 0, 100.1, 60, "").points), "it spans"),
+    "inches": (lambda kept: [replace(c, points=c.points / 25.4) for c in kept], "it spans 0.000"),
+    "small hole": (shrunk(HOLE, 0.5), "a hole 2.00 mm wide in material of 4 mm"),
+    "small letters": (shrunk(LETTER, 0.4), "letters of 1.60 mm"),
+    "letters outside": (moved(LETTER, -3.0), "part A1: engraving beyond its outline"),
+    "line twice": (
+        added(stroke([(12.0, 15.0), (12.0, 17.0)], "A1")),
+        "a line twice on layer ENGRAVE",
+    ),
+}
+
+
+@pytest.mark.parametrize("suffix", [".dxf", ".svg"])
+def test_a_right_drawing_passes(tmp_path: Path, suffix: str) -> None:
+    assert found(drawn(tmp_path / f"sheet{suffix}", sheet())) == []
+
+
+def drawn(path: Path, kept: list[Curve]) -> Drawing:
+    if path.suffix == ".svg":
+        return drawings.read(write_svg(path, kept, SIZE))
+    return drawings.read(write_dxf(path, kept))
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_damaged_dxf_is_caught(tmp_path: Path, name: str) -> None:
+    damage, expected = DAMAGES[name]
+    told = found(drawn(tmp_path / "sheet.dxf", damage(sheet())))
+    assert any(expected in words for words in told), told
+
+
+NOT_IN_SVG = ("spline", "text", "own colour", "layer 0", "letters outside", "small letters")
+
+
+@pytest.mark.parametrize("name", [name for name in DAMAGES if name not in NOT_IN_SVG])
+def test_a_damaged_svg_is_caught(tmp_path: Path, name: str) -> None:
+    damage, expected = DAMAGES[name]
+    told = found(drawn(tmp_path / "sheet.svg", damage(sheet())))
+    assert any(expected in words for words in told), told
+
+
+def test_text_in_an_svg_is_caught(tmp_path: Path) -> None:
+    path = write_svg(tmp_path / "sheet.svg", sheet(), SIZE)
+    path.write_text(path.read_text().replace("</svg>", '<text x="3" y="9">A1</text></svg>'))
+    assert any("a TEXT on layer" in words for words in found(drawings.read(path)))
+
+
+def test_wrong_units_are_caught(tmp_path: Path) -> None:
+    drawing = drawings.read(write_dxf(tmp_path / "sheet.dxf", sheet(), units=1))
+    assert found(drawing) == ["the drawing: $INSUNITS is 1, not 4 (millimetres)"]
+
+
+def test_two_layers_of_one_colour_are_caught(tmp_path: Path) -> None:
+    path = write_dxf(tmp_path / "sheet.dxf", sheet(), colours={"CUT_INNER": 1})
+    assert "layers CUT_INNER and CUT_OUTER have one colour" in found(drawings.read(path))[0]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        'width="100" height="60" viewBox="0 0 100 60"',
+        'width="100mm" height="60mm" viewBox="0 0 1000 600"',
+        'width="100mm" height="60mm"',
+    ],
+)
+def test_an_svg_of_another_scale_is_caught(tmp_path: Path, head: str) -> None:
+    drawing = drawings.read(write_svg(tmp_path / "sheet.svg", sheet(), SIZE, head))
+    assert any("the page does not say" in words for words in found(drawing))
+
+
+def test_the_old_format_holds_the_same_curves(tmp_path: Path) -> None:
+    old = [replace(c, kind="POLYLINE") for c in sheet()]
+    first = drawings.read(write_dxf(tmp_path / "new.dxf", sheet()))
+    second = drawings.read(write_dxf(tmp_path / "old.dxf", old, version="R12"))
+    assert second.version == "AC1009"
+    for mine, other in zip(first.curves, second.curves, strict=True):
+        assert (mine.part, mine.layer, mine.closed) == (other.part, other.layer, other.closed)
+        np.testing.assert_allclose(mine.points, other.points, atol=1e-9)
+
+
+def grown(curve: Curve, kerf: float) -> Curve:
+    """The cut with its corners moved out, or in if it is an inner one."""
+    shift = {"CUT_OUTER": kerf / 2, "CUT_INNER": -kerf / 2}.get(curve.layer, 0.0)
+    middle = curve.points.mean(axis=0)
+    return replace(curve, points=curve.points + shift * np.sign(curve.points - middle))
+
+
+@pytest.mark.parametrize(("kerf", "faults"), [(0.2, 0), (0.1, 4), (0.0, 4), (-0.2, 4)])
+def test_compensation_for_the_kerf_is_measured(tmp_path: Path, kerf: float, faults: int) -> None:
+    nominal = drawn(tmp_path / "nominal.dxf", sheet())
+    cut = drawn(tmp_path / "cut.dxf", [grown(curve, kerf) for curve in sheet()])
+    told = [fault.what for fault in sheets.compensation(cut, nominal, 0.2)]
+    assert len(told) == faults
+    assert all(words.endswith("of the nominal cut") for words in told)
+
+
+def test_a_part_missing_from_the_compensated_sheet_is_caught(tmp_path: Path) -> None:
+    nominal = drawn(tmp_path / "nominal.dxf", sheet())
+    cut = drawn(tmp_path / "cut.dxf", sheet()[:-1])
+    (fault,) = sheets.compensation(cut, nominal, 0.2)
+    assert "other parts or another order" in fault.what
+
+
+@pytest.mark.parametrize("name", ["sheet.dxf", "sheet.svg"])
+@pytest.mark.parametrize("content", [b"", b"junk", None])
+def test_what_is_no_drawing_is_refused(tmp_path: Path, name: str, content: bytes | None) -> None:
+    path = tmp_path / name
+    if content is None:  # the first half of a right one
+        drawn(path, sheet())
+        content = path.read_bytes()[: path.stat().st_size // 2]
+    path.write_bytes(content)
+    with pytest.raises(UserError, match="cannot be read back"):
+        drawings.read(path)
