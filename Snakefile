@@ -5,8 +5,15 @@ import sys
 from snakemake.utils import min_version
 
 from pipeline.sources import source_hash
-from pipeline.workflow import check_problems, check_room, chunks, designs
-from pipeline.workflow import options, prepare_jobs, section, studies
+from pipeline.workflow import check_problems, check_room, chunks, copies, designs
+from pipeline.workflow import (
+    options,
+    prepare_jobs,
+    section,
+    shown,
+    shown_options,
+    studies,
+)
 
 min_version("9.20")
 
@@ -29,4 +36,5 @@ include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"
+include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/report.smk"

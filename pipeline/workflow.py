@@ -20,7 +20,7 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
-from pipeline.problem import Problem, Stage, load, section_hash
+from pipeline.problem import Problem, Stage, load, outputs, section_hash
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -150,10 +150,32 @@ def designs(wildcards: Wildcards) -> list[str]:
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:
     """The parts of the map, at most so many and none without a frequency of its own."""
+    sweep = problem_of(study_of(wildcards)).sweep
+    return _parts(wildcards, "sweep", min(most, sweep.frequency.points if sweep else 1))
+
+
+def copies(wildcards: Wildcards, most: int) -> list[str]:
+    """The parts of the imperfect copies, at most so many and none without a copy of its own."""
+    robustness = problem_of(study_of(wildcards)).robustness
+    return _parts(wildcards, "scatter", min(most, robustness.samples if robustness else 1))
+
+
+def _parts(wildcards: Wildcards, kind: str, count: int) -> list[str]:
     study = study_of(wildcards)
-    sweep = problem_of(study).sweep
-    frequencies = sweep.frequency.points if sweep else 1
-    return [f"results/{study}/sweep_{chunk}.nc" for chunk in range(min(most, frequencies))]
+    return [f"results/{study}/{kind}_{chunk}.nc" for chunk in range(count)]
+
+
+def shown(wildcards: Wildcards) -> list[str]:
+    """The datasets that the report of a study shows."""
+    study = study_of(wildcards)
+    return [f"results/{study}/{name}.nc" for name in outputs(problem_of(study))]
+
+
+def shown_options(wildcards: Wildcards) -> str:
+    """Command-line options that name these datasets."""
+    names = outputs(problem_of(study_of(wildcards)))
+    files = zip(names, shown(wildcards), strict=True)
+    return " ".join(f"--{name} {file}" for name, file in files)
 
 
 def section(stage: Stage) -> Callable[[Wildcards], str]:

@@ -21,9 +21,11 @@ from pipeline.errors import refusal
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from pipeline.problem import Output
     from reports.study import Study
 
-DATASETS = ("design", "response", "sweep")
+REQUIRED: tuple[Output, ...] = ("design", "response")
+OPTIONAL: tuple[Output, ...] = ("sweep", "scatter")
 
 
 def publish(study: Study, folder: Path) -> list[Path]:
@@ -42,19 +44,18 @@ def publish(study: Study, folder: Path) -> list[Path]:
 
 def write_report(study: Study, folder: Path) -> list[Path]:
     """Write all files of the report into an existing `folder`; returns their paths, page last."""
-    from reports import facts as fact_files
-    from reports import page, style
-    from reports.fig2 import content, facts, figure, tables
+    from reports import facts, kinds, page, style
 
-    known = facts.collect(study)
-    fact_files.write_json(known, folder / "facts.json")
-    data = [fact_files.table(known), *tables.build(study)]
+    kind = kinds.of(study.problem)
+    known = facts.quoted(kind.facts(study), study.problem.report.paper)
+    facts.write_json(known, folder / "facts.json")
+    data = [facts.table(known), *kind.tables(study)]
     for table in data:
         (folder / table.name).write_bytes(table.csv)
     with style.styled():
-        drawn = style.save(figure.build(study), folder / study.name)
+        drawn = style.save(kind.figure(study), folder / study.name)
     svg = (folder / f"{study.name}.svg").read_text(encoding="utf-8")
-    html = page.render(content.build(study, known, data, svg, [path.name for path in drawn]))
+    html = page.render(kind.page(study, known, data, svg, [path.name for path in drawn]))
     (folder / "index.html").write_text(html, encoding="utf-8")
     names = ["facts.json", *(table.name for table in data), "index.html"]
     return [*drawn, *(folder / name for name in names)]
@@ -83,18 +84,22 @@ def _moved(path: Path, folder: Path) -> Path:
 def _work(args: argparse.Namespace) -> None:
     from reports import study
 
-    publish(
-        study.load(args.problem, args.preset, *(getattr(args, name) for name in DATASETS)),
-        args.out_dir,
-    )
+    given: dict[Output, Path] = {
+        name: path for name in (*REQUIRED, *OPTIONAL) if (path := getattr(args, name)) is not None
+    }
+    publish(study.load(args.problem, args.preset, given), args.out_dir)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Build the report; returns the exit code."""
     parser = cli.parser("reports.build", str(__doc__))
-    for name in DATASETS:
+    for name in (*REQUIRED, *OPTIONAL):
         parser.add_argument(
-            f"--{name}", type=Path, required=True, metavar="NC", help=f"the {name} dataset"
+            f"--{name}",
+            type=Path,
+            required=name in REQUIRED,
+            metavar="NC",
+            help=f"the {name} dataset" + ("" if name in REQUIRED else ", if the problem has one"),
         )
     parser.add_argument(
         "--out-dir", type=Path, required=True, metavar="FOLDER", help="the report's folder"

@@ -6,8 +6,11 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
+from difflib import get_close_matches
 from pathlib import Path
 
+from pipeline.errors import UserError
+from pipeline.problem.report import Paper
 from reports.tables import Table
 
 ABSENT = "—"
@@ -48,6 +51,24 @@ def number(
 def share(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
     """Fact of a share given as a fraction of one, shown in per cent to a tenth."""
     return Fact(key, label, 100.0 * value, "%", percent(value), paper, note)
+
+
+def quoted(facts: Sequence[Fact], paper: Paper | None) -> list[Fact]:
+    """The facts with the words that a publication uses for them; without one, with none.
+
+    Raises:
+        UserError: the publication's words are for a fact that there is not.
+    """
+    if paper is None:
+        return [replace(fact, paper=ABSENT) for fact in facts]
+    known = {fact.key for fact in facts}
+    for key in paper.values:
+        if key not in known:
+            near = get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            remedy = f"{hint}the facts here: {', '.join(sorted(known))}"
+            raise UserError("no such fact", key=f"report.paper.values.{key}", remedy=remedy)
+    return [replace(fact, paper=paper.values.get(fact.key, fact.paper)) for fact in facts]
 
 
 def grouped(group: str, facts: Iterable[Fact]) -> list[Fact]:

@@ -16,7 +16,8 @@ size, and knows nothing of what moves them. Its data is one JSON object:
     motion      [structure][case] -> {step: [3], data}: `data` (n_frames, n_units, 3) int16;
                 displacement = step * data in mm, mm, rad; -32768 stands for "no data".
     fields      [{key, label, unit, factor, scale (3,), map, limits}]: what may colour the units.
-                key "norm" is |u / scale|, else ux, uy or theta; shown times `factor`.
+                key "norm" is |u / scale|, "turn" |theta|, else ux, uy or theta; shown times
+                `factor`.
     maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}], pad: side of the squares
                 under clamped units; all in mm.
 
@@ -133,6 +134,15 @@ def payload(
         "maps": {name: _levels(COLOUR_MAPS[name]) for name in sorted(COLOUR_MAPS)},
         "circles": [vars(disc) for disc in discs],
     }
+
+
+def round_up(value: float) -> float:
+    """The next value of one significant digit, or two where the first is 1."""
+    if value <= 0:
+        return 1.0
+    step = 10.0 ** np.floor(np.log10(value))
+    step = step / 10.0 if value / step < 2.0 else step
+    return float(np.round(np.ceil(value / step - 1e-9) * step, 12))
 
 
 COLOUR_MAPS: dict[str, Colormap] = {"magnitude": style.MAGNITUDE, "signed": style.SIGNED}

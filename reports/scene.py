@@ -89,29 +89,3 @@ def cycles(scene: Scene, response: xr.Dataset) -> float:
     """Number of drive cycles that a response covers."""
     time = response["time"].values
     return float((time[-1] - time[0]) * scene.frequency)
-
-
-def draft_reasons(problem: Problem, study: Problem) -> list[str]:
-    """Where `problem`, a preset of `study`, is less than that; empty if it is of full size."""
-    reduced = [
-        f"{ours:g} {what} instead of {full:g}"
-        for (what, ours), full in zip(_sizes(problem).items(), _sizes(study).values(), strict=True)
-        if ours < full
-    ]
-    if problem.solver.accuracy == "draft":
-        reduced.append("accuracy of the solver: draft")
-    return reduced
-
-
-def _sizes(problem: Problem) -> dict[str, float]:
-    drive, sweep = problem.drive, problem.sweep
-    directions = drive.directions if isinstance(drive, Harmonic | RampHarmonic) else ()
-    sqp = problem.optimiser.methods.sqp
-    return {
-        "units": problem.lattice.columns * problem.lattice.rows,
-        "load angles": len(directions),
-        "evaluations of the design": sqp.evaluations if sqp else 0,
-        "drive cycles": problem.response.cycles,
-        "angles in the map": sweep.direction.points if sweep else 0,
-        "frequencies in the map": sweep.frequency.points if sweep else 0,
-    }

@@ -23,7 +23,7 @@ from reports.style import GREY, INTACT, PALE
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-SURROUNDINGS, CLOAK, SOURCE, VOID = 0, 1, 2, 3
+SURROUNDINGS, CLOAK, SOURCE = 0, 1, 2
 FREE, CLAMPED, DRIVEN = 0, 1, 2
 
 
@@ -31,7 +31,8 @@ FREE, CLAMPED, DRIVEN = 0, 1, 2
 class Structure:
     """A network of rigid units, flat.
 
-    vertices (n_units, n_vertices, 2) mm, counter-clockwise, padded with NaN; site (n_units, 2) mm
+    vertices (n_units, n_vertices, 2) mm, counter-clockwise, padded with NaN, all NaN for a unit
+    that is absent, as are its ligaments; site (n_units, 2) mm
     lattice point; ligament_unit and ligament_vertex (n_ligaments, 2); region, support (n_units,).
     """
 
@@ -49,18 +50,26 @@ class Structure:
 
     @property
     def n_units(self) -> int:
-        """Number of units, void ones included."""
+        """Number of units, absent ones included."""
         return len(self.vertices)
+
+    @property
+    def present(self) -> NDArray[np.bool_]:
+        """Whether each unit is there (n_units,)."""
+        return np.asarray(np.isfinite(self.vertices[..., 0]).any(axis=1))
 
 
 def from_dataset(data: xr.Dataset, spacing: float, vertices: str = "vertices") -> Structure:
     """Structure held by a design dataset, or by one `structure` of a response dataset."""
     index = np.stack([data["i"].values, data["j"].values], axis=-1)
+    shape = data[vertices].transpose("unit", "vertex", "xy").values.astype(float)
+    unit, vertex = (data[name].values.astype(int) for name in ("ligament_unit", "ligament_vertex"))
+    there = ~np.isnan(shape[unit, vertex, 0]).any(axis=1)
     return Structure(
-        vertices=data[vertices].transpose("unit", "vertex", "xy").values.astype(float),
+        vertices=shape,
         site=spacing * index.astype(float),
-        ligament_unit=data["ligament_unit"].values.astype(int),
-        ligament_vertex=data["ligament_vertex"].values.astype(int),
+        ligament_unit=unit[there],
+        ligament_vertex=vertex[there],
         region=data["region"].values.astype(int),
         support=data["support"].values.astype(int),
     )
@@ -111,7 +120,7 @@ def draw(
 ) -> PolyCollection:
     """Draw units and ligaments, units in `colours` (one each) or `values` through a colour map."""
     corners = deformed(structure, displacement)
-    kept = structure.region != VOID
+    kept = structure.present
     ends = corners[structure.ligament_unit, structure.ligament_vertex]
     axes.add_collection(LineCollection(list(ends), colors=GREY, linewidths=0.3, zorder=2))
     units = PolyCollection(

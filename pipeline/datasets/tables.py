@@ -13,7 +13,7 @@ from typing import Literal
 SCHEMA_VERSION = 1
 
 Type = Literal["float64", "int64", "int8", "str"]
-Kind = Literal["design", "design_method", "response", "sweep"]
+Kind = Literal["design", "design_method", "response", "sweep", "scatter"]
 
 
 @dataclass(frozen=True)
@@ -245,11 +245,40 @@ _SWEEP: Table = {
     "min_void_angle": Variable(_MAP, "rad", "smallest void angle of the cloaked case", gaps=True),
 }
 
+_COPY = ("noise", "sample")
+_PATH_OF_COPY = (*_COPY, "time")
+
+_SCATTER: Table = {
+    "noise": _label(("noise",), "1", "kind and size of the imperfection", "str"),
+    "sample": _label(("sample",), "1", "number of the copy, from zero", "int64"),
+    "time": _label(("time",), "s", "time since the start of the drive"),
+    "rotation": Variable(
+        _PATH_OF_COPY, "rad", "mean |theta| over the region of interest", gaps=True
+    ),
+    "departure": Variable(
+        _PATH_OF_COPY,
+        "1",
+        "root mean square over the region of interest of |U - U_target|, U = (ux/s, uy/s, theta)",
+        gaps=True,
+    ),
+    "reaction": Variable(
+        _PATH_OF_COPY, "N", "force on all driven units along the drive's direction", gaps=True
+    ),
+    "loss": Variable(_COPY, "1", "loss, weighted mean of the load cases", gaps=True, also=ENERGY),
+    "min_void_angle": Variable(_COPY, "rad", "smallest void angle on the way", gaps=True),
+    "clashes": Variable(
+        _COPY, "1", "units that overlapped or touched at rest in the first draw", "int64"
+    ),
+    "redrawn": Variable(_COPY, "1", "shifts drawn again until no units overlapped", "int64"),
+    "status": Variable(_COPY, "1", "ok, or why the copy has no result", "str"),
+}
+
 TABLES: Mapping[Kind, Table] = {
     "design": _UNIT | _CASE | _METHOD | _NETWORK | _SHAPE | _per_method(_HISTORY),
     "design_method": _UNIT | _CASE | _NETWORK | _SHAPE | _HISTORY,
     "response": _UNIT | _CASE | _RESPONSE_LABELS | _NETWORK | _RESPONSE,
     "sweep": _SWEEP,
+    "scatter": _SCATTER,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -258,5 +287,6 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "design_method": {},
     "response": {},
     "sweep": {},
+    "scatter": {},
 }
 """What each kind tells in attributes of its own, beside its provenance."""

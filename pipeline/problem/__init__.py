@@ -16,9 +16,11 @@ from pipeline.problem.identity import (
 )
 from pipeline.problem.loading import load, preset_names
 from pipeline.problem.model import Problem
+from pipeline.problem.outputs import Output, outputs
 from pipeline.problem.selection import selected_units, units_within
 
 __all__ = [
+    "Output",
     "Problem",
     "Stage",
     "canonical_json",
@@ -28,6 +30,7 @@ __all__ = [
     "inclusion_units",
     "interest_units",
     "load",
+    "outputs",
     "preset_names",
     "section_hash",
     "selected_units",

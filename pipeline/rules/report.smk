@@ -1,9 +1,7 @@
 rule report:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        design="results/{name}{preset}/design.nc",
-        response="results/{name}{preset}/response.nc",
-        sweep="results/{name}{preset}/sweep.nc",
+        datasets=shown,
     output:
         multiext(
             "results/{name}{preset}/report/{name}",
@@ -15,19 +13,19 @@ rule report:
         facts="results/{name}{preset}/report/facts.json",
         tables=expand(
             "results/{{name}}{{preset}}/report/{table}.csv",
-            table=["design", "facts", "loss_history", "robustness", "top_edge"],
+            table=["design", "facts", "loss_history"],
         ),
     log:
         "results/{name}{preset}/logs/report.log",
     threads: 1
     params:
         study=options,
+        datasets=shown_options,
         folder=subpath(output.page, parent=True),
         problem=section("report"),
         source=source_hash("reports.build"),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.build {params.study} --design {input.design}"
-        " --response {input.response} --sweep {input.sweep}"
+        "python -m reports.build {params.study} {params.datasets}"
         " --out-dir {params.folder} --log {log}"

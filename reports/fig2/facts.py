@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from reports import measures
+from reports import checks, measures
 from reports.facts import ABSENT, Fact, grouped, number, percent, share, worded
 from reports.scene import Scene, cycles
 from reports.structure import CLOAK, from_dataset, middle_of_top_edge
@@ -203,31 +203,12 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     yield number("map_failed", "Points without a result", failed, note=f"of {loss.size}")
 
 
-_MARGINS = {
-    "edge_length": "Edge lengths",
-    "block_angle": "Block angles",
-    "void_angle": "Void angles",
-    "convexity": "Convexity",
-    "gap": "Gaps",
-}
-
-
 def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
     """Margins of the constraints, geometry and estimated errors of the shipped design."""
-    margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
-    for name, margin in margins:
-        label = f"{_MARGINS.get(str(name), str(name))}: margin to the bound"
-        length = str(name) in {"edge_length", "gap"}
-        value = float(margin) if length else float(np.degrees(margin))
-        note = "smallest of the design at rest; 0 is active, negative violated"
-        yield number(
-            f"margin_{name}", label, _settled(value), "mm" if length else "deg", digits=3, note=note
-        )
+    yield from checks.design_facts(design)
     cloaked = response.sel(structure="cloaked")
-    rest, motion = "at rest, by geometry", "cloaked, all load cases and times, by geometry"
-    gap, moving = float(design["smallest_gap"]), float(cloaked["min_gap"].min())
-    yield number("gap", "Smallest gap between units", gap, "mm", digits=3, note=rest)
-    yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)
+    motion = "cloaked, all load cases and times, by geometry"
+    moving = float(cloaked["min_gap"].min())
     yield number("gap_motion", "Smallest gap in motion", moving, "mm", digits=3, note=motion)
     crossed = int(cloaked["overlaps"].sum())
     yield number("overlaps_motion", "Overlaps in motion", crossed, note=motion)
@@ -244,8 +225,3 @@ def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
     for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
         value = float(response[key].max())
         yield number(key, f"Estimated error of the {label}", value, digits=2, note=note)
-
-
-def _settled(margin: float) -> float:
-    """Margins within the optimiser's tolerance count as active."""
-    return 0.0 if abs(margin) < 1e-5 else margin

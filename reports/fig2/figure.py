@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import xarray as xr
 from matplotlib.figure import Figure
 
-from reports import measures, style
+from reports import draft, measures, style
 from reports.fig2.curves import loss_panel, map_panel, motion_panel
 from reports.fig2.facts import MONITORED
 from reports.fig2.structures import (
@@ -41,7 +41,8 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     load = f"$α$ = {direction:g}°"
     _problem(figure, scene, design, direction)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
-    loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design)
+    quoted = study.problem.report.paper is not None
+    loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design, quoted)
     style.letter(figure, 0.0, top_c, "c", f"Response over one drive cycle, {load}")
     snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
     style.letter(figure, 0.0, top_d, "d", f"Middle unit of the top edge, {load}")
@@ -51,7 +52,7 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     axes = style.place(figure, 118.5, top_d + 6.0, 43.0, 36.0)
     map_panel(figure, axes, style.place(figure, 163.5, top_d + 6.0, 2.4, 36.0), scene, sweep)
     if study.draft:
-        mark_draft(figure)
+        draft.mark(figure)
     return figure
 
 
@@ -74,20 +75,3 @@ def _problem(figure: Figure, scene: Scene, design: xr.Dataset, direction: float)
         )
         left = k * (side + 0.6) + side / 2
         style.write(figure, left, 46.2, notes[name], ha="center", fontsize=style.SMALL)
-
-
-def mark_draft(figure: Figure) -> None:
-    """Says across the page that this is not the study itself."""
-    figure.text(
-        0.5,
-        0.5,
-        "DRAFT",
-        fontsize=110,
-        fontweight="bold",
-        color=style.ALTERED,
-        alpha=0.16,
-        rotation=45,
-        ha="center",
-        va="center",
-        zorder=100,
-    )

@@ -64,7 +64,7 @@
     const [x, y, turn] = [u[3 * unit], u[3 * unit + 1], u[3 * unit + 2]];
     const { key, factor, scale } = field;
     if (key === "norm") return factor * Math.hypot(x / scale[0], y / scale[1], turn / scale[2]);
-    return factor * { ux: x, uy: y, theta: turn }[key];
+    return factor * { ux: x, uy: y, theta: turn, turn: Math.abs(turn) }[key];
   };
 
   const colour = (field, value) => {

@@ -23,6 +23,8 @@ SIZES = {
     "dof": 3,
     "direction": 3,
     "frequency": 3,
+    "noise": 2,
+    "sample": 4,
 }
 
 

@@ -13,13 +13,15 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets, problem, provenance
-from pipeline.problem import Problem
+from pipeline.problem import Output, Problem
 from pipeline.problem.drives import Harmonic
 from reports import study
 from reports.study import Study
 from sim.lattice import Lattice, quads
 
 PROBLEM = Path(__file__).parents[2] / "experiments" / "fig2" / "problem.yaml"
+
+KINDS: tuple[Output, ...] = ("design", "response", "sweep")
 
 REACH = {"altered": 1.0, "cloaked": 0.12}
 """Amplitude of the surroundings of each structure, of what the sheet would do."""
@@ -31,7 +33,7 @@ KKT = {"sqp": 2e-4, "mma": 3e-2}
 def written(folder: Path, preset: str | None = None) -> Study:
     """The study with the datasets in `folder`, read back."""
     paths = write(folder, preset)
-    return study.load(PROBLEM, preset, *paths)
+    return study.load(PROBLEM, preset, dict(zip(KINDS, paths, strict=True)))
 
 
 def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:

@@ -15,7 +15,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def command(paths: tuple[Path, Path, Path], out: Path, preset: str | None) -> list[str]:
-    names = zip(build.DATASETS, paths, strict=True)
+    names = zip(synthetic.KINDS, paths, strict=True)
     given = [word for name, path in names for word in (f"--{name}", str(path))]
     chosen = [] if preset is None else ["--preset", preset]
     return ["--problem", str(synthetic.PROBLEM), *chosen, *given, "--out-dir", str(out)]

@@ -116,6 +116,6 @@ def test_failed_points_of_the_map_are_crossed_out(study: Study) -> None:
     sweep["loss"][3, 4] = np.nan
     sweep["status"] = sweep["status"].astype(object)
     sweep["status"][3, 4] = "no convergence at t = 0.1 s"
-    made = drawn(dataclasses.replace(study, sweep=sweep))
+    made = drawn(dataclasses.replace(study, datasets=study.datasets | {"sweep": sweep}))
     crosses = [line for axes in made.axes for line in axes.lines if line.get_marker() == "x"]
     np.testing.assert_allclose(np.asarray(crosses[0].get_xydata()), [[45.0, 6.0]])

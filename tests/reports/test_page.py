@@ -112,8 +112,7 @@ def test_a_draft_says_so(quick_report: Path) -> None:
 def test_words_of_a_problem_are_escaped(quick: Study) -> None:
     hostile = dataclasses.replace(
         quick,
-        scene=dataclasses.replace(quick.scene, title="</script><b>&"),
-        problem=quick.problem.model_copy(update={"doc": "</script><b>"}),
+        problem=quick.problem.model_copy(update={"title": "</script><b>&", "doc": "</script><b>"}),
     )
     html = page.render(content.build(hostile, facts.collect(hostile), [], "<svg/>", []))
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html

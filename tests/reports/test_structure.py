@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from matplotlib.colors import Normalize
@@ -37,8 +39,10 @@ def test_a_unit_turns_about_its_centroid(pair: Structure) -> None:
     np.testing.assert_array_equal(moved[1], TRIANGLE)
 
 
-def test_void_units_are_not_drawn_and_values_follow(pair: Structure) -> None:
-    holed = Structure(**{**vars(pair), "region": np.array([structure.VOID, structure.CLOAK])})
+def test_absent_units_are_not_drawn_and_values_follow(pair: Structure) -> None:
+    vertices = pair.vertices.copy()
+    vertices[0] = np.nan
+    holed = dataclasses.replace(pair, vertices=vertices)
     axes = style.place(style.page(50.0), 5, 5, 40, 40)
     drawn = structure.draw(
         axes, holed, values=np.array([1.0, 2.0]), colour_map=style.MAGNITUDE, norm=Normalize(0, 2)

@@ -19,6 +19,7 @@ STAGES = (
     "pipeline/select",
     "pipeline/simulate",
     "pipeline/sweep",
+    "pipeline/scatter",
     "reports/build",
 )
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 REPORT = (
     *("index.html", "facts.json", "fig2.pdf", "fig2.svg", "fig2.png"),
-    *("design.csv", "facts.csv", "loss_history.csv", "robustness.csv", "top_edge.csv"),
+    *("design.csv", "facts.csv", "loss_history.csv"),
 )
 
 

@@ -35,6 +35,17 @@ def test_map_has_no_part_without_a_frequency(sandbox: Sandbox) -> None:
     assert sandbox.planned("fig2@quick")["sweep"] == 3
 
 
+def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
+    before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
+    sandbox.problem.write_text(
+        before + "\nrobustness:\n  samples: 5\n\n" + rest[rest.index("report:") :]
+    )
+    planned = sandbox.planned("fig2")
+    assert planned["scatter"] == 2
+    assert planned["gather_scatter"] == 1
+    assert not {"sweep", "gather_sweep"} & planned.keys()
+
+
 @pytest.mark.parametrize("target", ["fig2@quick", "fig2_quick"])
 def test_preset_has_its_own_target_and_folder(sandbox: Sandbox, target: str) -> None:
     ended = sandbox.run(target)

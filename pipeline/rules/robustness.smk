@@ -1,0 +1,40 @@
+# A few jobs of many copies each, for a laptop and for a cluster alike.
+MOST_PARTS = config.get("scatter_chunks", 2)
+
+
+rule scatter:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+    output:
+        temp("results/{name}{preset}/scatter_{chunk}.nc"),
+    log:
+        "results/{name}{preset}/logs/scatter_{chunk}.log",
+    threads: 1
+    params:
+        study=options,
+        chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
+        problem=section("scatter"),
+        source=source_hash("pipeline.scatter"),
+    message:
+        "Simulating imperfect copies of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
+    shell:
+        "python -m pipeline.scatter run {params.study} --design {input.design}"
+        " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
+
+
+rule gather_scatter:
+    input:
+        lambda wildcards: copies(wildcards, MOST_PARTS),
+    output:
+        "results/{name}{preset}/scatter.nc",
+    log:
+        "results/{name}{preset}/logs/scatter.log",
+    threads: 1
+    params:
+        problem=section("scatter"),
+        source=source_hash("pipeline.scatter"),
+    message:
+        "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline.scatter gather --parts {input} --out {output} --log {log}"

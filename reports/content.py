@@ -1,0 +1,99 @@
+"""The page of a report from its parts: what every report tells in the same way."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import xarray as xr
+
+from pipeline.problem import canonical_json, content_hash
+from reports.facts import Fact, worded
+from reports.page import Page, Source, source
+from reports.player import quantisation_error
+from reports.study import Study
+from reports.tables import Table
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a kind of report says of itself; `caption` is HTML, `headline` are keys of facts."""
+
+    credit: str
+    figure_title: str
+    caption: str
+    headline: Sequence[str]
+    player_note: str = ""
+
+
+def page(
+    study: Study,
+    words: Words,
+    facts: Sequence[Fact],
+    tables: Sequence[Table],
+    player: Mapping[str, Any],
+    svg: str,
+    figure_files: Sequence[str],
+) -> Page:
+    """The page of a study, of which everything else has been made."""
+    by_key = {fact.key: fact for fact in facts}
+    return Page(
+        title=study.problem.title or study.name,
+        lead=study.problem.doc.strip(),
+        credit=words.credit,
+        figure_title=words.figure_title,
+        caption=words.caption,
+        svg=svg,
+        figure_files=figure_files,
+        headline=[by_key[key] for key in words.headline if key in by_key],
+        facts=facts,
+        tables=tables,
+        player=player,
+        player_note=" ".join(filter(None, [rounding(player), words.player_note])),
+        provenance=provenance(study),
+        problem=json.dumps(
+            json.loads(canonical_json(study.problem)), indent=1, sort_keys=True, ensure_ascii=False
+        ),
+        skipped=skipped(study.response),
+        draft=study.draft,
+    )
+
+
+def rounding(player: Mapping[str, Any]) -> str:
+    """What the player's data leave out."""
+    shift, turn = quantisation_error(player)
+    shown, saved = player["axis"]["shown"], player["axis"]["saved"]
+    frames = "times" if player["axis"]["loops"] else "loads"
+    return (
+        f"{shown} of {saved} saved {frames}, rounded to ±{worded(shift, 'mm', 1)} and "
+        f"±{worded(turn, 'rad', 1)}; between them the motion is interpolated."
+    )
+
+
+def skipped(response: xr.Dataset) -> list[str]:
+    """What the simulation left out, each with the structures that it holds for."""
+    plans = json.loads(response.attrs["plan"])
+    names: dict[str, list[str]] = {}
+    for structure, plan in plans.items():
+        for text in plan["skipped"]:
+            names.setdefault(text, []).append(structure)
+    everywhere = len(plans)
+    return [
+        text if len(found) == everywhere else f"{text} ({', '.join(found)})"
+        for text, found in names.items()
+    ]
+
+
+def provenance(study: Study) -> list[Source]:
+    """This page and every dataset that it shows."""
+    packages = {name: version(name) for name in ("jinja2", "matplotlib", "numpy", "xarray")}
+    made = {
+        "problem_hash": content_hash(study.problem),
+        "datasets": json.dumps(study.files),
+        "packages": json.dumps(packages),
+    }
+    own = source("this page", xr.Dataset(attrs=made))
+    return [own, *(source(f"{name}.nc", data) for name, data in study.datasets.items())]

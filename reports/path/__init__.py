@@ -1,0 +1,1 @@
+"""Report of structures along a path: a slowly growing load, or time."""

@@ -1,0 +1,123 @@
+"""The page of structures along a path: its words and its animation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from reports import content, style
+from reports.content import Words
+from reports.facts import Fact
+from reports.page import Page
+from reports.path import measures
+from reports.path.course import Course, course, display_name, structures
+from reports.path.structures import shade_of
+from reports.player import Axis, Clip, Field, payload, round_up
+from reports.structure import from_dataset
+from reports.study import Study
+from reports.tables import Table
+
+
+def animation(study: Study) -> dict[str, Any]:
+    """The player's data: every structure along the path."""
+    path, response = course(study.problem, study.response), study.response
+    spacing = study.problem.lattice.spacing
+    clips = []
+    for name in structures(response):
+        part = response.sel(structure=name)
+        motion = part["displacement"].transpose("case", "time", "unit", "dof").values
+        clips.append(
+            Clip(
+                display_name(study.problem, name),
+                style.STRUCTURE_COLOURS[name],
+                from_dataset(part, spacing),
+                motion,
+            )
+        )
+    cases = [f"α = {angle:g}°" for angle in response["direction"].values]
+    return payload(axis(path), cases, clips, fields(study), pad=spacing)
+
+
+def axis(path: Course) -> Axis:
+    """What the slider runs over: once through the path in six seconds."""
+    pace = float(path.values[-1] - path.values[0]) / 6.0
+    digits = max(0, 3 - int(np.ceil(np.log10(max(path.values[-1], 1e-9)))))
+    symbol = path.symbol.strip("$")
+    speeds = {"once in 6 s": pace, "3 s": 2 * pace, "12 s": pace / 2}
+    return Axis(symbol, path.unit, path.values, digits, not path.static, speeds)
+
+
+def fields(study: Study) -> list[Field]:
+    """What may colour the units; that of the figure first."""
+    first = shade_of(study.problem, study.response).field
+    motion = study.response["displacement"].values
+    across, rise, turn = (round_up(float(np.nanmax(np.abs(motion[..., k])))) for k in range(3))
+    turn = round_up(float(np.degrees(np.nanmax(np.abs(motion[..., 2])))))
+    degrees = 180.0 / np.pi
+    others = [
+        Field("ux", "u_x", "mm", 1.0, "signed", (-across, across)),
+        Field("uy", "u_y", "mm", 1.0, "signed", (-rise, rise)),
+        Field("theta", "θ", "°", degrees, "signed", (-turn, turn)),
+    ]
+    return [first, *(other for other in others if other.key != first.key)]
+
+
+def build(
+    study: Study,
+    facts: Sequence[Fact],
+    tables: Sequence[Table],
+    svg: str,
+    figure_files: Sequence[str],
+) -> Page:
+    """The page of a study, of which everything else has been made."""
+    return content.page(study, words(study), facts, tables, animation(study), svg, figure_files)
+
+
+def words(study: Study) -> Words:
+    """What the page says of itself."""
+    paper = study.problem.report.paper
+    credit = "Every number here is computed from the datasets."
+    if paper is not None:
+        variant = f" Run with its values: {paper.variant}." if paper.variant else ""
+        credit = (
+            f"After Figure {paper.figure} of Bordiga et al., “Nonlinear mechanical metamaterial "
+            f"cloaks”.{variant} {credit}"
+        )
+    key = measures.measure_of(study.problem).key
+    return Words(
+        credit=credit,
+        figure_title=study.problem.title or study.name,
+        caption=caption(study),
+        headline=(f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction"),
+    )
+
+
+def caption(study: Study) -> str:
+    """Of the figure, as HTML."""
+    problem = study.problem
+    parts = [
+        "<b>a</b> The structures at rest: dark units are clamped, orange ones driven along the "
+        "arrows, purple ones redesigned"
+        + (", green ones of interest." if problem.objective.region != "surroundings" else "."),
+        "<b>b</b> Loss against evaluation; rejected evaluations are dots, infeasible ones pale, "
+        "the circle is the best feasible design.",
+        "<b>c</b> Snapshots at true size, coloured by "
+        f"{shade_of(problem, study.response).field.label}.",
+        f"<b>d</b> {measures.measure_of(problem).label}"
+        + ("; the bands hold 90 % of the imperfect cloaks." if study.scatter is not None else "."),
+    ]
+    letters = iter("efg")
+    if course(problem, study.response).static and problem.objective.target != "rest":
+        parts.append(
+            f"<b>{next(letters)}</b> Loss of distance between the top and the bottom row, mean "
+            "over the middle columns."
+        )
+    parts.append(f"<b>{next(letters)}</b> Force of the drive along its direction.")
+    if study.scatter is not None:
+        parts.append(
+            f"<b>{next(letters)}</b> The measure of panel d at the end of the path over imperfect "
+            "cloaks: median and 5 % to 95 %; dashed without, dotted with the perfect cloak."
+        )
+    return " ".join(parts)

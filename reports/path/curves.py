@@ -1,0 +1,116 @@
+"""Panels of curves along the path: the measure, contraction, reaction, and imperfect copies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from reports import style
+from reports.path import scatter
+from reports.path.course import Course, display_name, structures
+from reports.path.measures import Measure
+from reports.study import Study
+
+Array = NDArray[np.float64]
+
+BAND = (5.0, 95.0)
+"""Percentiles of the imperfect copies that a band spans."""
+
+
+def path_axes(axes: Axes, course: Course, label: str) -> None:
+    """An x axis along the path, with a paper's label of the load above it if there is one."""
+    axes.set(xlabel=course.label, ylabel=label, xlim=(course.values[0], course.values[-1]))
+    axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 3, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(5))
+    if course.strain is None:
+        return
+    ratio = 100.0 * course.strain / float(course.values[-1])
+    above = axes.secondary_xaxis(
+        "top",
+        functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio)),
+    )
+    above.set_xlabel("paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
+    above.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 4, 5, 10]))
+
+
+def structure_curves(
+    axes: Axes, problem: Problem, course: Course, values: xr.DataArray, names: Iterable[str]
+) -> None:
+    """Values (structure, case, time) of some structures, the mean of their load cases."""
+    mean = over_cases(problem, values)
+    for name in names:
+        axes.plot(
+            course.values,
+            mean.sel(structure=name),
+            color=style.STRUCTURE_COLOURS[name],
+            lw=1.2,
+            label=display_name(problem, name),
+            zorder=4,
+        )
+
+
+def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
+    """Weighted mean over the load cases."""
+    weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
+    mean: xr.DataArray = (values * weights).sum("case", skipna=False) / float(weights.sum())
+    return mean
+
+
+def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) -> None:
+    """What the cloak should keep small, with the bands of the cloak's imperfect copies."""
+    problem, response = study.problem, study.response
+    path_axes(axes, course, measure.symbol)
+    names = [name for name in structures(response) if name != "intact"]
+    structure_curves(axes, problem, course, measure.of(response), names)
+    if problem.objective.target == "rest":
+        axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
+    if study.scatter is not None:
+        _bands(axes, study, course, measure, study.scatter)
+    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
+    axes.legend(loc="upper left", handlelength=1.2)
+
+
+def _bands(axes: Axes, study: Study, course: Course, measure: Measure, copies: xr.Dataset) -> None:
+    """The 5 % to 95 % percentiles of every kind of noise, laid over one another."""
+    along = np.interp(copies["time"], study.response["time"], course.values)
+    values = scatter.curves(study.problem, measure, study.response, copies)
+    for noise in copies["noise"].values:
+        low, high = np.nanpercentile(values.sel(noise=noise), BAND, axis=0)
+        axes.fill_between(along, low, high, color=style.CLOAKED, alpha=0.18, lw=0, zorder=2)
+
+
+def robustness_panel(axes: Axes, study: Study, measure: Measure, copies: xr.Dataset) -> None:
+    """The measure at the end of the path: median and percentiles of every kind of noise."""
+    ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
+    values = scatter.curves(study.problem, measure, study.response, copies).isel(time=-1)
+    found = scatter.spreads(values, copies)
+    for row, spread in enumerate(found):
+        axes.plot([spread.low, spread.high], [row, row], color=style.CLOAKED, lw=3.0, alpha=0.45)
+        axes.plot(spread.middle, row, "o", ms=3.6, mfc="white", mec=style.CLOAKED, mew=1.0)
+    for name, dashes in (("altered", (4.0, 2.0)), ("cloaked", (1.5, 1.5))):
+        axes.axvline(
+            float(ends.sel(structure=name)),
+            color=style.STRUCTURE_COLOURS[name],
+            lw=0.9,
+            ls=(0, dashes),
+            zorder=1,
+        )
+    axes.set_yticks(range(len(found)), [spread.noise.replace(" ", "\n", 1) for spread in found])
+    axes.set(ylim=(len(found) - 0.5, -0.5), xlim=(0, None), xlabel=measure.symbol)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+
+
+def plain_panel(
+    axes: Axes, problem: Problem, course: Course, values: xr.DataArray, label: str
+) -> None:
+    """A curve of every structure."""
+    path_axes(axes, course, label)
+    names = structures(values.to_dataset(name="values"))
+    structure_curves(axes, problem, course, values, names)
+    axes.axhline(0.0, color=style.PALE, lw=0.5, zorder=1)

@@ -1,0 +1,166 @@
+"""The numbers of a report along a path, each computed from the datasets.
+
+A publication's words for them stand in the problem, under `report.paper.values`, by their key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from reports import checks
+from reports.facts import Fact, grouped, number, share
+from reports.path import measures, scatter
+from reports.path.course import Course, course, display_name, structures
+from reports.path.curves import over_cases
+from reports.structure import from_dataset
+from reports.study import Study
+
+
+def collect(study: Study) -> list[Fact]:
+    """All facts, under headings."""
+    path = course(study.problem, study.response)
+    return [
+        *grouped("Scene", scene_facts(study, path)),
+        *grouped("Result", measure_facts(study, path)),
+        *grouped("Loss", loss_facts(study)),
+        *grouped("Lateral contraction", contraction_facts(study, path)),
+        *grouped("Reaction", reaction_facts(study, path)),
+        *grouped("Optimisation", checks.history_facts(study.design)),
+        *grouped("Checks of the design", checks.design_facts(study.design)),
+        *grouped("Checks along the path", checks.path_facts(study.response)),
+        *grouped("Imperfect copies", robustness_facts(study)),
+    ]
+
+
+def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
+    """The problem as it was run."""
+    problem, response = study.problem, study.response
+    lattice, paper = problem.lattice, problem.report.paper
+    if paper is not None and paper.variant:
+        note = f"the set of values that was run, of Figure {paper.figure}"
+        yield Fact("variant", "Values", np.nan, "1", paper.variant, note=note)
+    initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
+    size = f"{lattice.columns} × {lattice.rows}"
+    yield Fact("units", "Units", initial.n_units, "1", size)
+    yield number("spacing", "Spacing s", lattice.spacing, "mm")
+    yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
+    removed = initial.n_units - int(from_dataset(study.design, lattice.spacing).present.sum())
+    if removed:
+        yield number("removed_units", "Units removed", removed)
+    yield number("cloak_units", "Units redesigned", int((response["region"] == 1).sum()))
+    yield number("interest_units", "Units of interest", int(response["roi"].sum()))
+    if path.static:
+        yield _displacement_fact(path)
+        count = problem.horizon.samples
+        yield number("load_steps", "Loads in the loss", count, note="equally spaced")
+    else:
+        yield number("horizon", "Loss taken over", problem.horizon_time, "s")
+
+
+def _displacement_fact(path: Course) -> Fact:
+    note = "of the driven units, along the drive"
+    if path.strain is not None:
+        note += f"; the paper labels it ε = {100 * path.strain:g} %"
+    return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
+
+
+def measure_facts(study: Study, path: Course) -> Iterator[Fact]:
+    """The measure at the end of the path, and its reduction by the cloak."""
+    measure = measures.measure_of(study.problem)
+    values = over_cases(study.problem, measure.of(study.response))
+    where = f"at {path.at(-1)}" if path.static else "at the end"
+    for name in ("altered", "cloaked"):
+        label = f"{measure.label}, {display_name(study.problem, name).lower()}"
+        end = float(values.sel(structure=name).isel(time=-1))
+        yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=where)
+    altered, cloaked = (values.sel(structure=name) for name in ("altered", "cloaked"))
+    gain = 1.0 - cloaked / altered
+    label = f"{measure.label} reduced by"
+    yield share(f"{measure.key}_reduction", label, float(gain.isel(time=-1)), note=where)
+    second_half = gain.isel(time=slice(gain.sizes["time"] // 2, None))
+    note = "the least over the second half of the path"
+    yield share(
+        f"{measure.key}_reduction_least", f"{label}, at least", float(second_half.min()), note=note
+    )
+    note = "the largest on the whole path"
+    yield number(
+        f"{measure.key}_cloaked_most",
+        f"{measure.label}, cloaked, at most",
+        float(cloaked.max()),
+        measure.unit,
+        digits=3,
+        note=note,
+    )
+
+
+def loss_facts(study: Study) -> Iterator[Fact]:
+    """The loss that was minimised, before and after."""
+    unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
+    loss = over_cases(study.problem, study.response["loss"])
+    start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
+    for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
+        label = f"Loss, {display_name(study.problem, name).lower()}"
+        yield number(f"loss_{key}", label, value, unit, digits=3)
+    yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
+    for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
+        value = float(study.response[key].max())
+        note = "relative; the largest of all structures"
+        yield number(key, f"Estimated error of the {label}", value, digits=2, note=note)
+
+
+def contraction_facts(study: Study, path: Course) -> Iterator[Fact]:
+    """Change of the vertical distance between top and bottom rows."""
+    if not path.static:
+        return
+    nearer = over_cases(study.problem, measures.contraction(study.response)).isel(time=-1)
+    column = study.response["i"].values
+    count = len(np.unique(column[measures.middle_columns(column)]))
+    note = f"loss of distance between top and bottom rows, mean of the middle {count} columns"
+    for name in structures(study.response):
+        label = f"Contraction, {display_name(study.problem, name).lower()}"
+        value = float(nearer.sel(structure=name))
+        yield number(f"contraction_{name}", label, value, "mm", digits=3, note=note)
+    if "intact" in structures(study.response):
+        intact = float(nearer.sel(structure="intact"))
+        for name in ("altered", "cloaked"):
+            off = float(nearer.sel(structure=name)) / intact - 1.0
+            label = f"Contraction, {display_name(study.problem, name).lower()}, off the intact by"
+            yield share(f"contraction_error_{name}", label, off)
+
+
+def reaction_facts(study: Study, path: Course) -> Iterator[Fact]:
+    """Force of the drive at the end of the path."""
+    if not path.static:
+        return
+    force = over_cases(study.problem, measures.reaction(study.response)).isel(time=-1)
+    note = f"on the driven units, along the drive, at {path.at(-1)}"
+    for name in structures(study.response):
+        label = f"Reaction, {display_name(study.problem, name).lower()}"
+        value = float(force.sel(structure=name))
+        yield number(f"reaction_{name}", label, value, "N", digits=3, note=note)
+
+
+def robustness_facts(study: Study) -> Iterator[Fact]:
+    """Spread of the measure over the imperfect copies."""
+    copies = study.scatter
+    if copies is None:
+        return
+    measure = measures.measure_of(study.problem)
+    values = scatter.curves(study.problem, measure, study.response, copies).isel(time=-1)
+    for spread in scatter.spreads(values, copies):
+        key = spread.noise.replace(" %", "").replace(" ", "_")
+        note = (
+            f"5 % to 95 %: {spread.low:.3g} to {spread.high:.3g}; {spread.count} copies, "
+            f"{spread.failed} failed, {spread.clashing} drawn again in part as units overlapped"
+        )
+        label = f"{measure.label}, median, {_in_words(spread.noise)}"
+        yield number(f"copies_{key}", label, spread.middle, measure.unit, digits=3, note=note)
+
+
+def _in_words(noise: str) -> str:
+    kind, _, size = noise.partition(" ")
+    if kind == "geometry":
+        return f"vertices off by up to ±{size} of s"
+    return f"stiffnesses with {size} standard deviation"

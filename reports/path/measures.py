@@ -1,0 +1,115 @@
+"""How far structures are from what they should do, along the path; contraction and reaction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from reports.structure import DRIVEN
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number along the path that should be small, of every structure and load case.
+
+    `of` maps a response to (structure, case, time); `symbol` stands on axes.
+    """
+
+    key: str
+    label: str
+    symbol: str
+    unit: str
+    of: Callable[[xr.Dataset], xr.DataArray]
+
+
+def measure_of(problem: Problem) -> Measure:
+    """The measure that goes with a problem's objective."""
+    scale = scales(problem)
+    if problem.objective.kind == "strain_energy":
+        symbol = r"mean $|\theta|$ (°)"
+        return Measure("rotation", "Mean |θ| in the region of interest", symbol, "deg", rotation)
+    if problem.objective.target == "rest":
+        symbol = r"RMS $\|\mathbf{U}\|$"
+        return Measure(
+            "motion", "RMS |U| in the region of interest", symbol, "1", lambda r: motion(r, scale)
+        )
+    return Measure(
+        "mismatch", "Mimicking error", "mimicking error", "1", lambda r: mismatch(r, scale)
+    )
+
+
+def rotation(response: xr.Dataset) -> xr.DataArray:
+    """Mean |theta| over the region of interest, degrees."""
+    turn: xr.DataArray = np.abs(_interest(response).sel(dof="theta"))  # type: ignore[assignment]
+    mean: xr.DataArray = turn.mean("unit")
+    return np.degrees(mean)  # type: ignore[return-value]
+
+
+def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Root mean square of |U|, U = (ux/s, uy/s, theta), over the region of interest."""
+    mean: xr.DataArray = _squares(_interest(response), scale).mean("unit")
+    return mean**0.5
+
+
+def mismatch(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Norm of U - U_intact over the region of interest, over that of U_intact at the end."""
+    inside = _interest(response)
+    intact = inside.sel(structure="intact")
+    apart: xr.DataArray = _squares(inside - intact, scale).sum("unit") ** 0.5
+    return apart / size_of_intact(response, scale)
+
+
+def size_of_intact(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Norm (case,) of U_intact over the region of interest at the end of the path."""
+    end = _interest(response).sel(structure="intact").isel(time=-1)
+    size: xr.DataArray = _squares(end, scale).sum("unit") ** 0.5
+    return size
+
+
+def scales(problem: Problem) -> tuple[float, float, float]:
+    """Divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
+    return problem.lattice.spacing, problem.lattice.spacing, 1.0
+
+
+def _interest(response: xr.Dataset) -> xr.DataArray:
+    return response["displacement"].isel(unit=response["roi"].values.astype(bool))
+
+
+def _squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
+    divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
+    squares: xr.DataArray = ((displacement / divisors) ** 2).sum("dof")
+    return squares
+
+
+def contraction(response: xr.Dataset) -> xr.DataArray:
+    """Loss of distance in mm between the top and the bottom row, mean over the middle columns."""
+    middle = middle_columns(response["i"].values)
+    row = response["j"].values
+    rise = response["displacement"].sel(dof="uy")
+    top, bottom = (rise.isel(unit=middle & (row == end)) for end in (row.max(), row.min()))
+    nearer: xr.DataArray = bottom.mean("unit") - top.mean("unit")
+    return nearer
+
+
+def middle_columns(column: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether each unit is in the middle half of the columns (7 of 15, 14 of 30)."""
+    count = int(column.max()) + 1
+    half = count // 2 - (count // 2 - count) % 2
+    first = (count - half) // 2
+    return (column >= first) & (column < first + half)
+
+
+def reaction(response: xr.Dataset) -> xr.DataArray:
+    """Force in N that the drive exerts along its direction, on all driven units together."""
+    held = response["reaction_force"].isel(unit=response["support"].values == DRIVEN)
+    total = held.sum("unit")
+    angle = np.radians(response["direction"])
+    along: xr.DataArray = np.cos(angle) * total.sel(dof="ux") + np.sin(angle) * total.sel(dof="uy")
+    return along.transpose("structure", "case", "time")
