@@ -2,54 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
-import scipy.linalg.cython_lapack  # noqa: F401  (its function addresses are looked up below)
 import scipy.sparse as sp
-from llvmlite import binding
-from numba import types
-from numba.extending import get_cython_function_address
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
-from threadpoolctl import threadpool_limits
 
 from sim.arrays import Floats, Ints
 from sim.cholesky import factorise_narrow
-from sim.kernels import compiled
+from sim.compiling import compiled
+from sim.lapack import dpbtrf, dpbtrs
 
 NARROW = 100
 """Columns of a band up to which the own factorisation beats LAPACK's."""
-
-threadpool_limits(1, user_api="blas")  # threads make factorisations of this size 8-30 times slower
-
-_POINTER, _INTEGER, _CHARACTER = (
-    types.CPointer(kind)  # type: ignore[no-untyped-call]
-    for kind in (types.float64, types.int32, types.uint8)
-)
-
-
-def _routine(name: str, *arguments: types.Type) -> Callable[..., None]:
-    """A LAPACK routine by symbol, so that compiled callers can be cached across processes."""
-    symbol = f"sim_band_{name}"
-    binding.add_symbol(symbol, get_cython_function_address("scipy.linalg.cython_lapack", name))
-    made: Callable[..., None] = types.ExternalFunction(symbol, types.void(*arguments))
-    return made
-
-
-_dpbtrf = _routine("dpbtrf", _CHARACTER, _INTEGER, _INTEGER, _POINTER, _INTEGER, _INTEGER)
-_dpbtrs = _routine(
-    "dpbtrs",
-    _CHARACTER,
-    _INTEGER,
-    _INTEGER,
-    _INTEGER,
-    _POINTER,
-    _INTEGER,
-    _POINTER,
-    _INTEGER,
-    _INTEGER,
-)
 
 
 @compiled
@@ -59,7 +23,7 @@ def factorise(band: Floats) -> bool:
         return factorise_narrow(band)
     uplo = np.full(1, ord("L"), dtype=np.uint8)
     size = np.array([band.shape[0], band.shape[1] - 1, band.shape[1], 0], dtype=np.int32)
-    _dpbtrf(
+    dpbtrf(
         uplo.ctypes,
         size[0:1].ctypes,
         size[1:2].ctypes,
@@ -75,7 +39,7 @@ def solve(factor: Floats, right: Floats) -> None:
     """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
     uplo = np.full(1, ord("L"), dtype=np.uint8)
     size = np.array([factor.shape[0], factor.shape[1] - 1, 1, factor.shape[1], 0], dtype=np.int32)
-    _dpbtrs(
+    dpbtrs(
         uplo.ctypes,
         size[0:1].ctypes,
         size[1:2].ctypes,

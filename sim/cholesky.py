@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats
-from sim.kernels import compiled
+from sim.compiling import compiled
 
 PANEL = 4
 STRIDE = 128

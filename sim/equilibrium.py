@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.band import factorise, solve
-from sim.kernels import compiled
+from sim.compiling import compiled
+from sim.matrix import add, clear, factorise, solve
 from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
 from sim.system import Bars, System, Workspace, workspace
 
@@ -19,6 +19,8 @@ KEEP_FROM_BARRIER = 0.9
 MAX_CORRECTIONS = 60
 MAX_BACKTRACKS = 30
 MAX_SHIFTS = 40
+FIRST_SHIFT = 1e-4
+"""Of an indefinite tangent, over the axial stiffness."""
 SMALLEST_INCREMENT = 1e-6
 ON_THE_WAY = 1e-3
 """Relative residual that suffices between two asked loads."""
@@ -41,10 +43,12 @@ def _residual(motion: Floats, system: System, work: Workspace) -> tuple[float, f
 
 @compiled
 def _factorise(motion: Floats, system: System, work: Workspace, shift: float) -> bool:
-    work.band[:] = 0.0
-    tangent(motion, system, work.turn, work.band)
-    work.band[:, 0] += shift
-    return factorise(work.band)
+    clear(work.matrix)
+    tangent(motion, system, work.turn, work.matrix)
+    if shift > 0.0:
+        for i in range(len(system.dofs)):
+            add(work.matrix, i, i, shift * system.scale[system.dofs[i]] ** 2)
+    return factorise(work.matrix)
 
 
 @compiled
@@ -54,9 +58,7 @@ def _factorise_shifted(motion: Floats, system: System, work: Workspace, counts: 
     if _factorise(motion, system, work, 0.0):
         return 0
     counts[SHIFTED] += 1
-    work.band[:] = 0.0
-    tangent(motion, system, work.turn, work.band)
-    shift = 1e-5 * np.abs(work.band[:, 0]).max()
+    shift = FIRST_SHIFT * np.abs(system.net.law[:, 0]).max()
     for tries in range(1, MAX_SHIFTS):
         counts[FACTORS] += 1
         if _factorise(motion, system, work, shift):
@@ -121,7 +123,7 @@ def _solve_free(system: System, work: Workspace, sign: float) -> None:
     """Solves for the free dofs of ``work.step`` with right-hand side ``sign`` times the force."""
     for i in range(len(system.dofs)):
         work.right[i] = sign * work.force[system.dofs[i]]
-    solve(work.band, work.right)
+    solve(work.matrix, work.right)
     for d in system.held:
         work.step[d] = 0.0
     for i in range(len(system.dofs)):

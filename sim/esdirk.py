@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.band import factorise, solve
-from sim.kernels import compiled, smallest_void
+from sim.compiling import compiled
+from sim.kernels import smallest_void
+from sim.matrix import add, clear, factorise, solve
 from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
 from sim.system import Bars, System, Workspace, workspace
 
@@ -41,12 +42,12 @@ class Base(NamedTuple):
 @compiled
 def _factorise_stage(motion: Floats, system: System, work: Workspace, k: float) -> bool:
     """Factor of a stage's tangent M/k^2 + C/k + K in the workspace; False if not positive."""
-    work.band[:] = 0.0
-    tangent(motion, system, work.turn, work.band)
+    clear(work.matrix)
+    tangent(motion, system, work.turn, work.matrix)
     for i in range(len(system.dofs)):
         d = system.dofs[i]
-        work.band[i, 0] += (system.mass[d] / k + system.damping[d]) / k
-    return factorise(work.band)
+        add(work.matrix, i, i, (system.mass[d] / k + system.damping[d]) / k)
+    return factorise(work.matrix)
 
 
 @compiled
@@ -74,7 +75,7 @@ def _newton_step(
         velocity = (motion[d] - base.u[d]) / base.k
         inertia = system.mass[d] * (velocity - base.v[d]) / base.k
         work.right[i] = -(inertia + system.damping[d] * velocity + work.force[d])
-    solve(work.band, work.right)
+    solve(work.matrix, work.right)
     size = 0.0
     for i in range(len(system.dofs)):
         d = system.dofs[i]
@@ -348,7 +349,7 @@ def adjoint(
                 work.right[i] = u[s, d] + (v[s, d] + a[s, d] / k) / k
             if not _factorise_stage(stage_u[n, s], system, work, k):
                 return False
-            solve(work.band, work.right)
+            solve(work.matrix, work.right)
             drive = bars.drive[n * (n_stages - 1) + s]
             _gather(stage_u[n, s], stage_v[n, s], stage_a[n, s], system, work, which, bars, drive)
             _stage_back(s, h, stages, system, work, v, a, next_u, next_v)

@@ -13,20 +13,13 @@ r_a).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from sim.arrays import Floats, Ints
-
-F = TypeVar("F", bound=Callable[..., Any])
-
-
-def compiled(function: F) -> F:
-    """Compiles a loop once, caches it on disk, and runs it without the interpreter's lock."""
-    return cast(F, njit(cache=True, nogil=True, error_model="numpy")(function))
+from sim.compiling import compiled
+from sim.matrix import Matrix, add
 
 
 class Network(NamedTuple):
@@ -230,19 +223,8 @@ def _ligament_block(k: int, motion: Floats, turn: Floats, net: Network, block: F
 
 
 @compiled
-def _add(band: Floats, i: int, j: int, value: float) -> None:
-    """Adds to the entry (i, j) of a lower band, unless either dof is held."""
-    if i < 0 or j < 0:
-        return
-    if i >= j:
-        band[j, i - j] += value
-    else:
-        band[i, j - i] += value
-
-
-@compiled
-def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats) -> None:
-    """Adds the energy's Hessian among the free dofs to a band ``band[column, row - column]``.
+def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, matrix: Matrix) -> None:
+    """Adds the energy's Hessian among the free dofs to a matrix.
 
     ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
     """
@@ -255,14 +237,14 @@ def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, band: Floats
             place[3 + m] = free[3 * net.unit[k, 1] + m]
         for row in range(6):
             for column in range(row + 1):
-                _add(band, place[row], place[column], block[row, column])
+                add(matrix, place[row], place[column], block[row, column])
     for k in net.touching:
         curvature = _contact_curvature(motion, net, k)
         if curvature > 0.0:
             i, j = free[3 * net.unit[k, 0] + 2], free[3 * net.unit[k, 1] + 2]
-            _add(band, i, i, curvature)
-            _add(band, j, j, curvature)
-            _add(band, i, j, -curvature)
+            add(matrix, i, i, curvature)
+            add(matrix, j, j, curvature)
+            add(matrix, i, j, -curvature)
 
 
 @compiled

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.kernels import compiled
+from sim.compiling import compiled
 from sim.potential import gradient, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
 

@@ -11,10 +11,10 @@ import numpy as np
 from jax import Array
 
 from sim.arrays import Floats, Ints, Numbers
-from sim.band import number_free_dofs
 from sim.geometry import Shape
 from sim.kernels import Network
 from sim.lattice import Lattice
+from sim.matrix import Pattern, number_free_dofs
 
 A = TypeVar("A")
 
@@ -107,7 +107,7 @@ class Topology:
 
     Attributes:
         ligament_units: (n_ligaments, 2).
-        n_units: number of units.
+        site: (n_units, 2) where the units are, mm.
         held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending.
         barrier, cutoff: contact angles, rad.
         designed: (n_designed,) ligaments whose parameters may be differentiated by.
@@ -115,7 +115,7 @@ class Topology:
     """
 
     ligament_units: Ints
-    n_units: int
+    site: Floats
     held: Ints
     barrier: float
     cutoff: float
@@ -123,15 +123,20 @@ class Topology:
     rotation_scale: float
 
     @cached_property
-    def numbering(self) -> tuple[Ints, int]:
-        """Number of each dof among the free ones (-1 if held), and the tangent's half bandwidth."""
-        return number_free_dofs(self.n_units, self.ligament_units, self.held)
+    def numbering(self) -> tuple[Ints, Pattern]:
+        """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
+        return number_free_dofs(self.site, self.ligament_units, self.held)
 
     @cached_property
     def free_dofs(self) -> Ints:
         """(n_free,) ids of the free dofs in the tangent's order."""
         number = self.numbering[0]
         return np.argsort(np.where(number < 0, len(number), number), kind="stable")[: self.n_free]
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return len(self.site)
 
     @property
     def n_dofs(self) -> int:
@@ -196,7 +201,7 @@ def topology(
     )
     return Topology(
         ligament_units=np.ascontiguousarray(units),
-        n_units=lattice.n_units,
+        site=lattice.site,
         held=np.unique(held),
         barrier=barrier,
         cutoff=cutoff,

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim.arrays import Floats
-from sim.band import factorise, solve
+from sim.matrix import clear, factorise, matrix, solve
 from sim.model import Topology, Values
 from sim.potential import hessian_product, tangent
 from sim.system import system_of
@@ -33,16 +33,17 @@ def highest_frequency(topology: Topology, values: Values, motion: Floats | None 
 def lowest_frequency(topology: Topology, values: Values) -> float:
     """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
     system = system_of(topology, values)
-    band = np.zeros((topology.n_free, system.width + 1))
+    made = matrix(system.pattern)
+    clear(made)
     turn = np.empty((topology.n_units, 4))
-    tangent(np.zeros(topology.n_dofs), system, turn, band)
-    if not factorise(band):
+    tangent(np.zeros(topology.n_dofs), system, turn, made)
+    if not factorise(made):
         return 0.0
     root = _root_mass(topology, values)
 
     def product(x: Floats) -> Floats:
         right = np.ravel(x) * root
-        solve(band, right)
+        solve(made, right)
         return np.asarray(right * root)
 
     return float(1 / np.sqrt(_largest(product, topology.n_free, 1e-3)))

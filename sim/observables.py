@@ -10,8 +10,8 @@ import numpy as np
 from jax import Array
 
 from sim.arrays import Floats, Ints
+from sim.compiling import compiled
 from sim.energy import LigamentStrain, ligament_strain
-from sim.kernels import compiled
 from sim.model import Topology, Values
 from sim.potential import gradient
 from sim.system import System, system_of

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from sim import kernels
 from sim.arrays import Floats, Ints
-from sim.kernels import Sensitivity, compiled
+from sim.compiling import compiled
+from sim.kernels import Sensitivity
+from sim.matrix import Matrix
 from sim.system import System
 
 
@@ -21,9 +23,9 @@ def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple
 
 
 @compiled
-def tangent(motion: Floats, system: System, turn: Floats, band: Floats) -> None:
-    """Adds the energy's Hessian among the free dofs to a lower band."""
-    kernels.tangent(motion, system.net, turn, system.free, band)
+def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> None:
+    """Adds the energy's Hessian among the free dofs to a matrix."""
+    kernels.tangent(motion, system.net, turn, system.free, matrix)
 
 
 @compiled

@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.kernels import Network, Sensitivity, compiled
+from sim.compiling import compiled
+from sim.kernels import Network, Sensitivity
+from sim.matrix import Matrix, Pattern, matrix
 from sim.model import Topology, Values
 
 
@@ -21,7 +23,7 @@ class System(NamedTuple):
         dofs: (n_free,) ids of the free dofs in the tangent's order.
         held: (n_held,) ids of the prescribed dofs.
         scale: (n_dofs,) weights that make rotations comparable with displacements, mm.
-        width: half bandwidth of the tangent.
+        pattern: of the tangent.
     """
 
     net: Network
@@ -31,7 +33,7 @@ class System(NamedTuple):
     dofs: Ints
     held: Ints
     scale: Floats
-    width: int
+    pattern: Pattern
 
 
 class Workspace(NamedTuple):
@@ -41,7 +43,7 @@ class Workspace(NamedTuple):
         turn: (n_units, 4) of the kernels.
         force, step, product: (n_dofs,).
         right: (n_free,).
-        band: (n_free, width + 1) lower band.
+        matrix: the tangent, then its factor.
     """
 
     turn: Floats
@@ -49,7 +51,7 @@ class Workspace(NamedTuple):
     step: Floats
     product: Floats
     right: Floats
-    band: Floats
+    matrix: Matrix
 
 
 class Bars(NamedTuple):
@@ -77,13 +79,13 @@ def workspace(system: System) -> Workspace:
         np.empty(n_dofs),
         np.empty(n_dofs),
         np.empty(n_free),
-        np.empty((n_free, system.width + 1)),
+        matrix(system.pattern),
     )
 
 
 def system_of(topology: Topology, values: Values, touching: Ints | None = None) -> System:
     """The system of concrete parameters, with contact in ``touching`` ligaments (default all)."""
-    free, width = topology.numbering
+    free, pattern = topology.numbering
     return System(
         net=topology.network(values, touching),
         mass=np.array(values.mass, dtype=float, order="C").ravel(),
@@ -92,7 +94,7 @@ def system_of(topology: Topology, values: Values, touching: Ints | None = None) 
         dofs=topology.free_dofs,
         held=topology.held,
         scale=topology.scale,
-        width=width,
+        pattern=pattern,
     )
 
 

@@ -18,6 +18,7 @@ from sim.dynamics import Drive, Solver, simulate
 from sim.geometry import shape
 from sim.lattice import Lattice, quads
 from sim.loads import Motion, held_dofs
+from sim.matrix import Matrix
 from sim.model import Material, Parameters, Topology, damping_of_ratio, parameters, topology
 
 BARRIER, CUTOFF = float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0))
@@ -32,6 +33,33 @@ MATERIAL = Material(
 )
 """The paper's constants."""
 NONE = np.array([], dtype=np.int64)
+
+
+def dense(of: Matrix) -> Floats:
+    """All entries of a stored matrix."""
+    if not of.pattern.by_fronts:
+        n, width = of.pattern.size
+        lower = of.values.reshape(n, width + 1)
+        columns, below = np.nonzero(lower)
+        rows, entries = columns + below, lower[columns, below]
+    else:
+        rows, columns, entries = _entries_of_fronts(of)
+    full = np.zeros((of.pattern.size[0],) * 2)
+    full[rows, columns] = full[columns, rows] = entries
+    return full
+
+
+def _entries_of_fronts(of: Matrix) -> tuple[Ints, Ints, Floats]:
+    fronts, found = of.pattern.fronts, []
+    for front in range(len(fronts.update)):
+        own = np.arange(fronts.first[front], fronts.first[front + 1])
+        rows = np.concatenate([own, fronts.boundary[fronts.edge[front] : fronts.edge[front + 1]]])
+        panel = of.values[fronts.panel[front] : fronts.panel[front + 1]]
+        pairs = np.meshgrid(own, rows, indexing="ij")
+        found.append((pairs[1].ravel(), pairs[0].ravel(), panel))
+    rows, columns, entries = (np.concatenate(part) for part in zip(*found, strict=True))
+    lower = rows >= columns
+    return rows[lower], columns[lower], entries[lower]
 
 
 def rotating_squares(side: int = 5, bias_deg: float = 20.0) -> Lattice:

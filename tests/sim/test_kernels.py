@@ -12,12 +12,12 @@ from jax import Array
 
 from sim import kernels
 from sim.arrays import Floats, Ints, Numbers
-from sim.band import number_free_dofs
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.geometry import shape
 from sim.kernels import Network, Sensitivity
 from sim.lattice import Lattice, quads
-from tests.sim.structures import BARRIER, CUTOFF, mixed_polygons
+from sim.matrix import clear, matrix, number_free_dofs
+from tests.sim.structures import BARRIER, CUTOFF, dense, mixed_polygons
 
 EXACT = 1e-12
 """Relative to the largest entry."""
@@ -142,25 +142,17 @@ def test_energy_and_gradient(random_case: Case) -> None:
     assert_equal(force, np.asarray(gradient_of_definition(motion, numbers(net), net.unit)))
 
 
-def test_tangent_in_band_storage(random_case: Case) -> None:
+@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+def test_tangent(random_case: Case, by_fronts: bool) -> None:
     net, motion, lattice = random_case.net, random_case.motion, random_case.lattice
     held = np.array([0, 1, 2, 7])
-    free, width = number_free_dofs(lattice.n_units, net.unit, held)
-    band = np.zeros((free.max() + 1, width + 1))
-    kernels.tangent(motion, net, scratch(motion)[0], free, band)
+    free, pattern = number_free_dofs(lattice.site, net.unit, held, by_fronts)
+    made = matrix(pattern)
+    clear(made)
+    kernels.tangent(motion, net, scratch(motion)[0], free, made)
     order = np.argsort(free)[len(held) :]
     wanted = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))
-    assert_equal(dense(band), wanted[np.ix_(order, order)])
-
-
-def dense(band: Floats) -> Floats:
-    """Symmetric matrix of a lower band ``band[column, row - column]``."""
-    n = len(band)
-    full = np.zeros((n, n))
-    for column in range(n):
-        for below in range(min(band.shape[1], n - column)):
-            full[column + below, column] = full[column, column + below] = band[column, below]
-    return full
+    assert_equal(dense(made), wanted[np.ix_(order, order)])
 
 
 def test_hessian_product(random_case: Case) -> None:
