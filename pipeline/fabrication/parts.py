@@ -21,8 +21,8 @@ Strokes = tuple[Floats, ...]
 
 
 @dataclass(frozen=True)
-class Hole:
-    """A round hole."""
+class Circle:
+    """A round hole, or a dot."""
 
     centre: tuple[float, float]
     diameter: float
@@ -44,7 +44,7 @@ class Part:
     id: str
     outline: Polygon
     height: float
-    holes: tuple[Hole, ...] = ()
+    holes: tuple[Circle, ...] = ()
     engraving: Strokes = ()
     scores: Strokes = ()
 
@@ -63,7 +63,7 @@ class Part:
             shapely.transform(self.outline, lambda points: points + shift),
             self.height,
             tuple(
-                Hole((hole.centre[0] + shift[0], hole.centre[1] + shift[1]), hole.diameter)
+                Circle((hole.centre[0] + shift[0], hole.centre[1] + shift[1]), hole.diameter)
                 for hole in self.holes
             ),
             tuple(stroke + shift for stroke in self.engraving),
@@ -112,9 +112,12 @@ class Unit:
         design: the polygon as designed.
         outline: the polygon as made: slots cut, tips truncated, corners filleted.
         slots: one for each ligament that ends here.
-        lettering: strokes of the label, seen from the top.
+        lettering: strokes of the label, to be read from the top.
+        underside: the same, to be read from below, seen from the top.
         mark: strokes of the arrow that points to +y.
-        markers: (n, 2) centres of the tracking dots.
+        markers: the tracking dots.
+        height: in z.
+        thickened: area added beside slots so that their walls are thick enough, mm^2.
     """
 
     number: int
@@ -126,8 +129,10 @@ class Unit:
     slots: tuple[Slot, ...]
     lettering: Strokes
     mark: Strokes
-    markers: Floats
+    markers: tuple[Circle, ...]
     height: float
+    underside: Strokes = ()
+    thickened: float = 0.0
 
     @property
     def part(self) -> Part:

@@ -21,7 +21,9 @@ class Slots(Section):
         direction: where a slot points: the unit's centroid, along its ligament, or along the
             bisector of its corner. Where the walls would be too thin, it turns as far as it must.
         depth: wanted depth from the vertex.
-        depth_min, depth_max: how far a corner may depart from it.
+        depth_min: least length in which the shim is held, where there is no more room.
+        depth_max: largest depth, where only a deeper slot has thick enough walls.
+        thicken: most that a unit may grow beside a slot, where nothing else gives thick walls.
         clearance: beside the shim on both sides: width = shim thickness + 2 clearance.
         tip: the tips beside the mouth are cut back to walls of this thickness.
     """
@@ -32,6 +34,7 @@ class Slots(Section):
     depth_max: Length = 5.0
     clearance: Gap = 0.1
     tip: Gap = 0.1
+    thicken: Gap = 1.0
 
     @model_validator(mode="after")
     def _depths_ascend(self) -> Self:
@@ -77,12 +80,14 @@ class Markers(Section):
     Attributes:
         kind: none, recesses to be filled with paint, or raised dots; the template has them always.
         count: dots per unit, on a line through its centroid if there is room; one if not.
-        diameter: of a dot.
+        spread: distance of the outer dots.
+        diameter: of a dot; both are smaller where there is no room.
         depth: of a recess, or height of a raised dot.
     """
 
     kind: Literal["none", "recess", "dots"] = "none"
     count: Literal[1, 2, 3] = 2
+    spread: Length = 6.0
     diameter: Length = 2.0
     depth: Length = 0.4
 
@@ -102,7 +107,7 @@ class Laser(Section):
     sheet: tuple[Length, Length] = (600.0, 300.0)
     margin: Gap = 5.0
     gap: Length = 2.0
-    template_thickness: Length = 1.5
+    template_thickness: Length = 1.0
 
 
 class Print(Section):

@@ -7,7 +7,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from pipeline.fabrication.parts import Ligament, Shim, Slot, Specimen, Unit, labels
+from pipeline.fabrication.parts import Circle, Ligament, Shim, Slot, Specimen, Unit, labels
 from pipeline.problem.fabrication import Fabrication
 
 Floats = NDArray[np.float64]
@@ -107,6 +107,6 @@ def _unit(
         tuple(slots),
         letters,
         arrow,
-        centre[None],
+        (Circle((float(centre[0]), float(centre[1])), 2.0),),
         ASKED.thickness,
     )

@@ -1,0 +1,101 @@
+"""The outline of a unit as it is made: corners rounded, slots cut, thin tips taken off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+from shapely import LineString, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from pipeline.fabrication.parts import Floats, Slot
+from pipeline.fabrication.slots import side_truncations
+from pipeline.problem.fabrication import Fabrication
+
+GRID = 1e-5  # mm; coordinates are rounded to it
+_ROUND = 12  # segments per quarter circle
+
+
+def filleted(polygon: Polygon, radius: float) -> Polygon:
+    """The polygon with its convex corners rounded."""
+    if radius == 0.0:
+        return polygon
+    inner = polygon.buffer(-radius, join_style="mitre", mitre_limit=100.0)
+    return _largest(inner.buffer(radius, quad_segs=_ROUND))
+
+
+def room_to_grow(
+    polygon: Polygon, neighbours: Sequence[Polygon], growth: float, wanted: Fabrication
+) -> Polygon:
+    """What a unit may grow to beside its slots without coming too near to its neighbours."""
+    grown = polygon.buffer(growth, join_style="mitre", mitre_limit=2.0)
+    taken = shapely.union_all(
+        [
+            other.buffer(wanted.minimum_gap + GRID, join_style="mitre", mitre_limit=100.0)
+            for other in neighbours
+            if other.distance(grown) < wanted.minimum_gap + GRID
+        ]
+    )
+    return _largest(grown.difference(taken).union(polygon))
+
+
+def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], wanted: Fabrication) -> Polygon:
+    """The polygon, thickened along slots whose inner ends have too thin walls in it."""
+    body = polygon
+    for slot in slots:
+        cap = _across(slot)
+        if not polygon.contains(cap) or cap.distance(polygon.exterior) < wanted.minimum_wall - GRID:
+            side = slot.width / 2 + wanted.minimum_wall
+            lug = _rectangle(slot, 0.0, slot.depth + wanted.minimum_wall, -side, side)
+            body = body.union(lug.intersection(room))
+    return _largest(body) if body is not polygon else polygon
+
+
+def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
+    """The body with its slots cut in, and the tips beside their mouths cut back."""
+    waste = [
+        piece for slot in slots for piece in (_channel(slot, wanted), *_tips(body, slot, wanted))
+    ]
+    made = _largest(body.difference(shapely.union_all(waste)))
+    return _largest(shapely.set_precision(made, GRID))
+
+
+def _frame(slot: Slot) -> tuple[Floats, Floats]:
+    """Unit vectors along the slot and to its left."""
+    return slot.direction, np.array([-slot.direction[1], slot.direction[0]])
+
+
+def _across(slot: Slot) -> LineString:
+    _, left = _frame(slot)
+    side = slot.width / 2 * left
+    return LineString([slot.end - side, slot.end + side])
+
+
+def _rectangle(slot: Slot, start: float, stop: float, right: float, left: float) -> Polygon:
+    """A rectangle in the slot's own axes."""
+    along, across = _frame(slot)
+    corners = [(start, right), (stop, right), (stop, left), (start, left)]
+    return Polygon([slot.mouth + s * along + t * across for s, t in corners])
+
+
+def _channel(slot: Slot, wanted: Fabrication) -> Polygon:
+    """The slot, lengthened outwards until it has left the unit."""
+    start = -3.0 * slot.width - wanted.slots.thicken
+    return _rectangle(slot, start, slot.depth, -slot.width / 2, slot.width / 2)
+
+
+def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
+    """Where the walls beside the slot are thinner than the tips."""
+    cuts = side_truncations(body, slot.mouth, slot.direction, slot.depth, wanted)
+    half, width = slot.width / 2, slot.width / 2 + wanted.slots.tip + GRID
+    for length, (right, left) in zip(cuts, ((-width, -half), (half, width)), strict=True):
+        if length > 0.0:
+            yield _rectangle(slot, -3.0 * slot.width, length, right, left)
+
+
+def _largest(shape: BaseGeometry) -> Polygon:
+    """The largest piece, counter-clockwise and without holes."""
+    pieces = [piece for piece in shapely.get_parts(shape) if isinstance(piece, Polygon)]
+    piece = max(pieces, key=lambda piece: piece.area)
+    return shapely.orient_polygons(Polygon(piece.exterior))
