@@ -9,9 +9,9 @@ from pipeline.fabrication.assembly.paper import (
     BOLD,
     GREY,
     INK,
-    PALE,
     POINT,
     SIGNAL,
+    Box,
     Paper,
     Sheet,
 )
@@ -44,47 +44,36 @@ def write(path: Path, specimen: Specimen, asked: Fabrication, paper: Paper = "A4
     canvas.setPageSize((sheet.width * POINT, sheet.height * POINT))
     plan = Plan(specimen, sheet)
     pages = tiles(plan.box, sheet.room[2:])
-    _front(sheet, specimen, asked, pages)
+    _front(sheet, plan, steps(specimen, asked, pages), pages)
+    _shim_pages(sheet, specimen)
     for tile in pages:
         _plan_page(sheet, plan, tile)
     _ligament_pages(sheet, specimen)
     canvas.save()
 
 
-def _front(sheet: Sheet, specimen: Specimen, asked: Fabrication, pages: Sequence[Tile]) -> None:
-    """Order of assembly and the first lines of the shim list; more pages if it is long."""
+def _front(sheet: Sheet, plan: Plan, told: Sequence[str], pages: Sequence[Tile]) -> None:
+    """The order of assembly, and the pages of the plan in small."""
     left, low, width, height = sheet.room
     with sheet.page("order of assembly"):
         y = low + height - 3.0
-        for number, told in enumerate(steps(specimen, asked, pages), 1):
-            for k, words in enumerate(paragraphs(told, 104)):
+        for number, step in enumerate(told, 1):
+            for k, words in enumerate(paragraphs(step, 104)):
                 if k == 0:
                     sheet.text(left, y, f"{number}.", 9, BOLD, SIGNAL)
                 sheet.text(left + 7, y, words, 9)
                 y -= _LINE
             y -= 1.2
-        _pages_sketch(sheet, pages, (left, low, width, y - low - 4.0))
-    _shim_pages(sheet, specimen)
+        _sketch(sheet, plan, pages, (left, low, width, y - low - 6.0))
 
 
-def _pages_sketch(
-    sheet: Sheet, pages: Sequence[Tile], room: tuple[float, float, float, float]
-) -> None:
-    """How the pages of the plan lie beside each other."""
-    import numpy as np
-
-    rows, columns = pages[0].of
-    _, _, wide, tall = pages[0].window
-    scale = min(90.0 / (columns * wide), (room[3] - 8.0) / (rows * tall), 0.3)
-    top = room[1] + room[3]
-    sheet.text(room[0], top, "The pages of the plan, as they are joined", 9, BOLD)
-    for tile in pages:
-        x = room[0] + tile.column * wide * scale
-        y = top - 4.0 - (tile.row + 1) * tall * scale
-        corners = np.array([[0, 0], [wide, 0], [wide, tall], [0, tall]]) * scale + [x, y]
-        sheet.polygon(corners, PALE)
-        middle = corners.mean(axis=0)
-        sheet.text(middle[0], middle[1] - 1.5, tile.name, 11, BOLD, at="middle")
+def _sketch(sheet: Sheet, plan: Plan, pages: Sequence[Tile], room: Box) -> None:
+    """The whole plan in small, and how its pages are joined."""
+    left, low, width, height = room
+    _, _, wide, tall = plan.box
+    scale = min(width / wide, (height - 6.0) / tall)
+    sheet.text(left, low + height - 2.0, "The plan and its pages", 9, BOLD)
+    plan.sketch(pages, (left, low + height - 6.0 - scale * tall), scale)
 
 
 def _plan_page(sheet: Sheet, plan: Plan, tile: Tile) -> None:
@@ -117,19 +106,22 @@ def _shim_pages(sheet: Sheet, specimen: Specimen) -> None:
 
 
 def _ligament_pages(sheet: Sheet, specimen: Specimen) -> None:
-    """Which shim joins which units, unless there is but one kind of shim."""
-    if len(specimen.shims) == 1:
-        return
+    """Which units are joined by another shim than the commonest one."""
+    common = max(specimen.shims, key=lambda shim: len(shim.ligaments))
     kinds = {
         ligament: (number, shim.id)
         for number, shim in enumerate(specimen.shims, 1)
         for ligament in shim.ligaments
+        if shim is not common
     }
     rows = [
         (" - ".join(ligament.labels), str(kinds[ligament.number][0]), kinds[ligament.number][1])
         for ligament in specimen.ligaments
+        if ligament.number in kinds
     ]
-    _table(sheet, "which shim joins which units", ("units", "on plan", "id"), rows, (26, 16, 18))
+    if rows:
+        title = f"units that are not joined by shim {common.id}"
+        _table(sheet, title, ("units", "on plan", "id"), rows, (26, 16, 18))
 
 
 def _table(

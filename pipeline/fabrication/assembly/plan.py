@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from pipeline.fabrication.assembly.paper import BOLD, GREY, INK, PALE, SIGNAL, Box, Sheet
+from pipeline.fabrication.assembly.paper import BOLD, GREY, INK, PALE, POINT, SIGNAL, Box, Sheet
 from pipeline.fabrication.assembly.tiles import OVERLAP, Tile
 from pipeline.fabrication.parts import Shim, Specimen, Unit, column_letters
 
@@ -19,7 +21,8 @@ TONES = ("#6f3fa0", "#1d7f78", "#c25e00", "#17427f", "#a3195b", "#4b7a1c", "#7a3
 """Colours of the shims, by length; over again where there are more lengths."""
 
 _CROSS = 3.0
-_ID = 6.5
+_ID, _SMALLEST = 6.5, 3.0  # points
+_ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER = 4.5
 
 
@@ -65,13 +68,34 @@ class Plan:
             self._names(origin)
         self._joints(tile, origin)
 
+    def sketch(self, pages: Sequence[Tile], corner: tuple[float, float], scale: float) -> None:
+        """All units in small, and over them the pages that show them.
+
+        Args:
+            pages: of the plan.
+            corner: where the lower left corner of the plan goes on the page.
+            scale: how small.
+        """
+        low = np.array(self.box[:2])
+        for unit in self._specimen.units:
+            points = np.asarray(unit.outline.exterior.coords)[:-1]
+            self._sheet.polygon((points - low) * scale + corner, PALE, 0.05)
+        for tile in pages:
+            x, y, width, height = tile.window
+            frame = np.array([[0, 0], [width, 0], [width, height], [0, height], [0, 0]])
+            points = (np.add(frame, [x, y]) - low) * scale + corner
+            self._sheet.line(points, 0.25, SIGNAL)
+            middle = points[:4].mean(axis=0)
+            self._sheet.text(middle[0], middle[1] - 3.0, tile.name, 24, BOLD, SIGNAL, "middle")
+
     def _unit(self, unit: Unit, origin: Floats) -> None:
         """Outline, id and arrow of a unit; those in fixtures are tinted."""
         held = unit.label in {*self._specimen.clamped, *self._specimen.driven}
         fill = "#dccdee" if held else PALE
         self._sheet.polygon(np.asarray(unit.outline.exterior.coords)[:-1] + origin, fill)
-        x, y = np.array(unit.design.centroid.coords[0]) + origin
-        self._sheet.text(x, y - 1.6, unit.label, _ID, BOLD, at="middle")
+        x, y, size = _name_place(unit)
+        words = np.array([x, y - 0.12 * size]) + origin
+        self._sheet.text(words[0], words[1], unit.label, size, BOLD, at="middle")
         for stroke in unit.mark:
             self._sheet.line(np.asarray(stroke) + origin, 0.25, SIGNAL)
 
@@ -130,6 +154,14 @@ class Plan:
     def _cross(self, centre: Floats) -> None:
         for step in (np.array([_CROSS, 0.0]), np.array([0.0, _CROSS])):
             self._sheet.line(np.array([centre - step, centre + step]), 0.15, INK)
+
+
+def _name_place(unit: Unit) -> tuple[float, float, float]:
+    """Middle of the name of a unit, where it is widest, and the size of type that fits there."""
+    circle = shapely.maximum_inscribed_circle(unit.outline, tolerance=0.05)
+    (x, y), radius = circle.coords[0], float(circle.length)
+    fitting = 2.0 * radius * POINT / (_ASPECT * len(unit.label))
+    return x, y, min(_ID, max(_SMALLEST, fitting))
 
 
 def _row(unit: Unit) -> int:

@@ -53,7 +53,7 @@ def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
     other = dataclasses.replace(kind, id="S9.00", length=9.0, ligaments=(6,))
     kinds = (dataclasses.replace(kind, ligaments=tuple(range(6))), other)
     found = pages.words(written(tmp_path, dataclasses.replace(one, shims=kinds)))
-    assert "which shim joins which units" in found[-1][0]
+    assert "units that are not joined by shim S8.25" in found[-1][0]
     last = found[-1].index("B2 - C2")
     assert found[-1][last + 1 : last + 3] == ["2", "S9.00"]
 
