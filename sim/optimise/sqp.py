@@ -27,6 +27,9 @@ RETREAT_COST = 3
 CALM = 0.9
 """Factor of the caution from one evaluation to the next."""
 
+JUMP = 0.5
+"""Share of a change of the loss that the slopes at both ends may leave unexplained."""
+
 
 @dataclass(frozen=True)
 class SqpOptions:
@@ -207,6 +210,9 @@ class Descent:
         """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""
         step = outcome.x - self.point.x
         ratio = (self.point.loss - outcome.loss) / trial.predicted
+        if self._jumped(step, outcome, trial.predicted):
+            self.radius /= 4
+            return self._move(outcome, ratio)
         bend = outcome.jacobian[trial.rows] - self.point.jacobian[trial.rows]
         change = outcome.gradient - self.point.gradient - bend.T @ trial.multipliers
         self.model.update(step, change)
@@ -215,6 +221,19 @@ class Descent:
             self.radius = min(self.radius, length) / 2
         elif ratio > GROW and length > 0.9 * self.radius:
             self.radius = min(2 * self.radius, self.options.radius_max)
+        return self._move(outcome, ratio)
+
+    def _jumped(self, step: Floats, outcome: Point, predicted: float) -> bool:
+        """Whether the loss is that of another branch of solutions, which tells nothing of this one.
+
+        Along one branch the trapezoidal rule recovers the change of the loss from its slopes.
+        """
+        change = outcome.loss - self.point.loss
+        explained = float((self.point.gradient + outcome.gradient) @ step) / 2
+        unexplained = abs(change - explained)
+        return unexplained > predicted and unexplained > JUMP * max(abs(change), abs(explained))
+
+    def _move(self, outcome: Point, ratio: float) -> bool:
         if ratio <= ACCEPT:
             return False
         self.point = outcome

@@ -229,3 +229,19 @@ def test_bounded_bowls_end_at_the_clipped_bottom(seed: int) -> None:
 
     found = minimise("sqp", loss, None, np.zeros(6), (-1.0, 1.0), EXACT)
     np.testing.assert_allclose(found.x, np.clip(bottom, -1, 1), atol=1e-5)
+
+
+def test_jumps_to_another_branch_teach_nothing() -> None:
+    """Every third evaluation finds another equilibrium, with slopes that are not this one's."""
+    known, count = many(40, 120), [0]
+
+    def jumping(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        loss, slope, aux = known.loss(x)
+        count[0] += 1
+        return (loss + 3.0, -20 * slope, aux) if count[0] % 3 == 0 else (loss, slope, aux)
+
+    found = minimise(
+        "sqp", jumping, known.constraints, known.start, options=replace(EXACT, evaluations=120)
+    )
+    least = known.loss(known.optimum)[0]
+    assert found.loss - least < 1e-3 * (known.loss(known.start)[0] - least)
