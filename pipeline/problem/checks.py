@@ -9,7 +9,13 @@ from dataclasses import dataclass
 from pipeline.problem.drives import LinearRamp
 from pipeline.problem.model import Problem
 from pipeline.problem.regions import Region, at
-from pipeline.problem.selection import Lattice, Selector, selected_units, units_within
+from pipeline.problem.selection import (
+    Selector,
+    loose_units,
+    selected_units,
+    units_near,
+    units_within,
+)
 from pipeline.problem.yamlfile import KeyPath
 
 
@@ -176,32 +182,22 @@ def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
 
 def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
     lattice = problem.lattice
-    kept = {unit for unit, _, _ in lattice.sites()} - removed
-    joined = _joined_to(min(kept), kept, lattice) if kept else set()
-    if other := kept - joined:
-        first = min(other if len(other) < len(joined) else joined)
-        what = f"the void splits the lattice: unit {lattice.name(first)} is cut off from the rest"
-        yield Finding(what, ("void",), "change its shape so that all other units stay joined")
-
-
-def _joined_to(start: int, kept: set[int], lattice: Lattice) -> set[int]:
-    """The kept units that ligaments join to `start`, at any distance."""
-    neighbours: dict[int, list[int]] = {unit: [] for unit in kept}
-    for one, other in lattice.bonds():
-        if one in kept and other in kept:
-            neighbours[one].append(other)
-            neighbours[other].append(one)
-    found, waiting = {start}, [start]
-    while waiting:
-        new = set(neighbours[waiting.pop()]) - found
-        found |= new
-        waiting += new
-    return found
+    if loose := loose_units(lattice, frozenset(removed)):
+        what = (
+            f"the void splits the lattice: unit {lattice.name(loose[0])} is cut off from the rest"
+        )
+        remedy = "change its shape, or give `loose: remove` to take such units out as well"
+        yield Finding(what, ("void",), remedy)
 
 
 def void_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units that the void removes."""
-    return () if problem.void is None else units_within(problem.void, problem.lattice)
+    """Ids of the units that the void removes, and of those it cuts loose if they are to go too."""
+    if problem.void is None:
+        return ()
+    inside = units_within(problem.void, problem.lattice)
+    if problem.void.loose == "refuse":
+        return inside
+    return tuple(sorted({*inside, *loose_units(problem.lattice, frozenset(inside))}))
 
 
 def inclusion_units(problem: Problem) -> tuple[int, ...]:
@@ -218,7 +214,7 @@ def altered_units(problem: Problem) -> set[int]:
 def source_units(problem: Problem) -> tuple[int, ...]:
     """Ids of the driven units within the cloak: they keep their shape to fit what drives them."""
     driven = selected_units(problem.drive.units, problem.lattice)
-    return tuple(sorted(set(driven) & set(units_within(problem.cloak, problem.lattice))))
+    return tuple(sorted(set(driven) & set(_cloak_inside(problem))))
 
 
 def cloak_units(problem: Problem) -> tuple[int, ...]:
@@ -226,8 +222,24 @@ def cloak_units(problem: Problem) -> tuple[int, ...]:
     taken = {*selected_units(problem.drive.units, problem.lattice), *altered_units(problem)}
     if isinstance(problem.objective.region, Region):
         taken |= set(units_within(problem.objective.region, problem.lattice))
-    inside = units_within(problem.cloak, problem.lattice)
-    return tuple(unit for unit in inside if unit not in taken)
+    return tuple(unit for unit in _cloak_inside(problem) if unit not in taken)
+
+
+def _cloak_inside(problem: Problem) -> tuple[int, ...]:
+    """Ids of all units within the cloak's outer rim."""
+    if problem.cloak.around is None:
+        return units_within(problem.cloak, problem.lattice)
+    cores = _cores(problem)
+    found = (units_near(core, problem.cloak.around.distance, problem.lattice) for core in cores)
+    return tuple(sorted(set().union(*found)))
+
+
+def _cores(problem: Problem) -> list[Region]:
+    """What a cloak lies around: the region of interest, if there is one, or what was altered."""
+    if isinstance(problem.objective.region, Region):
+        return [problem.objective.region]
+    inclusion = None if problem.inclusion is None else problem.inclusion.region
+    return [region for region in (problem.void, inclusion) if region is not None]
 
 
 def interest_units(problem: Problem) -> tuple[int, ...]:

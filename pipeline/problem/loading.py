@@ -16,6 +16,7 @@ from pipeline.problem import yamlfile
 from pipeline.problem.checks import findings
 from pipeline.problem.drives import TimeSeries
 from pipeline.problem.model import Problem
+from pipeline.problem.quantities import FOLDER
 from pipeline.problem.yamlfile import Document, KeyPath
 
 
@@ -31,7 +32,7 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     if preset is not None:
         data = overlaid(data, _preset(document, presets, preset))
     try:
-        problem = Problem.model_validate(data)
+        problem = Problem.model_validate(data, context={FOLDER: document.path.parent})
     except ValidationError as error:
         raise _told(error, document, data, preset) from error
     for finding in findings(problem):

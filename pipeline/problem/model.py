@@ -27,7 +27,7 @@ from pipeline.problem.quantities import (
     Stiffness,
     fault,
 )
-from pipeline.problem.regions import Region
+from pipeline.problem.regions import CloakRegion, Region, VoidRegion
 from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Lattice, Selector
@@ -221,9 +221,9 @@ class Problem(Section):
     supports: tuple[Support, ...] = ()
     drive: Drive
     horizon: Horizon
-    void: Region | None = None
+    void: VoidRegion | None = None
     inclusion: Inclusion | None = None
-    cloak: Region
+    cloak: CloakRegion
     objective: Objective
     constraints: Constraints = Constraints()
     optimiser: Optimiser

@@ -13,6 +13,10 @@ SIM_UNITS = {"sim_units": True}
 """Validation context that takes bare floats as they are: for problems read back from a dataset."""
 
 
+FOLDER = "folder"
+"""Key of the validation context under which the folder of the problem file is."""
+
+
 def fault(what: str, remedy: str, key: str | None = None) -> PydanticCustomError:
     """A validation error that knows its remedy, and the key below the validated section."""
     template = "{what}"

@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pipeline.problem.quantities import Angle, Length
-from pipeline.problem.regions import HAIR, Region
+from pipeline.problem.regions import HAIR, Region, inside
 from pipeline.problem.section import Section
 
 Index = Annotated[int, Field(ge=0, strict=True)]
@@ -85,8 +85,46 @@ Selector = Annotated[
 @lru_cache(maxsize=64)
 def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
     """The ids of the units whose site lies in the region, ascending."""
-    within = region.membership(lattice.centre_site, HAIR * lattice.spacing)
-    return tuple(unit for unit, x, y in lattice.sites() if within((x, y)))
+    units, points = zip(*((unit, (x, y)) for unit, x, y in lattice.sites()), strict=True)
+    held = region.holds(points, lattice.centre_site, HAIR * lattice.spacing)
+    return tuple(unit for unit, within in zip(units, held, strict=True) if within)
+
+
+@lru_cache(maxsize=64)
+def units_near(region: Region, distance: float, lattice: Lattice) -> tuple[int, ...]:
+    """The ids of the units in the region or within `distance` (mm) of its outline, ascending."""
+    units, points = zip(*((unit, (x, y)) for unit, x, y in lattice.sites()), strict=True)
+    reach = distance + HAIR * lattice.spacing
+    held = inside(points, region.outlines(lattice.centre_site), reach)
+    return tuple(unit for unit, near in zip(units, held, strict=True) if near)
+
+
+@lru_cache(maxsize=16)
+def loose_units(lattice: Lattice, removed: frozenset[int]) -> tuple[int, ...]:
+    """The ids of the units that are cut off from the largest part, ascending."""
+    neighbours: dict[int, list[int]] = {
+        unit: [] for unit, _, _ in lattice.sites() if unit not in removed
+    }
+    for one, other in lattice.bonds():
+        if one in neighbours and other in neighbours:
+            neighbours[one].append(other)
+            neighbours[other].append(one)
+    parts: list[set[int]] = []
+    for unit in neighbours:
+        if not any(unit in part for part in parts):
+            parts.append(_joined_to(unit, neighbours))
+    largest = max(parts, key=len, default=set())
+    return tuple(unit for unit in neighbours if unit not in largest)
+
+
+def _joined_to(start: int, neighbours: dict[int, list[int]]) -> set[int]:
+    """The units that ligaments join to `start`, at any distance."""
+    found, waiting = {start}, [start]
+    while waiting:
+        new = set(neighbours[waiting.pop()]) - found
+        found |= new
+        waiting += new
+    return found
 
 
 def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:

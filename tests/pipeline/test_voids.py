@@ -71,7 +71,7 @@ def test_losses_at_the_start_are_the_papers(tmp_path: Path) -> None:
         (
             "void: { polygon: { vertices: [[50 mm, -5 mm], [70 mm, -5 mm], [70 mm, 125 mm],"
             " [50 mm, 125 mm]] } }\n",
-            "the void splits the lattice: unit [0, 0] is cut off from the rest",
+            "the void splits the lattice: unit [5, 0] is cut off from the rest",
             "void",
         ),
         (
