@@ -9,16 +9,11 @@ import numpy as np
 import shapely
 from shapely import Geometry, LineString, Point, Polygon, STRtree
 
-from pipeline.fabrication.checks.drawings import Curve, Drawing
+from pipeline.fabrication.checks.drawings import OUTER, Curve, Drawing
 from pipeline.fabrication.checks.faults import Fault
 
-INNER, OUTER, ENGRAVE, SCORE, REFERENCE = LAYERS = (
-    "CUT_INNER",
-    "CUT_OUTER",
-    "ENGRAVE",
-    "SCORE",
-    "REFERENCE",
-)
+INNER, ENGRAVE, SCORE, REFERENCE = "CUT_INNER", "ENGRAVE", "SCORE", "REFERENCE"
+LAYERS = (INNER, OUTER, ENGRAVE, SCORE, REFERENCE)
 CUTS = (INNER, OUTER)
 CUT_KINDS = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "PATH", "POLYGON", "RECT")
 LINE_KINDS = (*CUT_KINDS, "LINE", "SIMPLELINE", "ARC")
@@ -71,6 +66,8 @@ def _of_curve(curve: Curve) -> Iterator[str]:
         return
     if curve.own_colour:
         yield f"a {curve.kind} on layer {curve.layer} with a colour of its own"
+    if curve.layer == OUTER and not curve.part:
+        yield "an outer cut that belongs to no part"
     if curve.layer in CUTS and not curve.closed:
         yield f"an open curve on layer {curve.layer}"
     lengths = shapely.length([LineString(pair) for pair in pairwise(_ring(curve))])

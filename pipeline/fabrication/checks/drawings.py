@@ -1,19 +1,20 @@
 """Reads a written drawing, DXF or SVG, as plain curves in millimetres, y up.
 
 Nothing here knows how the files are made: DXF goes through ezdxf's recovering reader and its
-auditor, SVG through svgelements. A curve says of which part it is: in a DXF by extended data under
-the name METACLOAK, in an SVG by the id of the group that holds it.
+auditor, SVG through svgelements. An outer cut says of which part it is: in a DXF by extended data
+under the name METACLOAK, in an SVG by its label. All else belongs to the outline that it lies in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Point, Polygon, STRtree
 
 from pipeline.errors import UserError
 
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+OUTER = "CUT_OUTER"
 APPLICATION = "METACLOAK"
+LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 BYLAYER = 256
 MILLIMETRES = 4
 FLATNESS = 2e-4
@@ -35,7 +38,7 @@ class Curve:
     """One entity of a drawing.
 
     Attributes:
-        part: id of the part that it belongs to, "" if it tells none.
+        part: id of the part that it belongs to, "" if there is none.
         layer: its layer.
         kind: what the file calls it.
         points: vertices (n, 2) in mm, a closed curve without the repeated first one.
@@ -80,7 +83,23 @@ def read(path: Path) -> Drawing:
     Raises:
         UserError: it cannot be read as what its name says.
     """
-    return read_svg(path) if path.suffix == ".svg" else read_dxf(path)
+    drawing = read_svg(path) if path.suffix == ".svg" else read_dxf(path)
+    return replace(drawing, curves=_owned(drawing.curves))
+
+
+def _owned(curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+    """The curves; those that tell no part get that of the outline around them."""
+    outlines = [curve for curve in curves if curve.layer == OUTER and curve.closed]
+    named = [curve for curve in outlines if curve.part and len(curve.points) > 2]
+    tree = STRtree([Polygon(curve.points) for curve in named])
+
+    def owner(curve: Curve) -> str:
+        if curve.part or curve.layer == OUTER or len(curve.points) == 0:
+            return curve.part
+        around = tree.query(Point(curve.points[0]), predicate="intersects")
+        return named[int(min(around))].part if len(around) else ""
+
+    return tuple(replace(curve, part=owner(curve)) for curve in curves)
 
 
 def read_dxf(path: Path) -> Drawing:
@@ -167,24 +186,25 @@ def _without_return(points: Array, closed: bool) -> Array:
     return points
 
 
-def _of_svg(group: Any, part: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
+def _of_svg(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
     from svgelements import Group, Image, Shape, Text
 
     for element in group:
         if isinstance(element, Group):
-            yield from _of_svg(element, element.values.get("id") or part, height)
+            yield from _of_svg(element, element.values.get("id") or layer, height)
         elif isinstance(element, Shape):
-            yield from _shape(element, part, height)
+            yield from _shape(element, layer, height)
         elif isinstance(element, Text | Image):
-            layer, kind = str(element.values.get("class", "")), type(element).__name__.upper()
-            yield Curve(part, layer, kind, np.empty((0, 2)), closed=False), str(element.stroke)
+            kind = type(element).__name__.upper()
+            yield Curve("", layer, kind, np.empty((0, 2)), closed=False), str(element.stroke)
 
 
-def _shape(shape: Any, part: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
+def _shape(shape: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
     """One curve for each stroke of the shape's path."""
     from svgelements import Path as SvgPath
 
-    kind, layer = type(shape).__name__.upper(), str(shape.values.get("class", ""))
+    kind = type(shape).__name__.upper()
+    part = str(shape.values["attributes"].get(LABEL, ""))
     for stroke in SvgPath(shape).as_subpaths():
         points, closed = _polygon(stroke)
         points = points * [1.0, -1.0] + [0.0, height]

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
 from shapely import Geometry, Polygon, STRtree
 
-from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, OUTER, line, named
+from pipeline.fabrication.checks.alignment import aligned
+from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, line, named
 from pipeline.fabrication.checks.curves import polygon as bounded
-from pipeline.fabrication.checks.drawings import MILLIMETRES, Curve, Drawing
+from pipeline.fabrication.checks.drawings import MILLIMETRES, OUTER, Curve, Drawing
 from pipeline.fabrication.checks.faults import Fault
 from pipeline.problem.fabrication import Laser
 
@@ -146,36 +147,46 @@ def _legible(
         yield _on(drawing, part, what, "labels.height", "give smaller letters", (outline, written))
 
 
-def compensation(cut: Drawing, nominal: Drawing, kerf: float) -> Iterator[Fault]:
-    """Faults of a compensated sheet against the nominal one: outer cuts k/2 out, inner ones in."""
-    pairs = (
-        [curve for curve in drawing.curves if curve.layer in CUTS] for drawing in (cut, nominal)
-    )
-    made, wanted = pairs
-    if [(c.part, c.layer) for c in made] != [(c.part, c.layer) for c in wanted]:
-        yield _whole(cut, f"other parts or another order than in {nominal.file.name}")
+def compensation(
+    cut: Sequence[Drawing], nominal: Sequence[Drawing], kerf: float
+) -> Iterator[Fault]:
+    """Faults of compensated sheets against nominal ones: outer cuts k/2 out, inner ones in.
+
+    Args:
+        cut: all sheets of one kind of parts, with the kerf made good.
+        nominal: the same parts at nominal size, maybe elsewhere on other sheets.
+        kerf: width of the cut, mm.
+    """
+    made, wanted = _cuts(cut), _cuts(nominal)
+    if {key: len(found) for key, found in made.items()} != {k: len(f) for k, f in wanted.items()}:
+        yield _whole(cut[0], "other parts than at nominal size", "laser.kerf")
         return
-    for curve, drawn in zip(made, wanted, strict=True):
-        shift = kerf / 2 if curve.layer == OUTER else -kerf / 2
-        if not _offset(curve, drawn, shift):
-            what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
-            shown = (line(curve), line(drawn))
-            yield _on(cut, curve.part, what, "laser.kerf", _BUG, shown)
+    for (part, layer), found in made.items():
+        shift = kerf / 2 if layer == OUTER else -kerf / 2
+        for (drawing, curve), (_, drawn) in zip(found, wanted[part, layer], strict=True):
+            if not _offset(curve, drawn, shift):
+                what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
+                yield _on(drawing, part, what, "laser.kerf", _BUG, (line(curve),))
+
+
+def _cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tuple[Drawing, Curve]]]:
+    """Closed cuts by part and layer."""
+    found: dict[tuple[str, str], list[tuple[Drawing, Curve]]] = {}
+    for drawing in drawings:
+        for curve in drawing.curves:
+            if curve.layer in CUTS and curve.closed:
+                found.setdefault((curve.part, curve.layer), []).append((drawing, curve))
+    return found
 
 
 def _offset(curve: Curve, drawn: Curve, shift: float) -> bool:
     """Whether a cut is the nominal one moved by `shift`; corners may be round or sharp."""
-    made, nominal = bounded(curve), bounded(drawn)
-    nominal = shapely.affinity.translate(nominal, *_between(nominal, made))
+    nominal = bounded(drawn)
+    sharp = nominal.buffer(shift, join_style="mitre", mitre_limit=10.0)
+    made = aligned(sharp, bounded(curve))
     least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=32)
     most = nominal.buffer(shift + _KERF_TOLERANCE, join_style="mitre", mitre_limit=10.0)
     return bool(made.covers(least) and most.covers(made))
-
-
-def _between(nominal: Geometry, made: Geometry) -> tuple[float, float]:
-    """Shift from one shape's place on its sheet to that of the other."""
-    before, after = (np.array(shape.bounds).reshape(2, 2).mean(axis=0) for shape in (nominal, made))
-    return float(after[0] - before[0]), float(after[1] - before[1])
 
 
 def _on(

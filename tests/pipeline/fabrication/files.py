@@ -18,6 +18,7 @@ Triangles = NDArray[np.int64]
 
 COLOURS = {"CUT_INNER": 5, "CUT_OUTER": 1, "ENGRAVE": 2, "SCORE": 3, "REFERENCE": 8}
 PENS = {1: "#ff0000", 2: "#ffff00", 3: "#00ff00", 5: "#0000ff", 8: "#808080", 7: "#000000"}
+INKSCAPE = "http://www.inkscape.org/namespaces/inkscape"
 CORE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
@@ -88,13 +89,14 @@ def write_svg(
     """An SVG with these curves, y down; `head` in place of its own opening words."""
     width, height = size
     words = head or f'width="{width:g}mm" height="{height:g}mm" viewBox="0 0 {width:g} {height:g}"'
-    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" {words}>']
+    lines = [f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:inkscape="{INKSCAPE}" {words}>']
     for curve in curves:
         points = " L ".join(f"{x:.6f} {height - y:.6f}" for x, y in curve.points)
         pen = PENS[COLOURS.get(curve.layer, 7)]
+        name = f'inkscape:label="{curve.part}" ' if curve.part else ""
         close = " Z" if curve.closed else ""
-        path_words = f'class="{curve.layer}" fill="none" stroke="{pen}" d="M {points}{close}"'
-        lines.append(f'<g id="{curve.part}"><path {path_words}/></g>')
+        path_words = f'<path {name}fill="none" stroke="{pen}" d="M {points}{close}"/>'
+        lines.append(f'<g id="{curve.layer}">{path_words}</g>')
     path.write_text("\n".join([*lines, "</svg>"]), encoding="utf-8")
     return path
 

@@ -1,0 +1,125 @@
+"""Checks the folder laser/ as a whole: every format of every sheet, and all parts exactly once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from shapely import Polygon
+
+from pipeline.fabrication.checks import corners, curves, drawings, sheets
+from pipeline.fabrication.checks.alignment import aligned
+from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks.drawings import Drawing
+from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.problem.fabrication import Fabrication
+
+_BUG = "run the same command again; if it stays, the exporter has a bug"
+NOMINAL = "nominal"
+
+
+def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
+    """Faults of all drawings in a package's folder."""
+    variants: dict[tuple[str, str], list[Drawing]] = {}
+    for path in sorted(folder.glob("*.dxf")):
+        if path.stem.endswith("_r12"):
+            continue
+        drawing = drawings.read(path)
+        kind, _, variant = path.stem.split("_")
+        variants.setdefault((kind, variant), []).append(drawing)
+        yield from _sheet(drawing, asked)
+        yield from _formats(drawing, folder, asked)
+    yield from _kerfs(variants, asked)
+    units = variants.get(("units", NOMINAL), [])
+    yield from _units(folder, units, wanted, asked)
+
+
+def _sheet(drawing: Drawing, asked: Fabrication) -> Iterator[Fault]:
+    yield from curves.check(drawing)
+    yield from sheets.check(drawing, asked.laser, thickness(drawing.file, asked))
+
+
+def thickness(file: Path, asked: Fabrication) -> float:
+    """Of the material that a sheet is cut from, by the file's name."""
+    foil = asked.shims.thickness
+    kinds = {"units": asked.thickness, "shims": foil, "strips": foil}
+    return kinds.get(file.name.partition("_")[0], asked.laser.template_thickness)
+
+
+def _formats(drawing: Drawing, folder: Path, asked: Fabrication) -> Iterator[Fault]:
+    """The same sheet as R12 and as SVG holds the same curves."""
+    stem = drawing.file.stem
+    for name in (f"{stem}_r12.dxf", f"{stem}.svg"):
+        other = drawings.read(folder / name)
+        yield from _sheet(other, asked)
+        if (what := _difference(drawing, other)) is not None:
+            yield Fault("the drawing", what, "laser", _BUG, other.file)
+
+
+def _difference(one: Drawing, other: Drawing) -> str | None:
+    """How two files of one sheet differ; one goes part by part, another layer by layer."""
+    pairs = [sorted(drawing.curves, key=lambda curve: curve.layer) for drawing in (one, other)]
+    ours, theirs = ([(c.part, c.layer, c.closed) for c in curves] for curves in pairs)
+    if ours != theirs:
+        return f"other parts, layers or another order than in {one.file.name}"
+    for mine, yours in zip(*pairs, strict=True):
+        if not _alike(mine.points, yours.points):
+            return f"part {mine.part} has another size or place than in {one.file.name}"
+    return None
+
+
+def _alike(mine: np.ndarray, yours: np.ndarray) -> bool:
+    """Whether two curves are the same; circles come with other numbers of points."""
+    boxes = ([points.min(axis=0), points.max(axis=0)] for points in (mine, yours))
+    ours, theirs = boxes
+    same = np.allclose(ours, theirs, rtol=0, atol=sheets.TOLERANCE)
+    if len(mine) != len(yours):
+        return bool(same)
+    return bool(same and np.abs(mine - yours).max() < sheets.TOLERANCE)
+
+
+def _kerfs(
+    variants: Mapping[tuple[str, str], list[Drawing]], asked: Fabrication
+) -> Iterator[Fault]:
+    """Each kind of sheet is there for the kerf that was asked for, and its parts are larger."""
+    kerf = asked.laser.kerf
+    for (kind, variant), nominal in variants.items():
+        if variant != NOMINAL or kerf == 0.0:
+            continue
+        if (kind, name := f"kerf{kerf:.2f}") in variants:
+            yield from sheets.compensation(variants[kind, name], nominal, kerf)
+        else:
+            what = f"there is no sheet of {kind} for a kerf of {kerf:g} mm"
+            yield Fault("the drawings", what, "laser.kerf", _BUG, nominal[0].file)
+
+
+def _units(
+    folder: Path, units: list[Drawing], wanted: Wanted, asked: Fabrication
+) -> Iterator[Fault]:
+    """Each unit once, none that is not there, each true to its design."""
+    found = [(part, shape, d.file) for d in units for part, shape in sheets.outlines(d)]
+    yield from every_unit(Counter(part for part, _, _ in found), wanted, folder)
+    for label, shape, file in found:
+        if label in wanted.polygons:
+            yield from corners.check(of_unit(label, file, shape, wanted), asked)
+
+
+def of_unit(label: str, file: Path, shape: Polygon, wanted: Wanted) -> Shape:
+    """A unit's outline in a file, moved back to its place in the design."""
+    design = wanted.polygons[label]
+    made = aligned(design, shape) if isinstance(shape, Polygon) and not shape.is_empty else shape
+    return Shape(label, file, design, made, wanted.slots[label])
+
+
+def every_unit(found: Mapping[str, int], wanted: Wanted, where: Path) -> Iterator[Fault]:
+    """Faults of the number of units: each is there once, and no other."""
+    for label in wanted.polygons:
+        if (count := found.get(label, 0)) != 1:
+            what = "it is missing" if count == 0 else f"it is there {count} times"
+            yield Fault(f"unit {label}", what, "laser", _BUG, where)
+    for label in sorted(set(found) - set(wanted.polygons)):
+        what = "it is made, but the structure has no such unit"
+        yield Fault(f"unit {label}", what, "laser", _BUG, where)

@@ -1,0 +1,64 @@
+"""What a package has to hold: read from the design's dataset, from nothing that was made of it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from shapely import Polygon
+
+from pipeline.fabrication.parts import labels
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """The units of one structure.
+
+    Attributes:
+        polygons: outline as designed by label, in the specimen frame.
+        slots: vertices at which a ligament ends, one entry a ligament, by label.
+        ligaments: how many there are.
+    """
+
+    polygons: dict[str, Polygon]
+    slots: dict[str, tuple[int, ...]]
+    ligaments: int
+
+
+def of_design(design: xr.Dataset, structure: str) -> Wanted:
+    """What is to be made of the structure intact, altered or cloaked.
+
+    A unit in a void is there in the intact structure only; with it go the ligaments that end there.
+    """
+    shapes = design["vertices" if structure == "cloaked" else "vertices_initial"]
+    corners = shapes.transpose("unit", "vertex", "xy").values
+    removed = _void(design) if structure != "intact" else np.zeros(len(corners), dtype=bool)
+    names = labels(zip(design["i"].values.tolist(), design["j"].values.tolist(), strict=True))
+    ids = design["unit"].values.tolist()
+    polygons = {
+        number: Polygon(ring[~np.isnan(ring[:, 0])])
+        for number, ring, gone in zip(ids, corners, removed, strict=True)
+        if not gone
+    }
+    slots: dict[int, list[int]] = defaultdict(list)
+    count = 0
+    pairs = zip(design["ligament_unit"].values, design["ligament_vertex"].values, strict=True)
+    for units, vertices in pairs:
+        if all(int(unit) in polygons for unit in units):
+            count += 1
+            for unit, vertex in zip(units, vertices, strict=True):
+                slots[int(unit)].append(int(vertex))
+    name = dict(zip(ids, names, strict=True))
+    return Wanted(
+        {name[number]: polygon for number, polygon in polygons.items()},
+        {name[number]: tuple(sorted(slots[number])) for number in polygons},
+        count,
+    )
+
+
+def _void(design: xr.Dataset) -> np.ndarray:
+    region = design["region"]
+    meanings = str(region.attrs["flag_meanings"]).split()
+    return np.asarray(region.values == region.attrs["flag_values"][meanings.index("void")])
