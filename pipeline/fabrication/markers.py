@@ -48,7 +48,7 @@ def _line(
     shares = np.linspace(-1.0, 1.0, wanted.count)
     places = centre + shares[None, :, None] * arm[:, None, :]
     shapely.prepare(free)
-    fits = np.flatnonzero(shapely.contains_xy(free, places).all(axis=1))
+    fits = np.flatnonzero(shapely.contains_xy(free, places[..., 0], places[..., 1]).all(axis=1))
     if not len(fits):
         return ()
     widest = fits[spread[fits] == spread[fits[0]]]

@@ -23,6 +23,7 @@ _DEPTH_STEP = 0.25  # mm; few different lengths of shims
 _KEPT = 600  # candidates per slot that are combined
 _HAIR = 1e-6  # mm
 _COST_OF_TURN = 1 / np.deg2rad(30.0)  # as dear as 1 mm less depth
+_COST_OF_KINK = 1 / np.deg2rad(60.0)  # where the shim leaves the slot, against the ligament
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,13 @@ def _candidates(
     thick = walls >= wanted.minimum_wall - _HAIR
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
     truncation = _truncations(room, mouth, directions, depths, wanted)
-    cost = np.abs(depths - wanted.slots.depth) + np.abs(turns) * _COST_OF_TURN + truncation
+    kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
+    cost = (
+        np.abs(depths - wanted.slots.depth)
+        + np.abs(turns) * _COST_OF_TURN
+        + kink * _COST_OF_KINK
+        + truncation
+    )
     held = depths - truncation >= wanted.slots.depth_min - _HAIR
     return Candidates(mouth, directions, depths, truncation, walls, cost).pick(held)
 

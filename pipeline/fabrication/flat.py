@@ -1,0 +1,175 @@
+"""The flat parts beside the units: shims, strips, template, spacer comb, coupon."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from shapely import Polygon, box
+
+from pipeline.fabrication.lettering import extent, text, turned
+from pipeline.fabrication.parts import Circle, Floats, Part, Specimen, Strokes
+from pipeline.problem.fabrication import Fabrication
+
+_RIM = 10.0  # mm of the template around the specimen
+_TOOTH = 8.0  # mm, length of the comb's teeth
+_HANDLE = 12.0  # mm, back of the comb
+_MOST_TEETH = 14
+_COUPON_PITCH, _COUPON_DEPTH = 9.0, 14.0  # mm
+
+
+def shim_pieces(specimen: Specimen, wanted: Fabrication) -> list[Part]:
+    """Every piece of foil, spares included, the shortest first."""
+    return [
+        Part(shim.id, box(0.0, 0.0, shim.length, shim.width), wanted.shims.thickness)
+        for shim in specimen.shims
+        for _ in range(shim.count)
+    ]
+
+
+def comb(specimen: Specimen, spacing: float, gap: float, wanted: Fabrication) -> Part:
+    """A comb whose teeth keep the units of a row at their distance while shims go in.
+
+    Args:
+        specimen: whose longest row gives the number of teeth.
+        spacing: of the lattice, mm.
+        gap: length of the ligaments, mm.
+        wanted: sheet and thickness.
+    """
+    columns = max(unit.column for unit in specimen.units)
+    room = (wanted.laser.sheet[0] - 2 * wanted.laser.margin) / spacing
+    teeth = max(1, min(columns, _MOST_TEETH, math.floor(room) - 1))
+    width = teeth * spacing
+    points = [(0.0, 0.0), (width, 0.0), (width, _HANDLE)]
+    for tooth in reversed(range(teeth)):
+        middle = (tooth + 0.5) * spacing
+        left, right, top = middle - gap / 2, middle + gap / 2, _HANDLE + _TOOTH
+        points += [(right, _HANDLE), (right, top), (left, top), (left, _HANDLE)]
+    points.append((0.0, _HANDLE))
+    told = _title(f"{gap:g}", (width / 2, _HANDLE / 2), 4.0)
+    return Part("COMB", Polygon(points), wanted.laser.template_thickness, engraving=told)
+
+
+def coupon(wanted: Fabrication) -> Part:
+    """A block with a slot for each clearance of the ladder, to find the one that holds a shim."""
+    width = _COUPON_PITCH * len(wanted.coupon)
+    block = box(0.0, 0.0, width, _COUPON_DEPTH)
+    written: list[Floats] = []
+    for step, clearance in enumerate(wanted.coupon):
+        middle = (step + 0.5) * _COUPON_PITCH
+        half = wanted.shims.thickness / 2 + clearance
+        block = block.difference(
+            box(middle - half, _COUPON_DEPTH - wanted.slots.depth, middle + half, 2 * _COUPON_DEPTH)
+        )
+        written += _title(f"{clearance:.2f}", (middle, 4.5), min(2.6, wanted.labels.height))
+    outline = shapely.orient_polygons(Polygon(block.exterior))
+    return Part("COUPON", outline, wanted.thickness, engraving=tuple(written))
+
+
+def _title(words: str, centre: tuple[float, float], height: float) -> Strokes:
+    return turned(text(words, height), 0.0, centre)
+
+
+def templates(specimen: Specimen, spacing: float, wanted: Fabrication) -> Iterator[Part]:
+    """Plates to mark the tracking dots through, with the outlines of the units to lay them on.
+
+    A template that is larger than a sheet is split along the lines between the units' sites.
+    """
+    whole = shapely.total_bounds([unit.outline for unit in specimen.units])
+    room = [side - 2 * wanted.laser.margin - wanted.laser.kerf for side in wanted.laser.sheet]
+    cuts = [_cuts(*limits, spacing, most) for limits, most in zip(_axes(whole), room, strict=True)]
+    number = 0
+    for y0, y1 in zip(cuts[1][:-1], cuts[1][1:], strict=True):
+        for x0, x1 in zip(cuts[0][:-1], cuts[0][1:], strict=True):
+            number += 1
+            yield _template(number, specimen, box(x0, y0, x1, y1), wanted)
+
+
+def _axes(bounds: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
+    x0, y0, x1, y1 = (float(value) for value in bounds)
+    return (x0 - _RIM, x1 + _RIM), (y0 - _RIM, y1 + _RIM)
+
+
+def _cuts(start: float, stop: float, spacing: float, most: float) -> list[float]:
+    """Where to cut an axis into pieces of at most ``most``, inner cuts between two sites."""
+    pieces = math.ceil((stop - start) / max(most, spacing))
+    while True:
+        wanted = np.linspace(start, stop, pieces + 1)[1:-1]
+        inner = (np.round(wanted / spacing - 0.5) + 0.5) * spacing
+        edges = [start, *inner.tolist(), stop]
+        if max(np.diff(edges)) <= most or pieces > (stop - start) / spacing:
+            return edges
+        pieces += 1
+
+
+def _template(number: int, specimen: Specimen, tile: Polygon, wanted: Fabrication) -> Part:
+    shapely.prepare(tile)
+    holes = tuple(
+        Circle(dot.centre, dot.diameter)
+        for unit in specimen.units
+        for dot in unit.markers
+        if tile.contains(shapely.Point(dot.centre).buffer(dot.diameter / 2 + wanted.laser.gap / 4))
+    )
+    inner = tile.buffer(-wanted.laser.gap / 4, join_style="mitre")
+    lines = [
+        np.asarray(piece.coords)
+        for unit in specimen.units
+        for piece in shapely.get_parts(unit.outline.exterior.intersection(inner))
+        if piece.geom_type == "LineString"
+    ]
+    x0, y0, _, _ = tile.bounds
+    name = f"TEMPLATE{number}"
+    width, height = extent(name, 4.0)
+    told = turned(text(name, 4.0), 0.0, (x0 + width / 2 + 3.0, y0 + height / 2 + 2.0))
+    return Part(name, tile, wanted.laser.template_thickness, holes, told, tuple(lines))
+
+
+def strips(specimen: Specimen) -> Iterator[tuple[str, Floats]]:
+    """The authors' continuous paths: one strip along each row and one along each column.
+
+    A path goes from slot end to slot end: out of a unit through the mouth of its slot, along the
+    ligament, into the next unit, and across it.
+
+    Yields:
+        Name, and points (n, 2) in the specimen frame.
+    """
+    ends = _slot_ends(specimen)
+    lines: dict[str, list[tuple[float, Floats]]] = defaultdict(list)
+    for ligament in specimen.ligaments:
+        one, other = (specimen.by_label[label] for label in ligament.labels)
+        name = f"ROW{one.row + 1}" if one.row == other.row else f"COLUMN{one.column + 1}"
+        axis = 0 if one.row == other.row else 1
+        points = np.concatenate(
+            [ends[ligament.number, one.label], ends[ligament.number, other.label][::-1]]
+        )
+        lines[name].append((float(points[:, axis].mean()), points))
+    for name in sorted(lines, key=lambda name: (name.rstrip("0123456789"), len(name), name)):
+        points = np.concatenate(
+            [piece for _, piece in sorted(lines[name], key=lambda pair: pair[0])]
+        )
+        yield name, points
+
+
+def _slot_ends(specimen: Specimen) -> dict[tuple[int, str], Floats]:
+    """(2, 2) inner end and mouth of the slot of each ligament in each unit."""
+    return {
+        (slot.ligament, unit.label): np.stack([slot.end, slot.mouth])
+        for unit in specimen.units
+        for slot in unit.slots
+    }
+
+
+def strip_parts(specimen: Specimen, wanted: Fabrication) -> Sequence[Part]:
+    """The strips laid flat: their length, and lines where they enter and leave the units."""
+    made = []
+    for name, points in strips(specimen):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        folds = tuple(
+            np.array([[x, 0.5], [x, wanted.thickness - 0.5]]) for x in along[1:-1].tolist()
+        )
+        outline = box(0.0, 0.0, float(along[-1]), wanted.thickness)
+        made.append(Part(name, outline, wanted.shims.thickness, scores=folds))
+    return made

@@ -1,0 +1,98 @@
+"""Flat parts on sheets for the laser cutter, at nominal size or with the kerf made good."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import shapely
+from shapely import Polygon
+
+from pipeline.errors import UserError
+from pipeline.fabrication.packing import TooLargeError, pack
+from pipeline.fabrication.parts import Circle, Part, Strokes
+from pipeline.problem.fabrication import Laser
+
+_MITRE = 5.0
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A sheet with parts on it.
+
+    Attributes:
+        name: of its files, such as "units_sheet1_kerf0.15".
+        size: width and height.
+        kerf: that the cuts make good; 0 for nominal size.
+        parts: in the order in which they are cut, where they lie on the sheet.
+        reference: lines to look at, not to cut.
+    """
+
+    name: str
+    size: tuple[float, float]
+    kerf: float
+    parts: tuple[Part, ...]
+    reference: Strokes = ()
+
+    @property
+    def ids(self) -> list[str]:
+        """Ids of the parts."""
+        return [part.id for part in self.parts]
+
+
+def sheets(kind: str, parts: Sequence[Part], wanted: Laser, file: str) -> Iterator[Sheet]:
+    """The sheets of one kind of parts: at nominal size, then with the kerf if there is one.
+
+    Args:
+        kind: what they hold; begins the names of the files.
+        parts: the parts.
+        wanted: sheet, kerf, margin, gap.
+        file: of the problem, for messages.
+
+    Raises:
+        UserError: a part is larger than a sheet, or too fine for the kerf.
+    """
+    for kerf in dict.fromkeys((0.0, wanted.kerf)):
+        drawn = [compensated(part, kerf, file) for part in parts]
+        try:
+            spots = pack([part.size for part in drawn], wanted.sheet, wanted.margin, wanted.gap)
+        except TooLargeError as error:
+            raise _too_large(drawn[error.part], wanted, file) from error
+        variant = f"kerf{kerf:.2f}" if kerf else "nominal"
+        for number in range(max(spot.sheet for spot in spots) + 1):
+            placed = tuple(
+                drawn[spot.part].moved(spot.x, spot.y) for spot in spots if spot.sheet == number
+            )
+            yield Sheet(f"{kind}_sheet{number + 1}_{variant}", wanted.sheet, kerf, placed)
+
+
+def compensated(part: Part, kerf: float, file: str) -> Part:
+    """The part with its outer cut half a kerf outwards and its holes half a kerf inwards.
+
+    Raises:
+        UserError: a slot or a hole is narrower than the kerf.
+    """
+    if kerf == 0.0:
+        return part
+    grown = part.outline.buffer(kerf / 2, join_style="mitre", mitre_limit=_MITRE)
+    closed = isinstance(grown, Polygon) and len(grown.interiors) == 0
+    if not closed or any(hole.diameter <= kerf for hole in part.holes):
+        what = f"a kerf of {kerf:g} mm closes a slot or a hole of part {part.id}"
+        remedy = "lower the kerf, or raise fabrication.slots.clearance"
+        raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
+    outline = shapely.orient_polygons(grown)
+    holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)
+    return replace(part, outline=outline, holes=holes)
+
+
+def _too_large(part: Part, wanted: Laser, file: str) -> UserError:
+    width, height = part.size
+    room = [side - 2 * wanted.margin for side in wanted.sheet]
+    return UserError(
+        f"part {part.id} of {width:.1f} x {height:.1f} mm does not fit on a sheet with"
+        f" {room[0]:g} x {room[1]:g} mm inside its margin",
+        file=file,
+        key="fabrication.laser.sheet",
+        value=[f"{side:g} mm" for side in wanted.sheet],
+        remedy="give a larger sheet, or a smaller margin",
+    )
