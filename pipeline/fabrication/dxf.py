@@ -14,12 +14,16 @@ from pipeline.fabrication.sheets import Sheet
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
+    from ezdxf.entities.dxfentity import DXFEntity
     from ezdxf.layouts.layout import Modelspace
 
 Version = Literal["R2010", "R12"]
 
 LAYERS = {"CUT_INNER": 5, "CUT_OUTER": 7, "ENGRAVE": 3, "SCORE": 1, "REFERENCE": 8}
 """Layers and their AutoCAD colours: blue, black or white, green, red, grey."""
+
+APPLICATION = "METACLOAK"
+"""Under this name an outer cut carries the id of its part, as extended data."""
 
 
 def write(sheet: Sheet, path: Path, version: Version) -> None:
@@ -47,6 +51,7 @@ def _new(version: Version) -> Drawing:
     if version != "R12":
         document.header["$INSUNITS"] = 4
         document.header["$MEASUREMENT"] = 1
+    document.appids.add(APPLICATION)
     for name, colour in LAYERS.items():
         document.layers.add(name, color=colour)
     return document
@@ -60,17 +65,17 @@ def _draw(space: Modelspace, part: Part, version: Version) -> None:
     for hole in part.holes:
         space.add_circle(hole.centre, hole.diameter / 2, dxfattribs={"layer": "CUT_INNER"})
     outline = np.asarray(part.outline.exterior.coords)[:-1]
-    _line(space, outline, "CUT_OUTER", version, closed=True)
+    cut = _line(space, outline, "CUT_OUTER", version, closed=True)
+    cut.set_xdata(APPLICATION, [(1000, part.id)])
 
 
 def _line(
     space: Modelspace, points: Floats, layer: str, version: Version, *, closed: bool = False
-) -> None:
+) -> DXFEntity:
     rounded = list(_distinct(np.round(points, 6).tolist()))
     if version == "R12":
-        space.add_polyline2d(rounded, close=closed, dxfattribs={"layer": layer})
-    else:
-        space.add_lwpolyline(rounded, close=closed, dxfattribs={"layer": layer})
+        return space.add_polyline2d(rounded, close=closed, dxfattribs={"layer": layer})
+    return space.add_lwpolyline(rounded, close=closed, dxfattribs={"layer": layer})
 
 
 def _distinct(points: Iterable[list[float]]) -> Iterator[tuple[float, float]]:
