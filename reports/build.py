@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from reports.study import Study
 
 REQUIRED: tuple[Output, ...] = ("design", "response")
-OPTIONAL: tuple[Output, ...] = ("sweep", "scatter")
+OPTIONAL: tuple[Output, ...] = ("sweep", "scatter", "verification")
 
 
 def publish(study: Study, folder: Path) -> list[Path]:

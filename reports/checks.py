@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from pipeline.problem import Problem
 from reports import measures
-from reports.facts import Fact, number
+from reports.facts import Fact, number, percent, share, worded
 
 _MARGINS = {
     "edge_length": "Edge lengths",
@@ -54,17 +55,79 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)
 
 
-def path_facts(response: xr.Dataset) -> Iterator[Fact]:
-    """Voids, gaps and overlaps of every structure on its way."""
-    for name in response["structure"].values:
+def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
+    """Voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
+    for name in (str(name) for name in response["structure"].values):
         part = response.sel(structure=name)
-        void = float(np.degrees(part["min_void_angle"].min()))
+        void, gap = float(np.degrees(part["min_void_angle"].min())), float(part["min_gap"].min())
         label = f"Smallest void angle, {name}"
         yield number(f"void_angle_{name}", label, void, "deg", digits=3, note="of all loads")
-        gap, note = float(part["min_gap"].min()), "of all loads, by geometry"
+        note = "of all loads, by geometry"
         yield number(f"gap_{name}", f"Smallest gap, {name}", gap, "mm", digits=3, note=note)
         crossed = int(part["overlaps"].max())
         yield number(f"overlaps_{name}", f"Overlapping pairs, {name}, most", crossed, note=note)
+        touching = int(part["contact_pairs"].isel(time=-1).max())
+        label = f"Pairs in contact, {name}"
+        yield number(f"contact_pairs_{name}", label, touching, note="at the end of the path")
+        yield from _stability(name, part)
+    yield _shim_strain(problem, response.sel(structure="cloaked"))
+
+
+def _stability(name: str, part: xr.Dataset) -> Iterator[Fact]:
+    flags = part["stability"].values
+    if (flags >= 0).any():
+        label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
+        note = f"of {flags.size}; where the tangent is not positive definite"
+        yield number(f"unstable_{name}", label, count, note=note)
+
+
+def _shim_strain(problem: Problem, part: xr.Dataset) -> Fact:
+    """Upper bound of a shim's largest strain, as that of a beam between two rigid units."""
+    shims = problem.fabrication.shims
+    length, limit = problem.lattice.ligament_length, problem.report.shim_strain_limit
+    stretch, shear, bend = (
+        float(part[name].max()) for name in ("max_stretch", "max_shear", "max_bend")
+    )
+    strain = beam_strain(stretch, shear, bend, shims.thickness / length)
+    note = (
+        f"upper bound for foil of {shims.thickness:g} mm: stretch {stretch:.2g}, relative turn "
+        f"{np.degrees(bend):.3g}°, shear {np.degrees(shear):.3g}°; limit {percent(limit)}: "
+        + ("kept" if strain <= limit else "exceeded")
+    )
+    return share("shim_strain", "Largest shim strain, cloaked", strain, note=note)
+
+
+def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -> float:
+    """Largest strain of a beam (Euler-Bernoulli) whose ends turn against each other and its chord.
+
+    Args:
+        stretch: of its axis.
+        shear: angle of the chord from the mean of both ends, rad; it bends the ends by 6 times.
+        bend: relative turn of the ends, rad.
+        slenderness: thickness over length.
+    """
+    return stretch + slenderness / 2 * (bend + 6 * shear)
+
+
+def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
+    """Losses of the design with finer load steps and under another contact law."""
+    if verification is None:
+        return
+    unit = verification["loss"].attrs["units"]
+    as_run = verification.isel(check=0).sel(structure="cloaked")
+    for name in (str(name) for name in verification["check"].values[1:]):
+        found = verification.sel(check=name, structure="cloaked")
+        key, loss = name.replace(" ", "_"), float(found["loss"])
+        if str(found["status"].item()) != "ok":
+            label = f"Loss, cloaked, {name}"
+            yield Fact(f"check_{key}", label, np.nan, unit, "—", note=str(found["status"].item()))
+            continue
+        note = (
+            f"{percent(loss / float(as_run['loss']) - 1)} against the run; units at equal loads "
+            f"within {worded(float(found['departure']), 'mm', 2)}; {int(found['overlaps'])} "
+            f"overlapping pairs, {int(found['contact_pairs'])} in contact at full load"
+        )
+        yield number(f"check_{key}", f"Loss, cloaked, {name}", loss, unit, digits=3, note=note)
 
 
 def settled(margin: float) -> float:

@@ -30,7 +30,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
         "units": problem.lattice.columns * problem.lattice.rows,
         "load angles": len(directions),
         "mm of driven displacement": getattr(drive, "amplitude", 0.0) if static else 0.0,
-        "load steps in the loss": problem.horizon.samples if static else 0,
+        "load steps in the loss": problem.horizon.steps or 0,
         "evaluations of the design": sqp.evaluations if sqp else 0,
         "drive cycles": 0 if static else problem.response.cycles,
         "angles in the map": sweep.direction.points if sweep else 0,

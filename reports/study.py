@@ -20,6 +20,7 @@ _STAGES: dict[Output, Stage] = {
     "response": "simulate",
     "sweep": "sweep",
     "scatter": "scatter",
+    "verification": "verify",
 }
 
 
@@ -64,6 +65,11 @@ class Study:
     def scatter(self) -> xr.Dataset | None:
         """Imperfect copies of the design, if the problem asks for them."""
         return self.datasets.get("scatter")
+
+    @property
+    def verification(self) -> xr.Dataset | None:
+        """The design under finer load steps and another contact law, of a study on load steps."""
+        return self.datasets.get("verification")
 
 
 def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:

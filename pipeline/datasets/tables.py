@@ -13,7 +13,7 @@ from typing import Literal
 SCHEMA_VERSION = 1
 
 Type = Literal["float64", "int64", "int8", "str"]
-Kind = Literal["design", "design_method", "response", "sweep", "scatter"]
+Kind = Literal["design", "design_method", "response", "sweep", "scatter", "verification"]
 
 
 @dataclass(frozen=True)
@@ -273,12 +273,39 @@ _SCATTER: Table = {
     "status": Variable(_COPY, "1", "ok, or why the copy has no result", "str"),
 }
 
+_CHECK = ("check", "structure")
+
+_VERIFICATION: Table = {
+    "check": _label(("check",), "1", "what was changed; as run comes first", "str"),
+    "structure": _RESPONSE_LABELS["structure"],
+    "loss": Variable(
+        _CHECK,
+        "1",
+        "loss, mean of the load cases; sums over load steps as if there were as many as run",
+        gaps=True,
+        also=ENERGY,
+    ),
+    "departure": Variable(
+        _CHECK,
+        "mm",
+        "largest distance of a unit from where it is as run, at equal loads",
+        gaps=True,
+    ),
+    "min_void_angle": Variable(_CHECK, "rad", "smallest void angle at any load", gaps=True),
+    "gap": Variable(_CHECK, "mm", "smallest gap between units at any load", gaps=True),
+    "overlaps": Variable(_CHECK, "1", "most overlapping pairs of units at any load", "int64"),
+    "contact_pairs": Variable(_CHECK, "1", "pairs of units in contact at the full load", "int64"),
+    "unstable": Variable(_CHECK, "1", "loads whose equilibrium is no minimum", "int64"),
+    "status": Variable(("check",), "1", "ok, or why there is no result", "str"),
+}
+
 TABLES: Mapping[Kind, Table] = {
     "design": _UNIT | _CASE | _METHOD | _NETWORK | _SHAPE | _per_method(_HISTORY),
     "design_method": _UNIT | _CASE | _NETWORK | _SHAPE | _HISTORY,
     "response": _UNIT | _CASE | _RESPONSE_LABELS | _NETWORK | _RESPONSE,
     "sweep": _SWEEP,
     "scatter": _SCATTER,
+    "verification": _VERIFICATION,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -288,5 +315,6 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "response": {},
     "sweep": {},
     "scatter": {},
+    "verification": {},
 }
 """What each kind tells in attributes of its own, beside its provenance."""

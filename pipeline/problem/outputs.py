@@ -6,7 +6,7 @@ from typing import Literal
 
 from pipeline.problem.model import Problem
 
-Output = Literal["design", "response", "sweep", "scatter"]
+Output = Literal["design", "response", "sweep", "scatter", "verification"]
 
 
 def outputs(problem: Problem) -> tuple[Output, ...]:
@@ -16,5 +16,6 @@ def outputs(problem: Problem) -> tuple[Output, ...]:
         "response": True,
         "sweep": problem.sweep is not None,
         "scatter": problem.robustness is not None,
+        "verification": problem.horizon.steps is not None,
     }
     return tuple(name for name, wanted in asked.items() if wanted)

@@ -38,7 +38,13 @@ class Paper(Section):
 
 
 class Report(Section):
-    """Choices of the report: the driven displacements of the snapshots, and the paper's numbers."""
+    """Choices of the report.
+
+    `snapshots` are the driven displacements that it shows, `shim_strain_limit` the strain up to
+    which the foil of the shims counts as sound (polyester yields at about 5 %), `paper` what a
+    publication tells.
+    """
 
     snapshots: tuple[Gap, ...] = ()
+    shim_strain_limit: Positive = 0.05
     paper: Paper | None = None

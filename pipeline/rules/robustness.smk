@@ -38,3 +38,24 @@ rule gather_scatter:
         "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.scatter gather --parts {input} --out {output} --log {log}"
+
+
+# Not what the design depends on: finer load steps, the other contact law.
+rule verify:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+    output:
+        "results/{name}{preset}/verification.nc",
+    log:
+        "results/{name}{preset}/logs/verification.log",
+    threads: 1
+    params:
+        study=options,
+        problem=section("verify"),
+        source=source_hash("pipeline.verify"),
+    message:
+        "Checking load steps and contact of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline.verify {params.study} --design {input.design}"
+        " --out {output} --log {log}"

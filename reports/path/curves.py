@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
@@ -36,7 +36,8 @@ def path_axes(axes: Axes, course: Course, label: str) -> None:
         functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio)),
     )
     above.set_xlabel("paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
-    above.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 4, 5, 10]))
+    above.xaxis.set_major_locator(FixedLocator(list(ratio * course.values[list(course.shown)])))
+    above.xaxis.set_major_formatter(lambda value, _: f"{value:.2g}")
 
 
 def structure_curves(
@@ -49,9 +50,9 @@ def structure_curves(
             course.values,
             mean.sel(structure=name),
             color=style.STRUCTURE_COLOURS[name],
-            lw=1.2,
+            lw=2.0 if name == "intact" else 1.2,
             label=display_name(problem, name),
-            zorder=4,
+            zorder=3 if name == "intact" else 4,
         )
 
 

@@ -29,7 +29,8 @@ def collect(study: Study) -> list[Fact]:
         *grouped("Reaction", reaction_facts(study, path)),
         *grouped("Optimisation", checks.history_facts(study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
-        *grouped("Checks along the path", checks.path_facts(study.response)),
+        *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
+        *grouped("Load steps and contact law", checks.variant_facts(study.verification)),
         *grouped("Imperfect copies", robustness_facts(study)),
     ]
 
@@ -53,7 +54,7 @@ def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
     yield number("interest_units", "Units of interest", int(response["roi"].sum()))
     if path.static:
         yield _displacement_fact(path)
-        count = problem.horizon.samples
+        count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
         yield number("horizon", "Loss taken over", problem.horizon_time, "s")

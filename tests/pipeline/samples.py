@@ -25,6 +25,7 @@ SIZES = {
     "frequency": 3,
     "noise": 2,
     "sample": 4,
+    "check": 3,
 }
 
 

@@ -20,6 +20,7 @@ STAGES = (
     "pipeline/simulate",
     "pipeline/sweep",
     "pipeline/scatter",
+    "pipeline/verify",
     "reports/build",
 )
 
