@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -14,16 +15,16 @@ from pipeline.fabrication.sheets import Sheet
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
-    from ezdxf.entities.dxfentity import DXFEntity
+    from ezdxf.entities.dxfgfx import DXFGraphic
     from ezdxf.layouts.layout import Modelspace
 
 Version = Literal["R2010", "R12"]
 
+APPLICATION = "METACLOAK"
+"""Outer cuts carry the id of their part as extended data under this name."""
+
 LAYERS = {"CUT_INNER": 5, "CUT_OUTER": 7, "ENGRAVE": 3, "SCORE": 1, "REFERENCE": 8}
 """Layers and their AutoCAD colours: blue, black or white, green, red, grey."""
-
-APPLICATION = "METACLOAK"
-"""Under this name an outer cut carries the id of its part, as extended data."""
 
 
 def write(sheet: Sheet, path: Path, version: Version) -> None:
@@ -33,8 +34,6 @@ def write(sheet: Sheet, path: Path, version: Version) -> None:
     width, height = sheet.size
     rim = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
     _line(space, rim, "REFERENCE", version, closed=True)
-    for stroke in sheet.reference:
-        _line(space, stroke, "REFERENCE", version)
     for part in sheet.parts:
         _draw(space, part, version)
     stream = io.StringIO()
@@ -47,6 +46,7 @@ def _new(version: Version) -> Drawing:
     from ezdxf.filemanagement import new
 
     options.write_fixed_meta_data_for_testing = True  # no dates, no random ids: the same bytes
+    logging.getLogger("ezdxf").setLevel(logging.ERROR)  # R12 has no place for units, and it says so
     document = new(version)
     if version != "R12":
         document.header["$INSUNITS"] = 4
@@ -71,7 +71,7 @@ def _draw(space: Modelspace, part: Part, version: Version) -> None:
 
 def _line(
     space: Modelspace, points: Floats, layer: str, version: Version, *, closed: bool = False
-) -> DXFEntity:
+) -> DXFGraphic:
     rounded = list(_distinct(np.round(points, 6).tolist()))
     if version == "R12":
         return space.add_polyline2d(rounded, close=closed, dxfattribs={"layer": layer})

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import Polygon, box
+from shapely import LineString, Polygon, box
 
 from pipeline.fabrication.lettering import extent, text, turned
 from pipeline.fabrication.parts import Circle, Floats, Part, Specimen, Strokes
@@ -80,10 +81,10 @@ def templates(specimen: Specimen, spacing: float, wanted: Fabrication) -> Iterat
     """
     whole = shapely.total_bounds([unit.outline for unit in specimen.units])
     room = [side - 2 * wanted.laser.margin - wanted.laser.kerf for side in wanted.laser.sheet]
-    cuts = [_cuts(*limits, spacing, most) for limits, most in zip(_axes(whole), room, strict=True)]
+    axes = [cuts(*limits, spacing, most) for limits, most in zip(_axes(whole), room, strict=True)]
     number = 0
-    for y0, y1 in zip(cuts[1][:-1], cuts[1][1:], strict=True):
-        for x0, x1 in zip(cuts[0][:-1], cuts[0][1:], strict=True):
+    for y0, y1 in pairwise(axes[1]):
+        for x0, x1 in pairwise(axes[0]):
             number += 1
             yield _template(number, specimen, box(x0, y0, x1, y1), wanted)
 
@@ -93,8 +94,8 @@ def _axes(bounds: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
     return (x0 - _RIM, x1 + _RIM), (y0 - _RIM, y1 + _RIM)
 
 
-def _cuts(start: float, stop: float, spacing: float, most: float) -> list[float]:
-    """Where to cut an axis into pieces of at most ``most``, inner cuts between two sites."""
+def cuts(start: float, stop: float, spacing: float, most: float) -> list[float]:
+    """Where to cut an axis into pieces of at most ``most``, mm; inner cuts between two sites."""
     pieces = math.ceil((stop - start) / max(most, spacing))
     while True:
         wanted = np.linspace(start, stop, pieces + 1)[1:-1]
@@ -120,6 +121,13 @@ def _template(number: int, specimen: Specimen, tile: Polygon, wanted: Fabricatio
         for piece in shapely.get_parts(unit.outline.exterior.intersection(inner))
         if piece.geom_type == "LineString"
     ]
+    if wanted.shims.strips:
+        lines += [
+            np.asarray(piece.coords)
+            for _, points in strips(specimen)
+            for piece in shapely.get_parts(LineString(points).intersection(inner))
+            if piece.geom_type == "LineString"
+        ]
     x0, y0, _, _ = tile.bounds
     name = f"TEMPLATE{number}"
     width, height = extent(name, 4.0)

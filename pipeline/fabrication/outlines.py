@@ -29,7 +29,7 @@ def room_to_grow(
     polygon: Polygon, neighbours: Sequence[Polygon], growth: float, wanted: Fabrication
 ) -> Polygon:
     """What a unit may grow to beside its slots without coming too near to its neighbours."""
-    grown = polygon.buffer(growth, join_style="mitre", mitre_limit=2.0)
+    grown = polygon.buffer(growth, quad_segs=4)
     taken = shapely.union_all(
         [
             other.buffer(wanted.minimum_gap + GRID, join_style="mitre", mitre_limit=100.0)

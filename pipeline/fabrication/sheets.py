@@ -10,7 +10,7 @@ from shapely import Polygon
 
 from pipeline.errors import UserError
 from pipeline.fabrication.packing import TooLargeError, pack
-from pipeline.fabrication.parts import Circle, Part, Strokes
+from pipeline.fabrication.parts import Circle, Part
 from pipeline.problem.fabrication import Laser
 
 _MITRE = 5.0
@@ -25,14 +25,12 @@ class Sheet:
         size: width and height.
         kerf: that the cuts make good; 0 for nominal size.
         parts: in the order in which they are cut, where they lie on the sheet.
-        reference: lines to look at, not to cut.
     """
 
     name: str
     size: tuple[float, float]
     kerf: float
     parts: tuple[Part, ...]
-    reference: Strokes = ()
 
     @property
     def ids(self) -> list[str]:

@@ -52,7 +52,6 @@ def _shapes(layer: str, sheet: Sheet) -> Iterator[str]:
     width, height = sheet.size
     if layer == "REFERENCE":
         yield f'<path d="M0,0H{width:g}V{height:g}H0Z"/>'
-        yield from (_path(stroke, height) for stroke in sheet.reference)
     for part in sheet.parts:
         yield from _shapes_of(layer, part, height)
 

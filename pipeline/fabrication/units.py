@@ -279,3 +279,15 @@ def shims(ligaments: Sequence[Ligament], wanted: Fabrication) -> tuple[Shim, ...
         )
         for length in sorted(taken)
     )
+
+
+def summary(made: Specimen) -> str:
+    """What is built, in one line."""
+    thickened = sum(unit.thickened > 0.0 for unit in made.units)
+    free = max((ligament.free for ligament in made.ligaments), default=0.0)
+    bend = math.degrees(max((ligament.bend for ligament in made.ligaments), default=0.0))
+    return (
+        f"{len(made.units)} units ({thickened} thickened beside their slots),"
+        f" {sum(shim.count for shim in made.shims)} shims of {len(made.shims)} lengths,"
+        f" free up to {free:.2f} mm, bent up to {bend:.0f} deg"
+    )
