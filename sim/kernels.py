@@ -308,6 +308,8 @@ class Sensitivity(NamedTuple):
     Attributes:
         arm, vector, void, law: as there.
         contact: (n_ligaments,) of the contact stiffness alone.
+        corner: (n_vertices, 2) by the arms of all vertices.
+        centroid: (n_units, 2) by the centroids.
     """
 
     arm: Floats
@@ -315,6 +317,8 @@ class Sensitivity(NamedTuple):
     void: Floats
     law: Floats
     contact: Floats
+    corner: Floats
+    centroid: Floats
 
 
 @compiled

@@ -15,6 +15,7 @@ from sim.geometry import Shape
 from sim.kernels import Network
 from sim.lattice import Lattice
 from sim.matrix import Pattern, number_free_dofs
+from sim.meeting import Meeting, meeting_units
 
 A = TypeVar("A")
 
@@ -49,6 +50,8 @@ class Parameters(NamedTuple, Generic[A]):
         void: (n_ligaments, 2) reference void angles, rad.
         law: (n_ligaments, 3) axial, shear, bending stiffness.
         contact: (n_ligaments,) contact stiffness, N mm/rad^2.
+        corner: (n_vertices, 2) arms of all vertices, mm.
+        centroid: (n_units, 2) mm.
         mass: (n_units, 3) tonne, tonne, tonne mm^2.
         damping: (n_units, 3) tonne/s, tonne/s, tonne mm^2/s.
     """
@@ -58,6 +61,8 @@ class Parameters(NamedTuple, Generic[A]):
     void: A
     law: A
     contact: A
+    corner: A
+    centroid: A
     mass: A
     damping: A
 
@@ -96,6 +101,8 @@ def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters
         void=shape.void_angle,
         law=jnp.stack([jnp.broadcast_to(k, (n,)) for k in stiffness], axis=1),
         contact=jnp.broadcast_to(jnp.asarray(material.contact, dtype=float), (n,)),
+        corner=shape.arm,
+        centroid=shape.centroid,
         mass=jnp.stack([mass, mass, inertia], axis=1),
         damping=jnp.stack([jnp.broadcast_to(c, (lattice.n_units,)) for c in damping], axis=1),
     )
@@ -112,6 +119,8 @@ class Topology:
         barrier, cutoff: contact angles, rad.
         designed: (n_designed,) ligaments whose parameters may be differentiated by.
         rotation_scale: length that makes rotations comparable with displacements, mm.
+        meeting: the units that may meet, if contact acts on their distance; without it contact
+            acts on the void angles.
     """
 
     ligament_units: Ints
@@ -121,11 +130,15 @@ class Topology:
     cutoff: float
     designed: Ints
     rotation_scale: float
+    meeting: Meeting | None = None
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:
         """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
-        return number_free_dofs(self.site, self.ligament_units, self.held)
+        coupled = self.ligament_units
+        if self.meeting is not None:
+            coupled = np.concatenate([coupled, self.meeting.pairs])
+        return number_free_dofs(self.site, coupled, self.held)
 
     @cached_property
     def free_dofs(self) -> Ints:
@@ -149,8 +162,13 @@ class Topology:
         return self.n_dofs - len(self.held)
 
     def network(self, values: Values, touching: Ints | None = None) -> Network:
-        """The kernels' arrays of concrete parameters, with contact in ``touching`` ligaments."""
+        """The kernels' arrays of concrete parameters, with contact in ``touching`` ligaments.
+
+        If contact acts on the distance of units, there is none in any ligament.
+        """
         n = len(self.ligament_units)
+        if self.meeting is not None:
+            touching = np.zeros(0, dtype=np.int64)
         contact = np.empty((n, 3))
         contact[:, 0] = values.contact
         contact[:, 1], contact[:, 2] = self.barrier, self.cutoff
@@ -186,8 +204,11 @@ def topology(
     barrier: float,
     cutoff: float,
     designed_units: Ints | None = None,
+    distance: float | None = None,
 ) -> Topology:
     """Topology of a lattice whose dofs ``held`` are prescribed.
+
+    With a ``distance`` (mm), contact acts on units nearer than that to one another.
 
     Without ``designed_units`` every ligament's parameters can be differentiated by; with them only
     those of the ligaments of these units, which must be all units with a vertex that the design
@@ -207,4 +228,5 @@ def topology(
         cutoff=cutoff,
         designed=designed,
         rotation_scale=lattice.spacing / 2,
+        meeting=None if distance is None else meeting_units(lattice, distance),
     )

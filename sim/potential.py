@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from sim import kernels
 from sim.arrays import Floats, Ints
+from sim.clear_step import clear_step
 from sim.compiling import compiled
+from sim.contact_kernels import add_gradient, add_hessian_product, add_mixed, add_tangent
 from sim.kernels import Sensitivity
 from sim.matrix import Matrix
 from sim.system import System
@@ -19,13 +21,18 @@ def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple
 
     The contact energy of a state that is not admissible is infinite.
     """
-    return kernels.gradient(motion, system.net, turn, out)
+    strain, contact = kernels.gradient(motion, system.net, turn, out)
+    if len(system.contacts.pairs) > 0:
+        contact += add_gradient(motion, system.contacts, out)
+    return strain, contact
 
 
 @compiled
 def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> None:
     """Adds the energy's Hessian among the free dofs to a matrix."""
     kernels.tangent(motion, system.net, turn, system.free, matrix)
+    if len(system.contacts.pairs) > 0:
+        add_tangent(motion, system.contacts, system.free, matrix)
 
 
 @compiled
@@ -34,6 +41,8 @@ def hessian_product(
 ) -> None:
     """Fills ``out`` (n_dofs,) with the Hessian times ``direction``, over all dofs."""
     kernels.hessian_product(motion, system.net, turn, direction, out)
+    if len(system.contacts.pairs) > 0:
+        add_hessian_product(motion, system.contacts, direction, out)
 
 
 @compiled
@@ -42,9 +51,14 @@ def mixed(
 ) -> None:
     """Adds d/dp of (``direction`` . dE/dmotion), of the ligaments' own p only for ``which``."""
     kernels.mixed(motion, system.net, turn, direction, which, out)
+    if len(system.contacts.pairs) > 0:
+        add_mixed(motion, system.contacts, turn, direction, out)
 
 
 @compiled
 def admissible_step(motion: Floats, system: System, step: Floats) -> float:
     """Largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""
-    return kernels.barrier_step(motion, system.net, step)
+    largest = kernels.barrier_step(motion, system.net, step)
+    if len(system.contacts.pairs) > 0:
+        largest = min(largest, clear_step(motion, system.contacts, step))
+    return largest

@@ -10,14 +10,17 @@ from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.kernels import Network, Sensitivity
 from sim.matrix import Matrix, Pattern, matrix
+from sim.meeting import contacts_of
 from sim.model import Topology, Values
+from sim.neighbours import Contacts
 
 
 class System(NamedTuple):
     """One structure, its inertia and the numbering of its dofs.
 
     Attributes:
-        net: ligaments and contacts.
+        net: ligaments, and contact on their void angles.
+        contacts: contact on the distance of units.
         mass, damping: (n_dofs,) diagonal.
         free: (n_dofs,) number of each dof among the free ones, negative where held.
         dofs: (n_free,) ids of the free dofs in the tangent's order.
@@ -27,6 +30,7 @@ class System(NamedTuple):
     """
 
     net: Network
+    contacts: Contacts
     mass: Floats
     damping: Floats
     free: Ints
@@ -88,6 +92,7 @@ def system_of(topology: Topology, values: Values, touching: Ints | None = None) 
     free, pattern = topology.numbering
     return System(
         net=topology.network(values, touching),
+        contacts=contacts_of(topology.meeting, values, topology.n_units),
         mass=np.array(values.mass, dtype=float, order="C").ravel(),
         damping=np.array(values.damping, dtype=float, order="C").ravel(),
         free=free,
@@ -107,6 +112,8 @@ def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
         void=np.zeros_like(net.void),
         law=np.zeros_like(net.law),
         contact=np.zeros(len(net.contact)),
+        corner=np.zeros_like(system.contacts.corner),
+        centroid=np.zeros_like(system.contacts.centroid),
     )
     zero = np.zeros_like(system.mass)
     return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))

@@ -168,14 +168,15 @@ def test_mixed_derivatives(random_case: Case) -> None:
     wanted = mixed_of_definition(
         random_case.motion, numbers(random_case.net), random_case.net.unit, random_case.direction
     )
-    for one, other in zip(found, wanted, strict=True):
+    for one, other in zip(found[: len(wanted)], wanted, strict=True):
         assert_equal(one, np.asarray(other))
 
 
 def mixed(of: Case, which: Ints) -> Sensitivity:
     net = of.net
     parts = (net.arm, net.vector, net.void, net.law, net.contact[:, 0])
-    out = Sensitivity(*(np.zeros(part.shape) for part in parts))
+    none = np.zeros((0, 2))
+    out = Sensitivity(*(np.zeros(part.shape) for part in (*parts, none, none)))
     kernels.mixed(of.motion, net, scratch(of.motion)[0], of.direction, which, out)
     return out
 
@@ -186,7 +187,7 @@ def test_mixed_derivatives_of_some_ligaments_alone(random_case: Case) -> None:
         mixed(random_case, np.arange(len(random_case.net.unit))),
         mixed(random_case, some),
     )
-    for all_of_it, part in zip(every, chosen, strict=True):
+    for all_of_it, part in zip(every[:5], chosen[:5], strict=True):
         np.testing.assert_array_equal(part[some], all_of_it[some])
         assert np.count_nonzero(part) <= all_of_it[some].size
 

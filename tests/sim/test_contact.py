@@ -1,0 +1,174 @@
+"""Contact on the distance of units: the law, and the compiled kernels against its derivatives."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax import Array
+
+from sim import contact_kernels
+from sim.arrays import Floats, Numbers
+from sim.clearance import displaced, polygons
+from sim.contact import DistanceLaw, Polygon, pair_energy
+from sim.geometry import shape
+from sim.kernels import Sensitivity
+from sim.lattice import Lattice
+from sim.matrix import clear, matrix, number_free_dofs
+from sim.model import Values, parameters, topology
+from sim.neighbours import Contacts
+from sim.system import System, system_of
+from tests.sim.structures import BARRIER, CONTACT, CUTOFF, MATERIAL, dense, hand_made
+
+EXACT = 1e-12
+"""Relative to the largest entry."""
+REACH = 0.8
+LAW = DistanceLaw(CONTACT * (REACH / 2.0) ** 2, REACH)
+
+
+def ring(rng: np.random.Generator, n: int, size: float) -> Floats:
+    """A star-shaped polygon around the origin, counter-clockwise, not always convex."""
+    angles = 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
+    lengths = size * rng.uniform(0.7, 1.3, n)
+    return lengths[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+class Crowd(NamedTuple):
+    """Units side by side, a small way apart, none of them joined but the first two."""
+
+    lattice: Lattice
+    system: System
+    motion: Floats
+    direction: Floats
+
+    @property
+    def contacts(self) -> Contacts:
+        return self.system.contacts
+
+
+def crowd(seed: int) -> Crowd:
+    """Four random units in a random state, each pushed against the first until it is near."""
+    rng = np.random.default_rng(seed)
+    rings = [ring(rng, 5, 5.0) for _ in range(4)]
+    sites = 15.0 * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+    lattice = hand_made([r + s for r, s in zip(rings, sites, strict=True)], np.array([[0, 7]]))
+    motion = np.zeros((4, 3))
+    motion[:, 2] = rng.normal(size=4)
+    made = shape(lattice, lattice.vertices)
+    values = Values(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+    nothing = np.array([], dtype=np.int64)
+    top = topology(lattice, nothing, BARRIER, CUTOFF, distance=REACH)
+    for unit in (1, 2, 3):
+        motion[unit, :2] = -approach(lattice, motion, unit, sites[unit] / 15.0, rng)
+    return Crowd(lattice, system_of(top, values), motion.ravel(), rng.normal(size=12))
+
+
+def approach(
+    lattice: Lattice, motion: Floats, unit: int, away: Floats, rng: np.random.Generator
+) -> Floats:
+    """Where to push a unit so that a random small gap to the first one is left."""
+    wanted, near, far = rng.uniform(0.2, 0.9) * REACH, 0.0, 30.0
+    for _ in range(40):
+        middle = (near + far) / 2
+        moved = motion.copy()
+        moved[unit, :2] = -middle * away
+        first, other = polygons(lattice, displaced(lattice, lattice.vertices, moved))[[0, unit]]
+        near, far = (middle, far) if first.distance(other) > wanted else (near, middle)
+    return near * away
+
+
+class Differentiable(NamedTuple):
+    """What the contact energy depends on besides the motion."""
+
+    corner: Numbers
+    centroid: Numbers
+    stiffness: Numbers
+    scale: float
+
+
+def numbers(case: Crowd) -> Differentiable:
+    contacts = case.contacts
+    scale = contacts.per_stiffness
+    return Differentiable(contacts.corner, contacts.centroid, np.array([CONTACT]), scale)
+
+
+PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+
+
+def definition(motion: Numbers, parts: Differentiable) -> Array:
+    """Energy of all pairs."""
+    law = DistanceLaw(jnp.mean(parts.stiffness) * parts.scale, REACH)
+    units = Polygon(jnp.asarray(parts.centroid), jnp.asarray(parts.corner).reshape(4, -1, 2))
+    motions = jnp.asarray(motion).reshape(-1, 3)
+
+    def pair(a: Array, b: Array) -> Array:
+        one, other = (Polygon(units.centroid[k], units.corner[k]) for k in (a, b))
+        return pair_energy(motions[a], motions[b], one, other, law)
+
+    return jax.vmap(pair)(*PAIRS.T).sum()
+
+
+of_definition = jax.jit(jax.value_and_grad(definition))
+hessian_of_definition = jax.jit(jax.hessian(definition))
+
+
+@jax.jit
+def mixed_of_definition(
+    motion: Numbers, parts: Differentiable, direction: Numbers
+) -> Differentiable:
+    def along(parts: Differentiable) -> Array:
+        return jnp.dot(jax.grad(definition)(motion, parts), direction)
+
+    return jax.grad(along)(parts)
+
+
+@pytest.fixture(scope="module", params=range(6))
+def case(request: pytest.FixtureRequest) -> Crowd:
+    return crowd(request.param)
+
+
+def assert_equal(found: Floats, wanted: Numbers) -> None:
+    assert np.abs(found - wanted).max() <= EXACT * np.abs(wanted).max()
+
+
+def test_energy_and_gradient(case: Crowd) -> None:
+    out = np.zeros(12)
+    energy = contact_kernels.add_gradient(case.motion, case.contacts, out)
+    assert energy > 0
+    wanted, slope = of_definition(case.motion, numbers(case))
+    assert energy == pytest.approx(float(wanted), rel=EXACT)
+    assert_equal(out, slope)
+
+
+def test_tangent_and_product(case: Crowd) -> None:
+    hessian = np.asarray(hessian_of_definition(case.motion, numbers(case)))
+    product = np.zeros(12)
+    contact_kernels.add_hessian_product(case.motion, case.contacts, case.direction, product)
+    assert_equal(product, hessian @ case.direction)
+
+    held = np.array([1, 5])
+    free, pattern = number_free_dofs(case.lattice.site, case.contacts.pairs, held)
+    tangent = matrix(pattern)
+    clear(tangent)
+    contact_kernels.add_tangent(case.motion, case.contacts, free, tangent)
+    order = np.argsort(free)[2:]
+    assert_equal(dense(tangent), hessian[np.ix_(order, order)])
+
+
+def test_mixed_derivatives(case: Crowd) -> None:
+    motion, direction = case.motion, case.direction
+    zero = np.zeros(0)
+    contacts = case.contacts
+    out = Sensitivity(
+        zero, zero, zero, zero, np.zeros(1), np.zeros_like(contacts.corner), np.zeros((4, 2))
+    )
+    turn = np.stack([np.cos(motion[2::3]), np.sin(motion[2::3])], axis=1)
+    contact_kernels.add_mixed(motion, contacts, turn, direction, out)
+
+    wanted = mixed_of_definition(motion, numbers(case), direction)
+    assert_equal(out.corner, wanted.corner)
+    assert_equal(out.centroid, wanted.centroid)
+    assert_equal(out.contact, wanted.stiffness)
