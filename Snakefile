@@ -1,19 +1,14 @@
 # From a problem file to a figure. `snakemake fig2` builds experiments/fig2 into results/fig2/,
-# `snakemake fig2@edge3` (or fig2_edge3) the same study with a preset. See profiles/default.
+# `snakemake fig2@edge3` (or fig2_edge3) the same study with a preset. A figure.yaml in place of a
+# problem.yaml shows several studies on one page. See profiles/default.
 import sys
 
 from snakemake.utils import min_version
 
 from pipeline.sources import source_hash
 from pipeline.workflow import check_problems, check_room, chunks, copies, designs
-from pipeline.workflow import (
-    options,
-    prepare_jobs,
-    section,
-    shown,
-    shown_options,
-    studies,
-)
+from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
+from pipeline.workflow import section, shown, shown_options, targets
 
 min_version("9.20")
 
@@ -22,14 +17,13 @@ if workflow.is_main_process:
     check_problems(sys.argv[1:])
 prepare_jobs()
 
-for study in studies():
-    for target in study.targets:
+for target, built in targets().items():
 
-        rule:
-            name:
-                target
-            input:
-                f"results/{study}/report/index.html",
+    rule:
+        name:
+            target
+        input:
+            f"results/{built}/report/index.html",
 
 
 include: "pipeline/rules/common.smk"

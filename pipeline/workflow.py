@@ -20,7 +20,15 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
-from pipeline.problem import Problem, Stage, load, outputs, section_hash
+from pipeline.problem import (
+    Problem,
+    Stage,
+    joint,
+    load,
+    outputs,
+    preset_names,
+    section_hash,
+)
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -74,6 +82,45 @@ def studies(root: Path = ROOT) -> list[Study]:
     return found
 
 
+def joints(root: Path = ROOT) -> dict[str, list[Study]]:
+    """The studies of every figure of several, by target; with each preset that all of them have.
+
+    A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
+    """
+    found: dict[str, list[Study]] = {}
+    for path in sorted(root.glob("experiments/*/figure.yaml")):
+        name = path.parent.name
+        try:
+            members = joint.load(path).studies
+        except UserError:
+            members = ()
+        presets = [set(preset_names(path.parents[1] / m / "problem.yaml")) for m in members]
+        for preset in ("", *sorted(set.intersection(*presets) if presets else ())):
+            found[str(Study(name, preset))] = [Study(member, preset) for member in members]
+    return found
+
+
+def targets() -> dict[str, str]:
+    """What every target builds: the folder of a study or of a figure of several."""
+    single = {target: str(study) for study in studies() for target in study.targets}
+    return single | {figure: figure for figure in joints()}
+
+
+def members(wildcards: Wildcards) -> list[str]:
+    """The datasets that a figure of several studies shows."""
+    return [
+        f"results/{study}/{name}.nc"
+        for study in joints()[f"{wildcards.name}{wildcards.preset}"]
+        for name in outputs(problem_of(study))
+    ]
+
+
+def member_hashes(wildcards: Wildcards) -> str:
+    """Hash of what the figure depends on in the problem files of its studies."""
+    of_each = (problem_of(study) for study in joints()[f"{wildcards.name}{wildcards.preset}"])
+    return " ".join(section_hash(problem, "report") for problem in of_each)
+
+
 def asked_for(words: Collection[str]) -> list[Study]:
     """The studies that the words of a command line name, by target or by a file of theirs.
 
@@ -81,7 +128,8 @@ def asked_for(words: Collection[str]) -> list[Study]:
     """
     by_target = {target: study for study in studies() for target in study.targets}
     names = {study.name for study in by_target.values()}
-    found = []
+    together = joints()
+    found = [study for word in words for study in together.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
         if study.name in names:

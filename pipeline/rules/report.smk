@@ -29,3 +29,37 @@ rule report:
     shell:
         "python -m reports.build {params.study} {params.datasets}"
         " --out-dir {params.folder} --log {log}"
+
+
+# Several studies on one page.
+rule joint_report:
+    input:
+        figure=ancient("experiments/{name}/figure.yaml"),
+        datasets=members,
+    output:
+        multiext(
+            "results/{name}{preset}/report/{name}",
+            ".pdf",
+            ".svg",
+            ".png",
+        ),
+        page="results/{name}{preset}/report/index.html",
+        facts="results/{name}{preset}/report/facts.json",
+    log:
+        "results/{name}{preset}/logs/report.log",
+    wildcard_constraints:
+        name="|".join(figure for figure in joints() if "@" not in figure) or "(?!)",
+    threads: 1
+    params:
+        preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),
+        folder=subpath(output.page, parent=True),
+        problem=member_hashes,
+        source=source_hash("reports.joint.build"),
+    message:
+        "Drawing figure and page of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m reports.joint.build --figure {input.figure} {params.preset}"
+        " --results results --out-dir {params.folder} --log {log}"
+
+
+ruleorder: joint_report > report

@@ -22,6 +22,7 @@ STAGES = (
     "pipeline/scatter",
     "pipeline/verify",
     "reports/build",
+    "reports/joint/build",
 )
 
 

@@ -35,6 +35,13 @@ def test_map_has_no_part_without_a_frequency(sandbox: Sandbox) -> None:
     assert sandbox.planned("fig2@quick")["sweep"] == 3
 
 
+def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig6@quick")
+    assert planned["joint_report"] == 1
+    assert planned["simulate"] == 2
+    assert "report" not in planned
+
+
 def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
     sandbox.problem.write_text(

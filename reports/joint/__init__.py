@@ -1,0 +1,1 @@
+"""Report of several studies on one page."""

@@ -1,0 +1,146 @@
+"""The page of several studies: facts and tables by study, and one animation of all structures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from pipeline.problem import canonical_json
+from pipeline.problem.joint import Joint
+from reports import content, facts, style
+from reports.facts import Fact
+from reports.joint import figure
+from reports.page import Page
+from reports.path import facts as path_facts
+from reports.path import measures, tables
+from reports.path.content import axis, fields
+from reports.path.course import course, display_name, structures
+from reports.player import Clip, payload
+from reports.publishing import Parts
+from reports.structure import from_dataset
+from reports.study import Study
+from reports.tables import Table
+
+
+def parts(name: str, asked: Joint, studies: Sequence[Study]) -> Parts:
+    """The report of several studies."""
+    known = [fact for study in studies for fact in _facts(study)]
+    data = [facts.table(known), *(table for study in studies for table in _tables(study))]
+    return Parts(
+        name,
+        known,
+        data,
+        lambda: figure.build(studies),
+        lambda svg, files: page(asked, studies, known, data, svg, files),
+    )
+
+
+def _facts(study: Study) -> list[Fact]:
+    """A study's facts, with its name before keys and headings."""
+    found = facts.quoted(path_facts.collect(study), study.problem.report.paper)
+    return [
+        replace(
+            fact, key=f"{study.name}.{fact.key}", group=f"{figure.heading(study)}: {fact.group}"
+        )
+        for fact in found
+    ]
+
+
+def _tables(study: Study) -> list[Table]:
+    return [
+        replace(
+            table,
+            name=f"{study.name}_{table.name}",
+            text=f"{figure.heading(study)}: {table.text.partition(' (')[0]}",
+        )
+        for table in tables.build(study)
+    ]
+
+
+def page(
+    asked: Joint,
+    studies: Sequence[Study],
+    known: Sequence[Fact],
+    data: Sequence[Table],
+    svg: str,
+    figure_files: Sequence[str],
+) -> Page:
+    """The page, of which everything else has been made."""
+    by_key = {fact.key: fact for fact in known}
+    player = animation(studies)
+    problems = {study.name: json.loads(canonical_json(study.problem)) for study in studies}
+    headline = []
+    for study in studies:
+        key = f"{study.name}.{measures.measure_of(study.problem).key}_reduction"
+        label = f"{figure.heading(study)}: {by_key[key].label.lower()}"
+        headline.append(replace(by_key[key], label=label))
+    return Page(
+        title=asked.title or ", ".join(map(figure.heading, studies)),
+        lead=asked.doc.strip(),
+        credit=credit(studies),
+        figure_title=asked.title,
+        caption=caption(studies),
+        svg=svg,
+        figure_files=figure_files,
+        headline=headline,
+        facts=known,
+        tables=data,
+        player=player,
+        player_note=content.rounding(player),
+        provenance=[
+            replace(source, name=f"{study.name}: {source.name}")
+            for study in studies
+            for source in content.provenance(study)
+        ],
+        problem=json.dumps(problems, indent=1, sort_keys=True, ensure_ascii=False),
+        skipped=list(dict.fromkeys(text for s in studies for text in content.skipped(s.response))),
+        draft=list(dict.fromkeys(reason for study in studies for reason in study.draft)),
+    )
+
+
+def credit(studies: Sequence[Study]) -> str:
+    """Which publication the studies follow, and with which of its values."""
+    papers = {p.figure: p.variant for study in studies if (p := study.problem.report.paper)}
+    source = "".join(
+        f"After Figure {name} of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”"
+        + (f", run with its values: {variant}. " if variant else ". ")
+        for name, variant in papers.items()
+    )
+    return source + "Every number here is computed from the datasets."
+
+
+def caption(studies: Sequence[Study]) -> str:
+    """Of the figure, as HTML."""
+    names = ", ".join(figure.heading(study).lower() for study in studies)
+    return (
+        f"Structures ({names}) before loading and at full load, true to scale, coloured by "
+        "u<sub>y</sub>: intact, altered and cloaked. Below, for each: the mimicking error along "
+        "the load"
+        + (" with bands of 90 % of imperfect cloaks" if any(s.scatter for s in studies) else "")
+        + ", and the loss of distance between the top and the bottom row, mean over the middle "
+        "columns."
+    )
+
+
+def animation(studies: Sequence[Study]) -> dict[str, Any]:
+    """The player's data: every structure along the first study's path; equal intact ones once."""
+    first = studies[0]
+    way, times = course(first.problem, first.response), first.response["time"]
+    clips = []
+    for study in studies:
+        for name in structures(study.response):
+            if name == "intact" and study is not first:
+                continue
+            part = study.response.sel(structure=name)
+            motion = part["displacement"].interp(time=times)
+            colour = style.STRUCTURE_COLOURS[name]
+            label = display_name(study.problem, name)
+            label = label if name == "intact" else f"{figure.heading(study)}: {label.lower()}"
+            shape = from_dataset(part, study.problem.lattice.spacing)
+            values = motion.transpose("case", "time", "unit", "dof").values
+            clips.append(Clip(label, colour, shape, values))
+    colours = max((fields(study) for study in studies), key=lambda found: found[0].limits[1])
+    cases = [f"α = {angle:g}°" for angle in first.response["direction"].values]
+    return payload(axis(way), cases, clips, colours, pad=first.problem.lattice.spacing)

@@ -1,0 +1,35 @@
+"""The studies of a joint figure with their datasets, checked to be alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline import problem
+from pipeline.errors import UserError
+from pipeline.problem.drives import LinearRamp, TanhRamp
+from pipeline.problem.joint import Joint
+from reports import study
+from reports.study import Study
+
+
+def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[Study]:
+    """The studies in their order.
+
+    Raises:
+        UserError: one of them is not like the others, or its datasets are missing.
+    """
+    found = []
+    for name in asked.studies:
+        path = figure.parent.parent / name / "problem.yaml"
+        folder = results / (name if preset is None else f"{name}@{preset}")
+        wanted = problem.outputs(problem.load(path, preset))
+        found.append(study.load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}))
+    for each in found:
+        if not isinstance(each.problem.drive, LinearRamp | TanhRamp):
+            raise UserError(
+                f"{each.name} is not driven by a ramp",
+                file=figure,
+                key="studies",
+                remedy="show studies along a load side by side",
+            )
+    return found
