@@ -15,7 +15,7 @@ from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp, TimeSeries
 from sim import loads
 from sim.constraints import Limits
-from sim.lattice import Lattice, quads
+from sim.lattice import Lattice
 from sim.model import Material
 from sim.scene import Scene
 
@@ -25,10 +25,7 @@ TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
 
 def lattice_of(problem: Problem) -> Lattice:
     """The intact initial network of a problem."""
-    wanted = problem.lattice
-    return quads(
-        wanted.columns, wanted.rows, wanted.spacing, wanted.ligament_length, wanted.bias_angle
-    )
+    return problem.lattice.network()
 
 
 def altered_lattice_of(problem: Problem) -> Lattice:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from sim.arrays import Floats, Ints
 
@@ -164,8 +168,127 @@ def quads(
     )
 
 
+def kagome(
+    columns: int,
+    rows: int,
+    spacing: float,
+    ligament_length: float,
+    bias: float,
+    cell_angle: float = np.pi / 3,
+) -> Lattice:
+    """Triangles of a kagome lattice: two in each cell, joined there and to the neighbouring cells.
+
+    A cell is spanned by ``spacing`` along x and along the direction ``cell_angle`` (rad). Its
+    joints are the middles of its four sides and its centre; ligaments run through them along the
+    three directions of the regular lattice. Joints of cells with even i and j are moved up by
+    ``bias`` (mm), those with odd i and j down. Unit ``2 i + k + 2 columns j`` is triangle k of cell
+    (i, j), the lower left one first (the authors' geometry).
+    """
+    across = spacing * np.array([1.0, 0.0])
+    along = spacing * np.array([np.cos(cell_angle), np.sin(cell_angle)])
+    inner, right, up = (
+        ligament_length / 2 * np.array([[np.sqrt(0.75), 0.5], [np.sqrt(0.75), -0.5], [0.0, 1.0]])
+    )
+    polygons, ligaments = [], []
+    unit_of = np.arange(2 * columns * rows).reshape(rows, columns, 2)
+    for j, i in np.ndindex(rows, columns):
+        left, below, centre, beyond, above = (
+            (i + a) * across + (j + b) * along + [0.0, bias * _parity(p, q)]
+            for a, b, p, q in (
+                (0.0, 0.5, i, j),
+                (0.5, 0.0, i, j),
+                (0.5, 0.5, i, j),
+                (1.0, 0.5, i + 1, j),
+                (0.5, 1.0, i, j + 1),
+            )
+        )
+        polygons += [
+            np.stack([left + right, below + up, centre - inner]),
+            np.stack([centre + inner, beyond - right, above - up]),
+        ]
+        here, other = 3 * unit_of[j, i]
+        ligaments.append((here + 2, other))
+        if i + 1 < columns:
+            ligaments.append((other + 1, 3 * unit_of[j, i + 1, 0]))
+        if j + 1 < rows:
+            ligaments.append((other + 2, 3 * unit_of[j + 1, i, 0] + 1))
+    j, i = np.divmod(np.arange(2 * columns * rows), 2 * columns)
+    return _network(polygons, np.array(ligaments), np.stack([i, j], axis=1), spacing)
+
+
+def _parity(i: int, j: int) -> float:
+    """1 where both numbers are even, -1 where both are odd, else 0."""
+    return {(0, 0): 1.0, (1, 1): -1.0}.get((i % 2, j % 2), 0.0)
+
+
+REACH = 0.05
+"""A ligament given by its end points ends at the vertex within this share of the spacing."""
+
+
+def listed(
+    polygons: Sequence[Sequence[tuple[float, float]]],
+    ligaments: Sequence[tuple[tuple[float, float], tuple[float, float]]],
+    spacing: float,
+) -> Lattice:
+    """Units as lists of corners (mm), either way round, and ligaments as pairs of end points.
+
+    Raises:
+        ValueError: a polygon without area, or a ligament that does not end at two units' vertices.
+    """
+    rings = [_counter_clockwise(np.array(polygon, dtype=float)) for polygon in polygons]
+    vertices = np.concatenate(rings)
+    unit = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    ends = np.array(ligaments, dtype=float).reshape(-1, 2, 2)
+    distance, place = cKDTree(vertices).query(ends)
+    for number, (far, (one, other)) in enumerate(zip(distance, place, strict=True)):
+        where = "ligament {} from ({:g}, {:g}) to ({:g}, {:g}) mm".format(
+            number, *np.round(ends[number].ravel(), 3)
+        )
+        if far.max() > REACH * spacing:
+            raise ValueError(f"{where} ends {far.max():.3g} mm away from any unit's corner")
+        if unit[one] == unit[other]:
+            raise ValueError(f"{where} begins and ends at the same unit")
+    index = np.stack([np.arange(len(rings)), np.zeros(len(rings), dtype=np.int64)], axis=1)
+    return _network(rings, place, index, spacing)
+
+
+def _counter_clockwise(ring: Floats) -> Floats:
+    area = _moments(ring)[0]
+    if abs(area) < 1e-9 or not np.isfinite(area):
+        raise ValueError(f"a polygon of {len(ring)} corners has no area")
+    return ring if area > 0 else ring[::-1]
+
+
+def _moments(ring: Floats) -> tuple[float, Floats]:
+    """Signed area and centroid of a polygon."""
+    here = ring - ring[0]
+    there = np.roll(here, -1, axis=0)
+    cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    area = cross.sum() / 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(area), ring[0] + ((here + there) * cross[:, None]).sum(axis=0) / (6 * area)
+
+
+def _network(polygons: list[Floats], ligaments: Ints, index: Ints, spacing: float) -> Lattice:
+    """A network of counter-clockwise polygons whose sites are their centroids."""
+    vertices = np.concatenate(polygons)
+    return Lattice(
+        vertices=vertices,
+        unit=np.repeat(np.arange(len(polygons)), [len(polygon) for polygon in polygons]),
+        ligaments=ligaments,
+        group=_groups(len(vertices), ligaments),
+        site=np.stack([_moments(polygon)[1] for polygon in polygons]),
+        index=index,
+        spacing=spacing,
+        id=np.arange(len(polygons)),
+    )
+
+
 def _groups(n_vertices: int, ligaments: Ints) -> Ints:
-    """Numbers the design groups: the ends of a ligament together, free vertices alone."""
-    representative = np.arange(n_vertices)
-    representative[ligaments.max(axis=1)] = ligaments.min(axis=1)
-    return np.unique(representative, return_inverse=True)[1]
+    """Numbers the design groups by their first vertex: joined vertices together, others alone."""
+    joined = coo_array(
+        (np.ones(len(ligaments)), (ligaments[:, 0], ligaments[:, 1])), shape=(n_vertices,) * 2
+    )
+    _, label = connected_components(joined, directed=False)
+    _, first = np.unique(label, return_index=True)
+    return np.argsort(np.argsort(first))[label]

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from pipeline.problem.drives import LinearRamp
+from pipeline.problem.lattices import ListedNetwork, Quads
 from pipeline.problem.model import Problem
 from pipeline.problem.regions import Region, at
 from pipeline.problem.selection import (
@@ -39,11 +40,13 @@ def findings(problem: Problem) -> Findings:
 
 def _lattice(problem: Problem) -> Findings:
     lattice = problem.lattice
+    if isinstance(lattice, ListedNetwork):
+        return
     if lattice.ligament_length >= lattice.spacing:
         what = f"ligaments of {lattice.ligament_length:g} mm leave no room for units"
         remedy = f"keep it below the spacing, {lattice.spacing:g} mm"
         yield Finding(what, ("lattice", "ligament_length"), remedy)
-    if abs(lattice.bias_angle) >= math.pi / 4:
+    if isinstance(lattice, Quads) and abs(lattice.bias_angle) >= math.pi / 4:
         what = f"a bias of {math.degrees(lattice.bias_angle):g} deg closes the voids"
         yield Finding(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
 
@@ -56,13 +59,13 @@ def _contact(problem: Problem) -> Findings:
     if barrier >= cutoff:
         what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
         yield Finding(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
-    elif cutoff >= (void := _smallest_void(problem)):
+    elif isinstance(problem.lattice, Quads) and cutoff >= (void := _smallest_void(problem.lattice)):
         what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
         yield Finding(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
 
 
-def _smallest_void(problem: Problem) -> float:
-    return 90.0 - 2.0 * abs(math.degrees(problem.lattice.bias_angle))
+def _smallest_void(lattice: Quads) -> float:
+    return 90.0 - 2.0 * abs(math.degrees(lattice.bias_angle))
 
 
 def _selectors(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
@@ -76,9 +79,7 @@ def _units_exist(problem: Problem) -> Findings:
         try:
             selected_units(selector, problem.lattice)
         except IndexError as error:
-            lattice = problem.lattice
-            remedy = f"i runs to {lattice.columns - 1} and j to {lattice.rows - 1}, from zero"
-            yield Finding(str(error), keys, remedy)
+            yield Finding(str(error), keys, problem.lattice.extent)
 
 
 def _drive_is_free(problem: Problem) -> Findings:
@@ -108,8 +109,8 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     centre, inner, outer = region.bounds
     x, y = at(centre, lattice.centre_site)
     margin = 0.5 * lattice.spacing
-    right, top = (lattice.columns - 1) * lattice.spacing, (lattice.rows - 1) * lattice.spacing
-    room = margin + min(x, y, right - x, top - y)
+    _, across, up = zip(*lattice.sites(), strict=True)
+    room = margin + min(x - min(across), y - min(up), max(across) - x, max(up) - y)
     shape = "disc" if region.disc is not None else "ring"
     key = "radius" if shape == "disc" else "outer"
     if outer > room:
@@ -259,10 +260,12 @@ def interest_units(problem: Problem) -> tuple[int, ...]:
 
 def _start_is_feasible(problem: Problem) -> Findings:
     lattice, limits = problem.lattice, problem.constraints
+    if not isinstance(lattice, Quads):
+        return
     start = {
         "edge_length": (limits.edge_length, lattice.edge_length, "mm"),
         "block_angle": (_degrees(limits.block_angle), 90.0, "deg"),
-        "void_angle": (_degrees(limits.void_angle), _smallest_void(problem), "deg"),
+        "void_angle": (_degrees(limits.void_angle), _smallest_void(lattice), "deg"),
         "gap": (limits.gap, lattice.ligament_length, "mm"),
     }
     for name, (asked, has, unit) in start.items():
@@ -277,6 +280,8 @@ def _degrees(angle: float | None) -> float | None:
 
 def _symmetry(problem: Problem) -> Findings:
     lattice = problem.lattice
+    if not isinstance(lattice, Quads):
+        return
     if problem.optimiser.symmetry == "C4" and lattice.columns != lattice.rows:
         what = f"a lattice of {lattice.columns} x {lattice.rows} has no fourfold symmetry"
         yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")

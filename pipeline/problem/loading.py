@@ -130,12 +130,17 @@ def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
 def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:
     """The location without the tags of unions, which are no keys of the file."""
     keys: list[str | int] = []
+    tag: object = None
     for part in location:
+        if part == tag:  # a kind that is also the name of a key: `file`
+            tag = None
+            continue
         if (isinstance(data, Mapping) and part in data) or (
             isinstance(data, list) and isinstance(part, int) and part < len(data)
         ):
             data = data[part]  # type: ignore[index]
             keys.append(part)
+            tag = data.get("kind") if isinstance(data, Mapping) else None
     return (*keys, location[-1]) if missing else tuple(keys)
 
 

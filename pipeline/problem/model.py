@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from pipeline.problem.drives import Drive, Harmonic, RampHarmonic
 from pipeline.problem.fabrication import Fabrication
+from pipeline.problem.lattices import Lattice
 from pipeline.problem.quantities import (
     Angle,
     BendingStiffness,
@@ -30,7 +31,7 @@ from pipeline.problem.quantities import (
 from pipeline.problem.regions import CloakRegion, Region, VoidRegion
 from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
-from pipeline.problem.selection import Lattice, Selector
+from pipeline.problem.selection import Selector
 
 _UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
 _UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits

@@ -1,68 +1,18 @@
-"""Which units a selector or a region means, by arithmetic on the lattice sites.
-
-Unit ids are `i + columns * j`; the site of unit (i, j) is `(i, j) * spacing` in the specimen frame.
-The squares of the starting lattice are symmetric about their sites, so sites are their centroids.
-"""
+"""Which units a selector or a region means, by arithmetic on the lattice sites."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from pipeline.problem.quantities import Angle, Length
+from pipeline.problem.lattices import Lattice, Quads
 from pipeline.problem.regions import HAIR, Region, inside
 from pipeline.problem.section import Section
 
 Index = Annotated[int, Field(ge=0, strict=True)]
-Size = Annotated[int, Field(ge=1, le=1000, strict=True)]
-
-
-class Lattice(Section):
-    """Squares of alternating bias on a square lattice, joined by ligaments at their corners."""
-
-    kind: Literal["quads"] = "quads"
-    columns: Size
-    rows: Size
-    spacing: Length
-    ligament_length: Length
-    bias_angle: Angle
-
-    @property
-    def edge_length(self) -> float:
-        """Edge of the starting squares in mm."""
-        return (self.spacing - self.ligament_length) / math.sqrt(2.0) / math.cos(self.bias_angle)
-
-    @property
-    def centre_site(self) -> tuple[float, float]:
-        """The site of the centre unit, or the middle of the lattice where there is none, in mm."""
-        return self.spacing * (self.columns - 1) / 2, self.spacing * (self.rows - 1) / 2
-
-    def unit(self, i: int, j: int) -> int:
-        """The id of unit (i, j)."""
-        return i + self.columns * j
-
-    def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
-        for j in range(self.rows):
-            for i in range(self.columns):
-                yield self.unit(i, j), i * self.spacing, j * self.spacing
-
-    def bonds(self) -> Iterator[tuple[int, int]]:
-        """The units that each ligament joins."""
-        for unit in range(self.columns * self.rows):
-            if (unit + 1) % self.columns:
-                yield unit, unit + 1
-            if unit + self.columns < self.columns * self.rows:
-                yield unit, unit + self.columns
-
-    def name(self, unit: int) -> str:
-        """A unit by its lattice indices."""
-        j, i = divmod(unit, self.columns)
-        return f"[{i}, {j}]"
 
 
 class ListedUnits(Section):
@@ -134,28 +84,15 @@ def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:
         IndexError: a listed unit is not in the lattice, or there is no one centre unit.
     """
     if isinstance(selector, ListedUnits):
-        return tuple(sorted({_listed(i, j, lattice) for i, j in selector.units}))
-    if selector == "centre":
-        return (_centre_unit(lattice),)
-    columns, rows = range(lattice.columns), range(lattice.rows)
-    sides = {
-        "corners": (columns[:: max(columns[-1], 1)], rows[:: max(rows[-1], 1)]),
-        "left": (columns[:1], rows),
-        "right": (columns[-1:], rows),
-        "bottom": (columns, rows[:1]),
-        "top": (columns, rows[-1:]),
-    }
-    chosen_columns, chosen_rows = sides[selector]
-    return tuple(lattice.unit(i, j) for j in chosen_rows for i in chosen_columns)
-
-
-def _listed(i: int, j: int, lattice: Lattice) -> int:
-    if i >= lattice.columns or j >= lattice.rows:
-        raise IndexError(f"unit [{i}, {j}] is not in the lattice")
-    return lattice.unit(i, j)
+        return tuple(sorted({lattice.unit(i, j) for i, j in selector.units}))
+    return (_centre_unit(lattice),) if selector == "centre" else lattice.side(selector)
 
 
 def _centre_unit(lattice: Lattice) -> int:
-    if lattice.columns % 2 == 0 or lattice.rows % 2 == 0:
+    centre, hair = lattice.centre_site, HAIR * lattice.spacing
+    for unit, x, y in lattice.sites():
+        if math.dist((x, y), centre) <= hair:
+            return unit
+    if isinstance(lattice, Quads):
         raise IndexError("a lattice of even size has no centre unit")
-    return lattice.unit(lattice.columns // 2, lattice.rows // 2)
+    raise IndexError("no unit has its site at the middle of the lattice")

@@ -23,6 +23,7 @@ from pipeline.problem import (
     preset_names,
     section_hash,
 )
+from pipeline.problem.lattices import Quads
 from pipeline.problem.loading import overlaid
 
 PRESETS = (None, "edge3", "free", "quick", "text")
@@ -39,6 +40,7 @@ def edited(fig2: Path, folder: Path, old: str, new: str) -> Problem:
 def test_fig2_is_as_the_authors_ran_it(fig2: Path) -> None:
     problem = load(fig2)
     assert problem.lattice.ligament_length == 0.15 * problem.lattice.spacing
+    assert isinstance(problem.lattice, Quads)
     assert problem.lattice.edge_length == pytest.approx(9.594, abs=1e-3)
     assert problem.horizon_time == 1.0
     assert problem.material.density == 6.18e-9

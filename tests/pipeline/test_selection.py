@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.problem.lattices import Quads
 from pipeline.problem.quantities import SIM_UNITS
 from pipeline.problem.regions import Disc, Region, Ring
 from pipeline.problem.selection import (
-    Lattice,
     ListedUnits,
     NamedUnits,
     selected_units,
@@ -17,8 +17,8 @@ from pipeline.problem.selection import (
 )
 
 
-def lattice(columns: int, rows: int, spacing: float = 15.0) -> Lattice:
-    return Lattice.model_validate(
+def lattice(columns: int, rows: int, spacing: float = 15.0) -> Quads:
+    return Quads.model_validate(
         {
             "columns": columns,
             "rows": rows,

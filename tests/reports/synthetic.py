@@ -17,7 +17,7 @@ from pipeline.problem import Output, Problem
 from pipeline.problem.drives import Harmonic
 from reports import study
 from reports.study import Study
-from sim.lattice import Lattice, quads
+from sim.lattice import Lattice
 
 PROBLEM = Path(__file__).parents[2] / "experiments" / "fig2" / "problem.yaml"
 
@@ -61,8 +61,7 @@ def _drive(chosen: Problem) -> Harmonic:
 
 
 def _lattice(chosen: Problem) -> Lattice:
-    given = chosen.lattice
-    return quads(given.columns, given.rows, given.spacing, given.ligament_length, given.bias_angle)
+    return chosen.lattice.network()
 
 
 def _flags(chosen: Problem) -> dict[str, Any]:
