@@ -19,7 +19,7 @@ _RIM = 10.0  # mm of the template around the specimen
 _TOOTH = 8.0  # mm, length of the comb's teeth
 _HANDLE = 12.0  # mm, back of the comb
 _MOST_TEETH = 14
-_COUPON_PITCH, _COUPON_DEPTH = 9.0, 14.0  # mm
+_COUPON_PITCH, _COUPON_DEPTH = 11.0, 14.0  # mm
 
 
 def shim_pieces(specimen: Specimen, wanted: Fabrication) -> list[Part]:

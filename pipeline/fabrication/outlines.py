@@ -87,7 +87,7 @@ def _channel(slot: Slot, wanted: Fabrication) -> Polygon:
 
 def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
     """Where the walls beside the slot are thinner than the tips."""
-    cuts = side_truncations(body, slot.mouth, slot.direction, slot.depth, wanted)
+    cuts = side_truncations(body, slot, wanted)
     half, width = slot.width / 2, slot.width / 2 + wanted.slots.tip + GRID
     for length, (right, left) in zip(cuts, ((-width, -half), (half, width)), strict=True):
         if length > 0.0:

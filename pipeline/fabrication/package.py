@@ -8,7 +8,7 @@ from pathlib import Path
 
 import shapely
 
-from pipeline.fabrication import dxf, flat, meshes, svg
+from pipeline.fabrication import dxf, dxf_r12, flat, meshes, svg
 from pipeline.fabrication.fixtures import fixtures
 from pipeline.fabrication.parts import Part, Specimen
 from pipeline.fabrication.plates import plates
@@ -75,8 +75,8 @@ def write(package: Package) -> None:
 def _laser(package: Package) -> None:
     for kind, parts in _flat_parts(package):
         for sheet in sheets(kind, parts, package.wanted.laser, package.file):
-            dxf.write(sheet, package.path(f"laser/{sheet.name}.dxf", sheet.ids), "R2010")
-            dxf.write(sheet, package.path(f"laser/{sheet.name}_r12.dxf"), "R12")
+            dxf.write(sheet, package.path(f"laser/{sheet.name}.dxf", sheet.ids))
+            dxf_r12.write(sheet, package.path(f"laser/{sheet.name}_r12.dxf"))
             svg.write(sheet, package.path(f"laser/{sheet.name}.svg"))
 
 

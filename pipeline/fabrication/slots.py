@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from shapely import LineString, Polygon
+from shapely import Polygon
 
 from pipeline.fabrication.parts import Floats, Slot
 from pipeline.problem.fabrication import Fabrication
@@ -156,7 +156,7 @@ def _candidates(
     walls = _walls(room, mouth, directions, depths, wanted.slot_width)
     thick = walls >= wanted.minimum_wall - _HAIR
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
-    truncation = _truncations(room, mouth, directions, depths, wanted)
+    truncation = truncations(room, mouth, directions, depths, wanted).max(axis=0)
     kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
     cost = (
         np.abs(depths - wanted.slots.depth)
@@ -206,39 +206,30 @@ def _walls(
     return np.where(inside, shapely.distance(caps, room.exterior), -1.0)
 
 
-def _truncations(
-    room: Polygon, mouth: Floats, directions: Floats, depths: Floats, wanted: Fabrication
+def truncations(
+    body: Polygon, mouth: Floats, directions: Floats, depths: Floats, wanted: Fabrication
 ) -> Floats:
-    """(n,) how far the tips are cut back along the slots: the larger of the two sides."""
-    return np.array(
-        [
-            max(side_truncations(room, mouth, direction, depth, wanted))
-            for direction, depth in zip(directions, depths, strict=True)
-        ]
-    )
-
-
-def side_truncations(
-    body: Polygon, mouth: Floats, direction: Floats, depth: float, wanted: Fabrication
-) -> tuple[float, float]:
-    """How far along a slot the walls on its right and on its left are thinner than the tips.
+    """(2, n) how far along slots the walls on their right and left are thinner than the tips.
 
     A wall is thick enough where the line beside the slot, a tip away, runs inside the body.
     """
-    found = []
-    for sign in (-1.0, 1.0):
-        offset = sign * (wanted.slot_width / 2 + wanted.slots.tip)
-        beside = mouth + offset * np.array([-direction[1], direction[0]])
-        end = beside + depth * direction
-        inner = shapely.intersection(LineString([beside, end]), body)
-        pieces = [
-            piece
-            for piece in shapely.get_parts(inner)
-            if piece.distance(shapely.Point(end)) < _HAIR
-        ]
-        reach = max((float(piece.length) for piece in pieces), default=0.0)
-        found.append(max(depth - reach, 0.0))
-    return found[0], found[1]
+    left = (wanted.slot_width / 2 + wanted.slots.tip) * directions[:, ::-1] * [-1.0, 1.0]
+    starts = mouth + np.stack([-left, left])
+    ends = starts + depths[:, None] * directions
+    beside = shapely.linestrings(np.stack([starts, ends], axis=-2))
+    pieces, owner = shapely.get_parts(shapely.intersection(beside.ravel(), body), return_index=True)
+    reached = shapely.distance(pieces, shapely.points(ends.reshape(-1, 2)[owner])) < _HAIR
+    length = np.zeros(beside.size)
+    np.maximum.at(length, owner[reached], shapely.length(pieces[reached]))
+    return np.maximum(depths - length.reshape(beside.shape), 0.0)
+
+
+def side_truncations(body: Polygon, slot: Slot, wanted: Fabrication) -> tuple[float, float]:
+    """The same for one slot of a body."""
+    right, left = truncations(
+        body, slot.mouth, slot.direction[None], np.array([slot.depth]), wanted
+    )[:, 0]
+    return float(right), float(left)
 
 
 def _together(offered: Sequence[Candidates], wanted: Fabrication) -> list[Candidates] | None:

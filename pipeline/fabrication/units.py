@@ -219,7 +219,7 @@ def _body(
 
 def _measured(body: Polygon, slot: Slot, wanted: Fabrication) -> Slot:
     """The slot with its truncation in the body as it is made."""
-    cuts = slots.side_truncations(body, slot.mouth, slot.direction, slot.depth, wanted)
+    cuts = slots.side_truncations(body, slot, wanted)
     return replace(slot, truncation=max(cuts))
 
 
