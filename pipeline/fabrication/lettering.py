@@ -64,6 +64,7 @@ _MARGINS = (0.4, 0.05)  # mm, wanted and least, to the rim of the part
 _OVERHANGS = (0.25, 0.5, 0.75)  # mm, as the last resort
 _STEP = 0.35  # mm
 _LEAST_ARROW = 0.8  # mm
+_SPECK = 0.1  # mm; shorter pieces of a clipped stroke are left out
 _RING = 0.3  # mm, radius
 _ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
 
@@ -187,7 +188,7 @@ def _clipped(strokes: Strokes, outline: Polygon) -> Strokes:
             kept.append(stroke)
         else:
             pieces = shapely.get_parts(line.intersection(inner))
-            kept += [np.asarray(piece.coords) for piece in pieces if piece.length > 0.0]
+            kept += [np.asarray(piece.coords) for piece in pieces if piece.length > _SPECK]
     return tuple(kept)
 
 

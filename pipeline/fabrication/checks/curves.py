@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -25,13 +24,23 @@ _EXPORTER = "run the same command again; if it stays, the exporter has a bug"
 
 def check(drawing: Drawing) -> Iterator[Fault]:
     """Faults of a drawing's curves."""
-    yield from _layers(drawing)
+    yield from check_form(drawing)
     for curve in drawing.curves:
-        for what in _of_curve(curve):
+        if curve.layer in CUTS and len(curve.points) > 2 and not line(curve).is_simple:
+            what = f"a cut that crosses or repeats itself on layer {curve.layer}"
             yield _fault(drawing, curve, what)
     cuts = [curve for curve in drawing.curves if curve.layer in CUTS and len(curve.points) > 2]
     yield from _crossings(drawing, cuts)
     yield from _doubled(drawing, [curve for curve in drawing.curves if curve.layer not in CUTS])
+    yield from _holes_in_place(drawing)
+
+
+def check_form(drawing: Drawing) -> Iterator[Fault]:
+    """Faults that show without comparing curves: layers, kinds, open ends, order of cuts."""
+    yield from _layers(drawing)
+    for curve in drawing.curves:
+        for what in _of_curve(curve):
+            yield _fault(drawing, curve, what)
     yield from _order(drawing)
 
 
@@ -70,11 +79,9 @@ def _of_curve(curve: Curve) -> Iterator[str]:
         yield "an outer cut that belongs to no part"
     if curve.layer in CUTS and not curve.closed:
         yield f"an open curve on layer {curve.layer}"
-    lengths = shapely.length([LineString(pair) for pair in pairwise(_ring(curve))])
+    lengths = np.linalg.norm(np.diff(_ring(curve), axis=0), axis=1)
     if len(lengths) == 0 or lengths.min() < SHORTEST:
         yield f"a segment of no length on layer {curve.layer}"
-    elif curve.layer in CUTS and not line(curve).is_simple:
-        yield f"a cut that crosses or repeats itself on layer {curve.layer}"
 
 
 def _ring(curve: Curve) -> np.ndarray:
@@ -110,18 +117,22 @@ def _meeting(lines: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _order(drawing: Drawing) -> Iterator[Fault]:
-    """Each part: its holes are inside its outline and are cut before it."""
+    """Holes of each part are cut before its outline."""
+    cut_out: set[str] = set()
+    for curve in drawing.curves:
+        if curve.layer == OUTER:
+            cut_out.add(curve.part)
+        elif curve.layer == INNER and curve.part in cut_out:
+            yield _fault(drawing, curve, "an inner cut comes after the outer one")
+
+
+def _holes_in_place(drawing: Drawing) -> Iterator[Fault]:
+    """Holes lie inside of the outline of their part."""
     for part, curves in drawing.parts().items():
-        places = {
-            layer: [place for place, curve in enumerate(curves) if curve.layer == layer]
-            for layer in CUTS
-        }
-        outers = [polygon(curves[place]) for place in places[OUTER] if curves[place].closed]
-        for place in places[INNER]:
-            if any(outer < place for outer in places[OUTER]):
-                yield _fault(drawing, curves[place], "an inner cut comes after the outer one")
-            if not _held(curves[place], outers):
-                yield _fault(drawing, curves[place], f"an inner cut outside of {part or 'a part'}")
+        outers = [polygon(c) for c in curves if c.layer == OUTER and c.closed and len(c.points) > 2]
+        for curve in curves:
+            if curve.layer == INNER and not _held(curve, outers):
+                yield _fault(drawing, curve, f"an inner cut outside of {part or 'a part'}")
 
 
 def _held(curve: Curve, outers: Iterable[Polygon]) -> bool:

@@ -12,7 +12,8 @@ from shapely import Polygon
 from pipeline.fabrication.checks import corners, curves, drawings, sheets
 from pipeline.fabrication.checks.alignment import aligned
 from pipeline.fabrication.checks.corners import Shape
-from pipeline.fabrication.checks.drawings import Drawing
+from pipeline.fabrication.checks.curves import REFERENCE
+from pipeline.fabrication.checks.drawings import Curve, Drawing
 from pipeline.fabrication.checks.faults import Fault
 from pipeline.fabrication.checks.wanted import Wanted
 from pipeline.problem.fabrication import Fabrication
@@ -54,7 +55,8 @@ def _formats(drawing: Drawing, folder: Path, asked: Fabrication) -> Iterator[Fau
     stem = drawing.file.stem
     for name in (f"{stem}_r12.dxf", f"{stem}.svg"):
         other = drawings.read(folder / name)
-        yield from _sheet(other, asked)
+        yield from curves.check_form(other)
+        yield from sheets.check_scale(other, asked.laser)
         if (what := _difference(drawing, other)) is not None:
             yield Fault("the drawing", what, "laser", _BUG, other.file)
 
@@ -66,19 +68,23 @@ def _difference(one: Drawing, other: Drawing) -> str | None:
     if ours != theirs:
         return f"other parts, layers or another order than in {one.file.name}"
     for mine, yours in zip(*pairs, strict=True):
-        if not _alike(mine.points, yours.points):
+        if not _alike(mine, yours):
             return f"part {mine.part} has another size or place than in {one.file.name}"
     return None
 
 
-def _alike(mine: np.ndarray, yours: np.ndarray) -> bool:
-    """Whether two curves are the same; circles come with other numbers of points."""
-    boxes = ([points.min(axis=0), points.max(axis=0)] for points in (mine, yours))
-    ours, theirs = boxes
-    same = np.allclose(ours, theirs, rtol=0, atol=sheets.TOLERANCE)
-    if len(mine) != len(yours):
-        return bool(same)
-    return bool(same and np.abs(mine - yours).max() < sheets.TOLERANCE)
+def _alike(mine: Curve, yours: Curve) -> bool:
+    """Whether two curves are the same; circles and sheets may begin anywhere."""
+    pair = (mine.points, yours.points)
+    if mine.kind == "CIRCLE" or mine.layer == REFERENCE:
+        pair = (_box(mine), _box(yours))
+    if len(pair[0]) != len(pair[1]):
+        return False
+    return bool(np.abs(pair[0] - pair[1]).max(initial=0.0) < sheets.TOLERANCE)
+
+
+def _box(curve: Curve) -> np.ndarray:
+    return np.stack([curve.points.min(axis=0), curve.points.max(axis=0)])
 
 
 def _kerfs(

@@ -32,6 +32,9 @@ MILLIMETRES = 4
 FLATNESS = 2e-4
 """Curves become polygons that are this true to them, mm."""
 
+_TURN = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
+_CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -175,7 +178,7 @@ def _flattened(entity: Any, kind: str) -> tuple[Array, bool]:  # noqa: ANN401  (
         outline = path.make_path(entity)
     except TypeError:
         return np.empty((0, 2)), False
-    points = np.array([(p.x, p.y) for p in outline.flattening(FLATNESS)])
+    points = np.array([(p.x, p.y) for p in outline.flattening(FLATNESS)]).reshape(-1, 2)
     closed = kind == "CIRCLE" or bool(getattr(entity, "is_closed", False))
     return _without_return(points, closed), closed
 
@@ -201,14 +204,19 @@ def _of_svg(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]
 
 def _shape(shape: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
     """One curve for each stroke of the shape's path."""
+    from svgelements import Circle
     from svgelements import Path as SvgPath
 
     kind = type(shape).__name__.upper()
     part = str(shape.values["attributes"].get(LABEL, ""))
-    for stroke in SvgPath(shape).as_subpaths():
-        points, closed = _polygon(stroke)
-        points = points * [1.0, -1.0] + [0.0, height]
-        yield Curve(part, layer, kind, points, closed), str(shape.stroke)
+    if isinstance(shape, Circle):
+        centre = np.array([shape.implicit_center.x, shape.implicit_center.y])
+        outlines = [(centre + float(shape.implicit_r) * _CIRCLE, True)]
+    else:
+        outlines = [_polygon(stroke) for stroke in SvgPath(shape).as_subpaths()]
+    for points, closed in outlines:
+        turned = points * [1.0, -1.0] + [0.0, height]
+        yield Curve(part, layer, kind, turned, closed), str(shape.stroke)
 
 
 def _polygon(stroke: Any) -> tuple[Array, bool]:  # noqa: ANN401

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import xarray as xr
@@ -46,7 +47,7 @@ def check_package(
     for step in steps:
         faults += step
         done()
-    stop(faults, pictures)
+    stop([replace(fault, file=fault.file.relative_to(folder)) for fault in faults], pictures)
 
 
 STEPS = 3

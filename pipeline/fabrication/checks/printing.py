@@ -25,7 +25,7 @@ _ALIKE = 1e-3
 def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
     """Faults of all meshes in a package's folder."""
     units = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("units/*.stl"))}
-    yield from every_unit(Counter(units), wanted, folder / "units")
+    yield from every_unit(Counter(units.keys()), wanted, folder / "units")
     for label, solid in units.items():
         faults = list(solids.check(solid))
         yield from faults

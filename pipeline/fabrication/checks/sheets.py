@@ -20,6 +20,7 @@ TOLERANCE = 1e-3
 """Lengths of a drawing are right to this, mm."""
 
 LEAST_LETTER = 2.0
+_CLIPPED = 0.2  # mm that a slot may take off a letter
 _KERF_TOLERANCE = 2e-3
 _JOINED = 0.05  # mm; strokes so near to each other make one letter
 _HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
@@ -35,7 +36,7 @@ def check(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fault]:
         laser: what was asked for.
         thickness: of the material, mm; no hole may be smaller.
     """
-    yield from _scale(drawing, laser)
+    yield from check_scale(drawing, laser)
     yield from _places(drawing, laser)
     yield from _holes(drawing, thickness)
     yield from _letters(drawing)
@@ -47,7 +48,7 @@ def outlines(drawing: Drawing) -> list[tuple[str, Polygon]]:
     return [(curve.part, bounded(curve)) for curve in found]
 
 
-def _scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
+def check_scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
     """The file is in millimetres and as large as the sheet."""
     if drawing.file.suffix == ".svg":
         yield from _page(drawing, laser)
@@ -137,9 +138,9 @@ def _legible(
     drawing: Drawing, part: str, strokes: list[Curve], outline: Geometry
 ) -> Iterator[Fault]:
     written = shapely.MultiLineString([line(curve) for curve in strokes if len(curve.points) > 1])
-    letters = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
-    height = min(widest(letter) - 2 * _JOINED for letter in letters)
-    if height < LEAST_LETTER - TOLERANCE:
+    pieces = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
+    height = max(widest(piece) - 2 * _JOINED for piece in pieces)  # arrows are smaller
+    if height < LEAST_LETTER - _CLIPPED:
         what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
         yield _on(drawing, part, what, "labels.height", "give larger letters", (outline, written))
     if not outline.covers(written):
@@ -181,12 +182,21 @@ def _cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tuple[Drawi
 
 def _offset(curve: Curve, drawn: Curve, shift: float) -> bool:
     """Whether a cut is the nominal one moved by `shift`; corners may be round or sharp."""
-    nominal = bounded(drawn)
+    nominal, made = bounded(drawn), bounded(curve)
     sharp = nominal.buffer(shift, join_style="mitre", mitre_limit=10.0)
-    made = aligned(sharp, bounded(curve))
-    least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=32)
+    least = nominal.buffer(shift - _KERF_TOLERANCE, quad_segs=8)
     most = nominal.buffer(shift + _KERF_TOLERANCE, join_style="mitre", mitre_limit=10.0)
-    return bool(made.covers(least) and most.covers(made))
+    boxed = shapely.affinity.translate(made, *_between(made, sharp))
+    if boxed.covers(least) and most.covers(boxed):
+        return True
+    placed = aligned(sharp, made)
+    return bool(placed.covers(least) and most.covers(placed))
+
+
+def _between(shape: Geometry, other: Geometry) -> tuple[float, float]:
+    """Shift from the middle of one shape's box to that of another's."""
+    before, after = (np.array(s.bounds).reshape(2, 2).mean(axis=0) for s in (shape, other))
+    return float(after[0] - before[0]), float(after[1] - before[1])
 
 
 def _on(

@@ -86,7 +86,10 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "sheet grown": (changed(REFERENCE, points=rectangle(0, 0, 100.1, 60, "").points), "it spans"),
     "inches": (lambda kept: [replace(c, points=c.points / 25.4) for c in kept], "it spans 0.000"),
     "small hole": (shrunk(HOLE, 0.5), "a hole 2.00 mm wide in material of 4 mm"),
-    "small letters": (shrunk(LETTER, 0.4), "letters of 1.60 mm"),
+    "small letters": (
+        lambda kept: shrunk(LETTER + 1, 0.4)(shrunk(LETTER, 0.4)(kept)),
+        "letters of 1.",
+    ),
     "letters outside": (moved(LETTER, -3.0), "part A1: engraving beyond its outline"),
     "line twice": (
         added(stroke([(12.0, 15.0), (12.0, 17.0)], "A1")),
