@@ -14,7 +14,7 @@ help:
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
-	@echo "make clients   run the tests that need a browser (Chromium)"
+	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
 	@echo "make setup     only make .venv from requirements.lock"

@@ -1,0 +1,65 @@
+"""A package of the six squares, written by the exporters in a second."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline import problem
+from pipeline.fabrication import assembly, bom, manifest, package, units
+from pipeline.fabrication.parts import Specimen
+from pipeline.problem import Problem
+from tests.pipeline.fabrication import handmade
+
+PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
+
+
+def design() -> xr.Dataset:
+    """What the package needs of a design dataset: the six squares, the corner ones clamped."""
+    indices = [(i, j) for j in range(handmade.ROWS) for i in range(handmade.COLUMNS)]
+    corners = np.stack([handmade.square(i, j) for i, j in indices])
+    ends = np.array(handmade.neighbours())
+    support = np.zeros(len(indices), dtype=np.int8)
+    support[[0, -1]], support[1] = 1, 2
+    return xr.Dataset(
+        {
+            "vertices": (("unit", "vertex", "xy"), corners),
+            "vertices_initial": (("unit", "vertex", "xy"), corners),
+            "ligament_unit": (("ligament", "end"), ends[:, :, 0]),
+            "ligament_vertex": (("ligament", "end"), ends[:, :, 1]),
+            "region": _flags(np.zeros(len(indices), dtype=np.int8), "surroundings void"),
+            "support": _flags(support, "free clamped driven"),
+        },
+        {
+            "unit": ("unit", np.arange(len(indices))),
+            "i": ("unit", [i for i, _ in indices]),
+            "j": ("unit", [j for _, j in indices]),
+        },
+    )
+
+
+def _flags(values: np.ndarray, meanings: str) -> tuple[str, np.ndarray, dict[str, object]]:
+    numbers = np.arange(len(meanings.split()), dtype=np.int8)
+    return ("unit", values, {"flag_values": numbers, "flag_meanings": meanings})
+
+
+def specimen(asked: Problem) -> Specimen:
+    """The six squares as the exporters cut them."""
+    net = units.network(design(), "cloaked")
+    return units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
+
+
+def write(folder: Path) -> Problem:
+    """Write the package into a new folder; returns the problem that it was made with."""
+    asked = problem.load(PROBLEM)
+    made = specimen(asked)
+    folder.mkdir(parents=True)
+    filled = package.Package(folder, made, asked, str(PROBLEM))
+    package.write(filled)
+    assembly.write(folder / "assembly.pdf", made, asked.fabrication)
+    density = asked.material.density
+    bom.write(folder / "bom.csv", made, asked.fabrication, density, filled.contents)
+    manifest.write(folder, made, asked, PROBLEM)
+    return asked
