@@ -8,7 +8,7 @@ from snakemake.utils import min_version
 from pipeline.sources import source_hash
 from pipeline.workflow import check_problems, check_room, chunks, copies, designs
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
-from pipeline.workflow import section, shown, shown_options, targets
+from pipeline.workflow import packages, section, shown, shown_options, targets
 
 min_version("9.20")
 
@@ -25,10 +25,17 @@ for target, built in targets().items():
         input:
             f"results/{built}/report/index.html",
 
+    rule:
+        name:
+            f"{target}_fabrication"
+        input:
+            packages(built),
+
 
 include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
+include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/report.smk"

@@ -30,6 +30,7 @@ from pipeline.problem import (
     section_hash,
 )
 
+FABRICATION = "_fabrication"  # ends the targets that build what a lab makes
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
 
@@ -115,6 +116,26 @@ def members(wildcards: Wildcards) -> list[str]:
     ]
 
 
+def packages(built: str) -> Callable[[Wildcards], list[str]]:
+    """A function to the packages of a study, or of all studies of a figure, by what it builds."""
+
+    def found(_: Wildcards) -> list[str]:
+        names = joints().get(built) or [Study.parse(built)]
+        return [
+            f"results/{study}/fabrication/{structure}/manifest.json"
+            for study in names
+            for structure in structures_built(problem_of(study))
+        ]
+
+    return found
+
+
+def structures_built(problem: Problem) -> tuple[str, ...]:
+    """The structures that a lab would build: the intact one only where a void makes it differ."""
+    both = ("altered", "cloaked")
+    return both if problem.void is None else ("intact", *both)
+
+
 def member_hashes(wildcards: Wildcards) -> str:
     """Hash of what the figure depends on in the problem files of its studies."""
     of_each = (problem_of(study) for study in joints()[f"{wildcards.name}{wildcards.preset}"])
@@ -129,6 +150,7 @@ def asked_for(words: Collection[str]) -> list[Study]:
     by_target = {target: study for study in studies() for target in study.targets}
     names = {study.name for study in by_target.values()}
     together = joints()
+    words = [word.removesuffix(FABRICATION) for word in words]
     found = [study for word in words for study in together.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])

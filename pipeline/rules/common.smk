@@ -6,6 +6,7 @@ wildcard_constraints:
     preset=r"(@\w+)?",
     method=r"\w+",
     chunk=r"\d+",
+    structure="intact|altered|cloaked",
 
 
 onstart:

@@ -53,6 +53,15 @@ def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     assert not {"sweep", "gather_sweep"} & planned.keys()
 
 
+def test_packages_need_the_design_and_nothing_else(sandbox: Sandbox) -> None:
+    assert sandbox.planned("fig2_fabrication") == {
+        "design": 2,
+        "select": 1,
+        "fabricate": 2,
+        "fig2_fabrication": 1,
+    }
+
+
 @pytest.mark.parametrize("target", ["fig2@quick", "fig2_quick"])
 def test_preset_has_its_own_target_and_folder(sandbox: Sandbox, target: str) -> None:
     ended = sandbox.run(target)

@@ -1,0 +1,20 @@
+# One package for each structure that would be built; the stage puts a whole folder in its place.
+rule fabricate:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+    output:
+        "results/{name}{preset}/fabrication/{structure}/manifest.json",
+    log:
+        "results/{name}{preset}/logs/fabricate_{structure}.log",
+    threads: 1
+    params:
+        study=options,
+        folder=subpath(output[0], parent=True),
+        problem=section("fabricate"),
+        source=source_hash("pipeline.fabricate"),
+    message:
+        "Drawing what is made of the {wildcards.structure} structure of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline.fabricate {params.study} --design {input.design}"
+        " --structure {wildcards.structure} --out-dir {params.folder} --log {log}"
