@@ -27,7 +27,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
     sqp = problem.optimiser.methods.sqp
     static = isinstance(drive, LinearRamp | TanhRamp)
     return {
-        "units": problem.lattice.columns * problem.lattice.rows,
+        "units": problem.lattice.n_units,
         "load angles": len(directions),
         "mm of driven displacement": getattr(drive, "amplitude", 0.0) if static else 0.0,
         "load steps in the loss": problem.horizon.steps or 0,

@@ -15,7 +15,7 @@ from pipeline.problem import Output, Problem, Stage
 from reports import draft, scene
 from reports.scene import Scene
 
-_STAGES: dict[Output, Stage] = {
+STAGES: dict[Output, Stage] = {
     "design": "design",
     "response": "simulate",
     "sweep": "sweep",
@@ -100,7 +100,7 @@ def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
 
 
 def _check_problem(chosen: Problem, kind: Output, data: xr.Dataset, path: Path) -> None:
-    wanted = problem.section_hash(chosen, _STAGES[kind])
+    wanted = problem.section_hash(chosen, STAGES[kind])
     if (found := data.attrs.get("problem_hash")) != wanted:
         raise UserError(
             "the dataset was made from another problem (or another preset)",

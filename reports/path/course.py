@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.drives import LinearRamp, TanhRamp
+from pipeline.problem.lattices import Kagome, Lattice, Quads
 
 Array = NDArray[np.float64]
 
@@ -95,3 +96,12 @@ def display_name(problem: Problem, structure: str) -> str:
     if getattr(problem, "inclusion", None) is not None:
         return "Stiffened"
     return "Uncloaked"
+
+
+def lattice_size(lattice: Lattice) -> str:
+    """How many units a lattice has, in words."""
+    if isinstance(lattice, Quads):
+        return f"{lattice.columns} × {lattice.rows}"
+    if isinstance(lattice, Kagome):
+        return f"2 × {lattice.columns} × {lattice.rows}"
+    return f"{lattice.n_units}"

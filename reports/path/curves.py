@@ -79,10 +79,11 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
 
 def _bands(axes: Axes, study: Study, course: Course, measure: Measure, copies: xr.Dataset) -> None:
     """The 5 % to 95 % percentiles of every kind of noise, laid over one another."""
-    along = np.interp(copies["time"], study.response["time"], course.values)
+    along = np.interp([0.0, *copies["time"].values], study.response["time"], course.values)
     values = scatter.curves(study.problem, measure, study.response, copies)
     for noise in copies["noise"].values:
         low, high = np.nanpercentile(values.sel(noise=noise), BAND, axis=0)
+        low, high = np.insert(low, 0, 0.0), np.insert(high, 0, 0.0)  # all start from rest
         axes.fill_between(along, low, high, color=style.CLOAKED, alpha=0.18, lw=0, zorder=2)
 
 

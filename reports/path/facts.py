@@ -12,7 +12,7 @@ import numpy as np
 from reports import checks
 from reports.facts import Fact, grouped, number, share
 from reports.path import measures, scatter
-from reports.path.course import Course, course, display_name, structures
+from reports.path.course import Course, course, display_name, lattice_size, structures
 from reports.path.curves import over_cases
 from reports.structure import from_dataset
 from reports.study import Study
@@ -43,8 +43,7 @@ def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
         note = f"the set of values that was run, of Figure {paper.figure}"
         yield Fact("variant", "Values", np.nan, "1", paper.variant, note=note)
     initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
-    size = f"{lattice.columns} × {lattice.rows}"
-    yield Fact("units", "Units", initial.n_units, "1", size)
+    yield Fact("units", "Units", lattice.n_units, "1", lattice_size(lattice))
     yield number("spacing", "Spacing s", lattice.spacing, "mm")
     yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
     removed = initial.n_units - int(from_dataset(study.design, lattice.spacing).present.sum())
@@ -115,10 +114,11 @@ def contraction_facts(study: Study, path: Course) -> Iterator[Fact]:
     """Change of the vertical distance between top and bottom rows."""
     if not path.static:
         return
-    nearer = over_cases(study.problem, measures.contraction(study.response)).isel(time=-1)
-    column = study.response["i"].values
-    count = len(np.unique(column[measures.middle_columns(column)]))
-    note = f"loss of distance between top and bottom rows, mean of the middle {count} columns"
+    nearer = over_cases(study.problem, measures.contraction(study.problem, study.response)).isel(
+        time=-1
+    )
+    count = len(measures.middle_units(study.problem, "top"))
+    note = f"loss of distance between top and bottom rows, mean of the middle {count} units"
     for name in structures(study.response):
         label = f"Contraction, {display_name(study.problem, name).lower()}"
         value = float(nearer.sel(structure=name))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from reports import draft, style
 from reports.history import loss_history
 from reports.path import curves, measures
-from reports.path.course import Course, course, display_name, structures
+from reports.path.course import Course, course, display_name, lattice_size, structures
 from reports.path.structures import rest_panel, snapshots
 from reports.study import Study
 
@@ -48,7 +48,7 @@ def _at_rest(figure: Figure, study: Study, names: tuple[str, ...]) -> None:
     style.letter(figure, 0.0, 0.8, "a")
     side = 40.0
     lattice, drive = study.problem.lattice, study.problem.drive
-    size = f"{lattice.columns} × {lattice.rows} units, $s$ = {lattice.spacing:g} mm"
+    size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
     notes = [size, f"$A$ = {drive.amplitude:g} mm" if hasattr(drive, "amplitude") else "", ""]
     left = (3 - len(names)) * (side + 0.6) / 2
     for k, name in enumerate(names):
@@ -69,7 +69,7 @@ def _panels(study: Study, path: Course) -> list[Panel]:
         (measure.label, lambda axes: curves.measure_panel(axes, study, path, measure))
     ]
     if path.static and problem.objective.target != "rest":
-        values = measures.contraction(response)
+        values = measures.contraction(problem, response)
         panels.append(
             (
                 "Lateral contraction",

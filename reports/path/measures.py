@@ -88,22 +88,21 @@ def _squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> x
     return squares
 
 
-def contraction(response: xr.Dataset) -> xr.DataArray:
-    """Loss of distance in mm between the top and the bottom row, mean over the middle columns."""
-    middle = middle_columns(response["i"].values)
-    row = response["j"].values
+def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Loss of distance in mm between the top and the bottom units of the lattice's middle half."""
+    top, bottom = (middle_units(problem, side) for side in ("top", "bottom"))
     rise = response["displacement"].sel(dof="uy")
-    top, bottom = (rise.isel(unit=middle & (row == end)) for end in (row.max(), row.min()))
-    nearer: xr.DataArray = bottom.mean("unit") - top.mean("unit")
+    nearer: xr.DataArray = rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
     return nearer
 
 
-def middle_columns(column: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether each unit is in the middle half of the columns (7 of 15, 14 of 30)."""
-    count = int(column.max()) + 1
-    half = count // 2 - (count // 2 - count) % 2
-    first = (count - half) // 2
-    return (column >= first) & (column < first + half)
+def middle_units(problem: Problem, side: str) -> list[int]:
+    """Units of a side in the middle half of the lattice (7 columns of 15)."""
+    lattice = problem.lattice
+    along = {unit: x for unit, x, _ in lattice.sites()}
+    low, high = min(along.values()), max(along.values())
+    reach = (high - low + lattice.spacing) / 4
+    return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
 
 
 def reaction(response: xr.Dataset) -> xr.DataArray:

@@ -46,7 +46,7 @@ def path(study: Study) -> Columns:
         columns["displacement_mm"] = way.values
     series = {
         f"{measure.key}_{'1' if measure.unit == '1' else measure.unit}": measure.of(response),
-        "contraction_mm": measures.contraction(response),
+        "contraction_mm": measures.contraction(problem, response),
         "reaction_N": measures.reaction(response),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],

@@ -6,7 +6,7 @@ import pytest
 
 from reports.build import publish
 from reports.study import Study
-from tests.reports import synthetic
+from tests.reports import static, synthetic
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +31,15 @@ def report(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     publish(study, folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def shield(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A region to be spared from strain."""
+    return static.written(tmp_path_factory.mktemp("shield"), static.SHIELD)
+
+
+@pytest.fixture(scope="session")
+def smile(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A void to be hidden."""
+    return static.written(tmp_path_factory.mktemp("smile"), static.SMILE)

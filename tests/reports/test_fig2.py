@@ -1,52 +1,24 @@
 from __future__ import annotations
 
 import dataclasses
-import io
-from itertools import combinations
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 
 from reports import style
 from reports.fig2 import figure
 from reports.fig2.structures import simulated_rows
 from reports.study import Study
+from tests.reports import pictures
+from tests.reports.pictures import texts
 
 
 def drawn(study: Study, recorded: int = 0) -> Figure:
     rows = simulated_rows(study.scene, study.response)
     with style.styled():
         made = figure.build(study, [dataclasses.replace(rows[0], source="experiment")] * recorded)
-        FigureCanvasAgg(made).print_raw(io.BytesIO())  # type: ignore[no-untyped-call]
-    return made
-
-
-def texts(made: Figure) -> list[Text]:
-    found = made.findobj(lambda artist: isinstance(artist, Text) and artist.get_visible())
-    return [text for text in found if isinstance(text, Text) and text.get_text().strip()]
-
-
-def shown(made: Figure) -> list[tuple[str, Bbox]]:
-    """Texts with their extents in pixels, but for ticks beyond the axes or of hidden axes."""
-    clipped = {
-        id(tick.label1)
-        for axes in made.axes
-        for axis in (axes.xaxis, axes.yaxis)
-        for tick in axis.get_major_ticks() + axis.get_minor_ticks()
-        if not (axes.axison and _within(tick.get_loc(), axis.get_view_interval()))
-    }
-    kept = [text for text in texts(made) if id(text) not in clipped and text.get_text() != "DRAFT"]
-    return [(text.get_text(), text.get_window_extent()) for text in kept]
-
-
-def _within(value: float, limits: tuple[float, float]) -> bool:
-    low, high = np.sort(limits)
-    slack = 1e-9 * (high - low)
-    return bool(low - slack <= value <= high + slack)
+        return pictures.drawn(made)
 
 
 @pytest.fixture(scope="module")
@@ -55,22 +27,8 @@ def whole(study: Study) -> Figure:
 
 
 @pytest.mark.parametrize("preset", ["study", "quick"])
-def test_no_text_is_cut_or_overlaps(preset: str, request: pytest.FixtureRequest) -> None:
-    made = drawn(request.getfixturevalue(preset))
-    page = made.bbox
-    boxes = shown(made)
-    for text, box in boxes:
-        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= page.x1 and box.y1 <= page.y1
-        assert inside, text
-    for (first, a), (second, b) in combinations(boxes, 2):
-        assert not a.overlaps(b.shrunk(0.9, 0.9)), (first, second)
-
-
-def test_type_is_legible_at_two_columns(whole: Figure) -> None:
-    width, height = whole.get_size_inches() * style.MM_PER_INCH
-    assert width == pytest.approx(178.0)
-    assert height < 235.0
-    assert {text.get_fontsize() for text in texts(whole)} <= {6.0, 7.0, 7.5, 9.0}
+def test_it_is_legible_at_two_columns(preset: str, request: pytest.FixtureRequest) -> None:
+    pictures.assert_legible(drawn(request.getfixturevalue(preset)))
 
 
 def test_panels_are_lettered(whole: Figure) -> None:
