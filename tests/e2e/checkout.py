@@ -106,6 +106,14 @@ class Checkout:
         command = [".venv/bin/python", "-m", module, "--problem", problem, *words]
         return self._run(command, first)
 
+    def shell(self, commands: str) -> Ended:
+        """Commands as a user types them, but for `make` setting up the environment."""
+        ready = re.sub("^make ", f"make {' '.join(_NO_SETUP)} ", commands, flags=re.MULTILINE)
+        return self._run(["bash", "-euc", ready])
+
+    def script(self, text: str) -> Ended:
+        return self._run([".venv/bin/python", "-c", text])
+
     def start(self, target: str = STUDY) -> subprocess.Popen[str]:
         """`make` in a process group of its own; the output is a pipe."""
         return subprocess.Popen(
