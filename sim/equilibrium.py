@@ -1,8 +1,9 @@
 """Compiled equilibrium paths by Newton continuation, and their exact adjoint.
 
-Between two asked loads the increment adapts itself. A predictor along the path and every correction
-stop short of the contact barrier. Corrections descend the energy: an indefinite tangent is shifted
-until it is positive definite, so that the path ends in minima and leaves saddles.
+Between two asked loads the increment adapts itself. An increment is smooth if no tangent on the
+way was indefinite and the correction is short beside the step predicted; one that is not is cut, so
+that the path is followed up to where it ends: a limit point or a branching. There the structure
+jumps: the energy is descended to a minimum at the next load, and the jump is recorded.
 """
 
 from __future__ import annotations
@@ -11,123 +12,30 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
-from sim.matrix import add, clear, factorise, solve
-from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
+from sim.newton import (
+    FACTORS,
+    INCREMENTS,
+    KEEP_FROM_BARRIER,
+    SHIFTED,
+    correct,
+    factorise_shifted,
+    factorise_tangent,
+    leave_saddle,
+    solve_free,
+)
+from sim.potential import admissible_step, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
 
-KEEP_FROM_BARRIER = 0.9
-MAX_CORRECTIONS = 60
-MAX_BACKTRACKS = 30
-MAX_SHIFTS = 40
-FIRST_SHIFT = 1e-4
-"""Of an indefinite tangent, over the axial stiffness."""
 SMALLEST_INCREMENT = 1e-6
+SMALLEST_SMOOTH = 1e-3
+"""Part of the way between two loads below which an increment that is not smooth is a jump."""
+SHORT = 0.5
+"""Correction of a smooth increment at most, over the step predicted."""
 ON_THE_WAY = 1e-3
 """Relative residual that suffices between two asked loads."""
-
-GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
-"""Places in the counts that the solvers gather."""
-
-
-@compiled
-def _residual(motion: Floats, system: System, work: Workspace) -> tuple[float, float, float]:
-    """Energy, and the largest out-of-balance and reaction force (moments over the scale), N."""
-    strain, contact = gradient(motion, system, work.turn, work.force)
-    residual, reaction = 0.0, 0.0
-    for d in system.dofs:
-        residual = max(residual, abs(work.force[d]) / system.scale[d])
-    for d in system.held:
-        reaction = max(reaction, abs(work.force[d]) / system.scale[d])
-    return strain + contact, residual, reaction
-
-
-@compiled
-def _factorise(motion: Floats, system: System, work: Workspace, shift: float) -> bool:
-    clear(work.matrix)
-    tangent(motion, system, work.turn, work.matrix)
-    if shift > 0.0:
-        for i in range(len(system.dofs)):
-            add(work.matrix, i, i, shift * system.scale[system.dofs[i]] ** 2)
-    return factorise(work.matrix)
-
-
-@compiled
-def _factorise_shifted(motion: Floats, system: System, work: Workspace, counts: Ints) -> int:
-    """Factor of the tangent, shifted if need be; returns the shifts tried, -1 if none helped."""
-    counts[FACTORS] += 1
-    if _factorise(motion, system, work, 0.0):
-        return 0
-    counts[SHIFTED] += 1
-    shift = FIRST_SHIFT * np.abs(system.net.law[:, 0]).max()
-    for tries in range(1, MAX_SHIFTS):
-        counts[FACTORS] += 1
-        if _factorise(motion, system, work, shift):
-            return tries
-        shift *= 4.0
-    return -1
-
-
-@compiled
-def _descend(
-    motion: Floats, energy: float, residual: float, newton: bool, system: System, work: Workspace,
-    trial: Floats, counts: Ints,
-) -> tuple[bool, float, float, float]:  # fmt: skip
-    """Moves ``motion`` along ``work.step`` by backtracking short of the barrier.
-
-    A full Newton step that halves the residual passes too: near the end the energy is all rounding.
-
-    Returns:
-        whether a step was found, and energy, residual and reaction there.
-    """
-    slope = 0.0
-    for d in system.dofs:
-        slope += work.step[d] * work.force[d]
-    length = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
-    for _ in range(MAX_BACKTRACKS):
-        trial[:] = motion + length * work.step
-        new_energy, new_residual, reaction = _residual(trial, system, work)
-        counts[GRADIENTS] += 1
-        descends = new_energy <= energy + 1e-4 * length * slope
-        if np.isfinite(new_energy) and (descends or (newton and new_residual < 0.5 * residual)):
-            motion[:] = trial
-            return True, new_energy, new_residual, reaction
-        length *= 0.5
-    return False, energy, residual, 0.0
-
-
-@compiled
-def _correct(
-    motion: Floats, relative: float, absolute: float, system: System, work: Workspace,
-    trial: Floats, counts: Ints,
-) -> bool:  # fmt: skip
-    """Newton descent at fixed held dofs; True once the residual is below its tolerance."""
-    energy, residual, reaction = _residual(motion, system, work)
-    counts[GRADIENTS] += 1
-    for _ in range(MAX_CORRECTIONS):
-        if residual <= max(relative * reaction, absolute):
-            return True
-        shifts = _factorise_shifted(motion, system, work, counts)
-        if shifts < 0:
-            return False
-        _solve_free(system, work, -1.0)
-        found, energy, residual, reaction = _descend(
-            motion, energy, residual, shifts == 0, system, work, trial, counts
-        )
-        if not found:
-            return False
-    return False
-
-
-@compiled
-def _solve_free(system: System, work: Workspace, sign: float) -> None:
-    """Solves for the free dofs of ``work.step`` with right-hand side ``sign`` times the force."""
-    for i in range(len(system.dofs)):
-        work.right[i] = sign * work.force[system.dofs[i]]
-    solve(work.matrix, work.right)
-    for d in system.held:
-        work.step[d] = 0.0
-    for i in range(len(system.dofs)):
-        work.step[system.dofs[i]] = work.right[i]
+EASY = 5
+"""Factorisations of a correction after which the next increment is doubled."""
+MAX_SADDLES = 4
 
 
 @compiled
@@ -138,31 +46,75 @@ def _predict(motion: Floats, load: Floats, share: float, system: System, work: W
         d = system.held[i]
         work.product[d] = (load[i] - motion[d]) * share
     hessian_product(motion, system, work.turn, work.product, work.force)
-    _solve_free(system, work, -1.0)
+    solve_free(system, work)
     for d in system.held:
         work.step[d] = work.product[d]
 
 
 @compiled
-def _advance(
-    motion: Floats, load: Floats, relative: float, absolute: float, increment: float,
-    system: System, work: Workspace, saved: Floats, trial: Floats, counts: Ints,
-) -> tuple[float, float]:  # fmt: skip
-    """Follows the path to one load.
+def _length(one: Floats, other: Floats, system: System) -> float:
+    """Distance of the free dofs of two motions, mm."""
+    total = 0.0
+    for d in system.dofs:
+        total += ((one[d] - other[d]) * system.scale[d]) ** 2
+    return np.sqrt(total)
+
+
+@compiled
+def _settle(
+    motion: Floats, predicted: float, relative: float, absolute: float, system: System,
+    work: Workspace, counts: Ints,
+) -> tuple[bool, bool]:  # fmt: skip
+    """Corrects a motion that was predicted over the length ``predicted``.
 
     Returns:
-        the fraction of the way reached, with ``motion`` there, and the increment to go on with.
+        whether it is in balance now, and whether that was smooth.
     """
-    done = 0.0
+    shifted = counts[SHIFTED]
+    work.guess[:] = motion
+    found = correct(motion, relative, absolute, system, work, counts)
+    short = _length(motion, work.guess, system) <= SHORT * predicted
+    return found, short and counts[SHIFTED] == shifted
+
+
+@compiled
+def _stabilise(
+    motion: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints
+) -> tuple[bool, bool]:
+    """Leaves the saddles that ``motion`` may be on, and factorises the tangent.
+
+    Returns:
+        whether the tangent is positive definite, and whether a saddle was left.
+    """
+    for saddles in range(MAX_SADDLES):
+        if factorise_tangent(motion, system, work, 0.0, counts):
+            return True, saddles > 0
+        leave_saddle(motion, system, work, counts)
+        if not correct(motion, relative, absolute, system, work, counts):
+            return False, True
+    return factorise_tangent(motion, system, work, 0.0, counts), True
+
+
+@compiled
+def _advance(
+    motion: Floats, load: Floats, relative: float, absolute: float, increment: float,
+    system: System, work: Workspace, counts: Ints,
+) -> tuple[float, float, bool]:  # fmt: skip
+    """Follows the path to one load; the workspace holds a factor of the tangent before and after.
+
+    Returns:
+        the fraction of the way reached, with ``motion`` there; the increment to go on with; and
+        whether the structure jumped.
+    """
+    done, jumped = 0.0, False
     while done < 1.0:
-        saved[:] = motion
+        work.saved[:] = motion
         counts[INCREMENTS] += 1
-        usable = _factorise_shifted(motion, system, work, counts) >= 0
         ahead = min(increment, 1.0 - done)
         _predict(motion, load, ahead / (1.0 - done), system, work)
         allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
-        if allowed * ahead < SMALLEST_INCREMENT:  # held units drive a void into its barrier
-            return done, increment
+        if not allowed * ahead >= SMALLEST_INCREMENT:  # held units drive a void into its barrier
+            return done, increment, jumped
         motion += allowed * work.step
         last = allowed == 1.0 and ahead == 1.0 - done
         if last:
@@ -170,47 +122,91 @@ def _advance(
                 motion[system.held[i]] = load[i]
         before = counts[FACTORS]
         wanted = relative if last else ON_THE_WAY
-        if usable and _correct(motion, wanted, absolute, system, work, trial, counts):
+        predicted = _length(motion, work.saved, system)
+        found, smooth = _settle(motion, predicted, wanted, absolute, system, work, counts)
+        if found and not smooth and allowed * ahead <= SMALLEST_SMOOTH:
+            found, _ = _stabilise(motion, wanted, absolute, system, work, counts)
+            smooth = jumped = True
+        if found and smooth:
             done = 1.0 if last else done + allowed * ahead
-            if counts[FACTORS] - before <= 5:
+            if counts[FACTORS] - before <= EASY:
                 increment = min(1.0, 2.0 * increment)
         else:
-            motion[:] = saved
+            motion[:] = work.saved
             increment = 0.25 * allowed * ahead
-            if increment < SMALLEST_INCREMENT:
-                return done, increment
-    return done, increment
+            usable = factorise_shifted(motion, system, work, counts) >= 0
+            if increment < SMALLEST_INCREMENT or not usable:
+                return done, increment, jumped
+    return done, increment, jumped
+
+
+@compiled
+def _repeat(
+    motion: Floats, load: Floats, step: Floats, relative: float, absolute: float, system: System,
+    work: Workspace, counts: Ints,
+) -> bool:  # fmt: skip
+    """Goes to a load by a step known from a similar structure; False if that is not smooth."""
+    work.saved[:] = motion
+    if KEEP_FROM_BARRIER * admissible_step(motion, system, step) < 1.0:
+        return False
+    motion += step
+    for i in range(len(system.held)):
+        motion[system.held[i]] = load[i]
+    predicted = _length(motion, work.saved, system)
+    found, smooth = _settle(motion, predicted, relative, absolute, system, work, counts)
+    if not (found and smooth):
+        motion[:] = work.saved
+    return found and smooth
 
 
 @compiled
 def follow(
-    loads: Floats, system: System, relative: float, absolute: float, states: Floats, stable: Ints,
-    counts: Ints,
+    loads: Floats, known: Floats, trusted: Ints, system: System, relative: float, absolute: float,
+    states: Floats, stable: Ints, jumped: Ints, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills ``states`` (n_loads, n_dofs) with the equilibria at ``loads`` (n_loads, n_held).
 
-    ``stable`` (n_loads,) tells whether the tangent there is positive definite; ``counts`` (4,)
-    gathers the work.
+    Args:
+        loads: the path.
+        known: (n_loads, n_dofs) equilibria of a similar structure, whose steps are tried first.
+        trusted: (n_loads,) whether to try them.
+        system: the structure.
+        relative: tolerance of the residual, relative to the largest reaction.
+        absolute: its floor, N.
+        states: filled.
+        stable: (n_loads,) filled: whether the tangent there is positive definite.
+        jumped: (n_loads,) filled: whether the structure jumped on the way there.
+        counts: (4,) gathers the work.
 
     Returns:
         the number of loads reached, and the fraction of the way to the next.
     """
     work = workspace(system)
-    motion = np.zeros(len(system.mass))
-    saved, trial = np.empty_like(motion), np.empty_like(motion)
+    motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
     # rest itself may be out of balance: a void may start in contact
-    if not _correct(motion, relative, absolute, system, work, trial, counts):
+    if not correct(motion, relative, absolute, system, work, counts):
         return 0, 0.0
+    positive, left = _stabilise(motion, relative, absolute, system, work, counts)
+    jumped[0] = left
     increment = 1.0
     for p in range(len(loads)):
-        done, increment = _advance(
-            motion, loads[p], relative, absolute, increment, system, work, saved, trial, counts
-        )
+        done, leapt = 0.0, False
+        if trusted[p]:
+            step[:] = known[p] - known[p - 1] if p > 0 else known[p] - motion
+            if _repeat(motion, loads[p], step, relative, absolute, system, work, counts):
+                done = 1.0
+            else:
+                factorise_shifted(motion, system, work, counts)
+        if done < 1.0:
+            done, increment, leapt = _advance(
+                motion, loads[p], relative, absolute, increment, system, work, counts
+            )
         states[p] = motion
         if done < 1.0:
             return p, done
-        counts[FACTORS] += 1
-        stable[p] = _factorise(motion, system, work, 0.0)
+        positive, left = _stabilise(motion, relative, absolute, system, work, counts)
+        states[p], stable[p] = motion, positive
+        jumped[p] = jumped[p] or leapt or left
     return len(loads), 0.0
 
 
@@ -222,13 +218,14 @@ def adjoint(states: Floats, bar: Floats, system: System, which: Ints, bars: Bars
         the first load whose tangent is not positive definite, or -1.
     """
     work = workspace(system)
+    counts = np.zeros(4, dtype=np.int64)
     for p in range(len(states)):
         if np.abs(bar[p]).max() == 0.0:
             continue
-        if not _factorise(states[p], system, work, 0.0):
+        if not factorise_tangent(states[p], system, work, 0.0, counts):
             return p
         work.force[:] = bar[p]
-        _solve_free(system, work, -1.0)
+        solve_free(system, work)
         mixed(states[p], system, work.turn, work.step, which, bars.sensitivity)
         hessian_product(states[p], system, work.turn, work.step, work.product)
         for i in range(len(system.held)):

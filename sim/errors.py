@@ -1,5 +1,9 @@
 """Errors that a solve may end with; each says where it failed and what to try."""
 
+from __future__ import annotations
+
+from sim.arrays import Floats
+
 
 class SimulationError(RuntimeError):
     """A solve could not reach its tolerance.
@@ -8,9 +12,17 @@ class SimulationError(RuntimeError):
         reason: what failed, where (step, worst unit) and what to try, in one sentence.
         step: index of the failed time or load step, or None.
         unit: id of the unit with the largest residual, or None.
+        states: (n_reached, n_dofs) what was computed before, or None.
     """
 
-    def __init__(self, reason: str, step: int | None = None, unit: int | None = None) -> None:
+    def __init__(
+        self,
+        reason: str,
+        step: int | None = None,
+        unit: int | None = None,
+        states: Floats | None = None,
+    ) -> None:
         super().__init__(reason)
         self.step = step
         self.unit = unit
+        self.states = states

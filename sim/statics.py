@@ -21,11 +21,14 @@ class Record:
     Attributes:
         states: (n_asked, n_dofs) equilibria.
         stable: (n_asked,) whether each is a minimum of the energy.
+        jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
+            point or branched.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
     """
 
     states: Floats
     stable: Ints
+    jumped: Ints
     counts: Ints
 
 
@@ -41,6 +44,9 @@ class StaticSolver:
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
         threads: cases solved side by side.
+        start: of a similar structure under the same drive, whose steps between the asked loads are
+            tried before the path is followed step by step; of the result they change no more than
+            the tolerance allows. Where that structure jumped its step is not tried.
     """
 
     topology: Topology
@@ -48,6 +54,7 @@ class StaticSolver:
     relative: float = 1e-10
     absolute: float = 1e-11
     threads: int = 1
+    start: Record | None = None
 
     def refined(self, record: Record) -> StaticSolver:
         """The same to a hundred times tighter a tolerance: equilibria have no steps to halve."""
@@ -59,20 +66,33 @@ class StaticSolver:
         top = self.topology
         loads = drive.values(top.held, self.asked)
         states = np.zeros((len(loads), top.n_dofs))
-        stable, counts = np.zeros(len(loads), dtype=np.int64), np.zeros(4, dtype=np.int64)
+        stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
+        counts = np.zeros(4, dtype=np.int64)
+        known, trusted = self._known(states)
         system = system_of(top, values)
         reached, fraction = follow(
-            loads, system, self.relative, self.absolute, states, stable, counts
-        )
+            loads, known, trusted, system, self.relative, self.absolute, states, stable, jumped,
+            counts,
+        )  # fmt: skip
         if reached < len(loads):
+            where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()
+            unit = int(top.ligament_units[where, 0])
             raise SimulationError(
                 f"no equilibrium found beyond load {reached} of {len(loads)} (at {fraction:.3g} of"
-                " the way to the next): a limit point or jammed contact; try a smaller load or"
-                " more load steps",
+                f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
+                " stable state; try a smaller load or more load steps",
                 step=reached,
+                unit=unit,
+                states=states[:reached],
             )
-        record = Record(states, stable, counts)
+        record = Record(states, stable, jumped, counts)
         return states.copy(), np.zeros_like(states), record
+
+    def _known(self, states: Floats) -> tuple[Floats, Ints]:
+        """States of the start, and whether to try the step to each."""
+        if self.start is None or self.start.states.shape != states.shape:
+            return states, np.zeros(len(states), dtype=np.int64)
+        return self.start.states, 1 - self.start.jumped
 
     def backward(
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats

@@ -45,7 +45,7 @@ class Workspace(NamedTuple):
 
     Attributes:
         turn: (n_units, 4) of the kernels.
-        force, step, product: (n_dofs,).
+        force, step, product, trial, saved, guess: (n_dofs,).
         right: (n_free,).
         matrix: the tangent, then its factor.
     """
@@ -54,6 +54,9 @@ class Workspace(NamedTuple):
     force: Floats
     step: Floats
     product: Floats
+    trial: Floats
+    saved: Floats
+    guess: Floats
     right: Floats
     matrix: Matrix
 
@@ -79,6 +82,9 @@ def workspace(system: System) -> Workspace:
     n_dofs, n_free = len(system.mass), len(system.dofs)
     return Workspace(
         np.empty((n_dofs // 3, 4)),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
         np.empty(n_dofs),
         np.empty(n_dofs),
         np.empty(n_dofs),
