@@ -95,12 +95,12 @@ def counted(scene: Scene, solver: Solver, cases: list[int]) -> dict[str, int]:
     records = [solve_case(solver, values, scene.drives[case])[2] for case in cases]
     total: dict[str, int] = {}
     for record in records:
-        for what, count in _work(record).items():
+        for what, count in work_of(record).items():
             total[what] = total.get(what, 0) + count
     return total
 
 
-def _work(record: object) -> dict[str, int]:
+def work_of(record: object) -> dict[str, int]:
     """What the forward solve of one case did."""
     match record:
         case explicit.Record():

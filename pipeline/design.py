@@ -84,6 +84,7 @@ def optimise(
     from sim.errors import SimulationError
     from sim.evaluation import evaluator
     from sim.optimise import InfeasibleStartError, Journal, JournalInUseError, minimise
+    from sim.optimise.paths import Paths
 
     budget = asked.optimiser.methods.chosen.get(method)
     if budget is None:
@@ -96,9 +97,11 @@ def optimise(
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
+    paths = Paths(folder / f"{method}.paths")
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
 
         def show(evaluation: Evaluation) -> None:
+            paths.accept(evaluation)
             bar.update(loss=evaluation.loss, violation=evaluation.violation)
 
         try:
@@ -107,7 +110,7 @@ def optimise(
             ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
-                    journal.wrap(evaluator(scene, plan)),
+                    journal.wrap(evaluator(scene, plan, paths)),
                     Constraints(scene.space, limits_of(asked)),
                     np.zeros(scene.space.n_variables),
                     options=_options(asked, method),

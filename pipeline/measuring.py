@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,8 +18,10 @@ Places = NDArray[np.int64]
 
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
-NOT_ASKED = -1
-"""Flag of the stability of states that are no equilibria."""
+NOT_ASKED, UNSTABLE, STABLE, JUMPED = -1, 0, 1, 2
+"""Stability of a state: no equilibrium; no minimum of the energy; a minimum; one that the structure
+jumped to from where its path ended."""
+LOG = logging.getLogger(__name__)
 
 
 class Structure(NamedTuple):
@@ -149,6 +152,11 @@ def _at_stride(values: NDArray[np.generic], stride: int, size: int) -> Floats:
 def _stability(solved: Solved, at: Places) -> NDArray[np.int8]:
     from sim.statics import Record
 
-    if isinstance(solved.record, Record):
-        return solved.record.stable[at].astype(np.int8)
+    record = solved.record
+    if isinstance(record, Record):
+        flags = np.where(record.stable == 1, np.where(record.jumped == 1, JUMPED, STABLE), UNSTABLE)
+        for flag, what in ((UNSTABLE, "is not stable"), (JUMPED, "was reached by a jump")):
+            if len(which := np.flatnonzero(flags == flag)):
+                LOG.warning("the equilibrium %s at load %s of %d", what, which + 1, len(flags))
+        return flags[at].astype(np.int8)
     return np.full(len(at), NOT_ASKED, dtype=np.int8)

@@ -157,14 +157,17 @@ class Pulled(NamedTuple):
 
 
 def forward(
-    solver: Solver, values: Values, drives: Sequence[Drive]
+    solver: Solver, values: Values, drives: Sequence[Drive], solvers: Sequence[Solver] | None = None
 ) -> tuple[Floats, Floats, Records]:
     """Displacement and velocity (n_cases, n_asked, n_units, 3) of all cases, and their records.
+
+    With ``solvers`` (n_cases,) each case is solved by its own, otherwise alike.
 
     Raises:
         SimulationError: a step failed.
     """
-    results = _spread(lambda drive: solve_case(solver, values, drive), drives, solver.threads)
+    jobs = list(zip(solvers or [solver] * len(drives), drives, strict=True))
+    results = _spread(lambda job: solve_case(job[0], values, job[1]), jobs, solver.threads)
     shape = (len(drives), -1, solver.topology.n_units, 3)
     displacement = np.stack([u for u, _, _ in results]).reshape(shape)
     velocity = np.stack([v for _, v, _ in results]).reshape(shape)

@@ -161,19 +161,21 @@ def _repeat(
 
 @compiled
 def follow(
-    loads: Floats, known: Floats, trusted: Ints, system: System, relative: float, absolute: float,
-    states: Floats, stable: Ints, jumped: Ints, counts: Ints,
+    loads: Floats, bends: Floats, trusted: Ints, system: System, relative: float, absolute: float,
+    states: Floats, tangents: Floats, stable: Ints, jumped: Ints, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
     """Fills ``states`` (n_loads, n_dofs) with the equilibria at ``loads`` (n_loads, n_held).
 
     Args:
         loads: the path.
-        known: (n_loads, n_dofs) equilibria of a similar structure, whose steps are tried first.
-        trusted: (n_loads,) whether to try them.
+        bends: (n_loads, n_dofs) by how much the path of a similar structure departs from its
+            tangent between two loads, to be tried first.
+        trusted: (n_loads,) whether to try that.
         system: the structure.
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
         states: filled.
+        tangents: (n_loads, n_dofs) filled: step to each load along the tangent at the one before.
         stable: (n_loads,) filled: whether the tangent there is positive definite.
         jumped: (n_loads,) filled: whether the structure jumped on the way there.
         counts: (4,) gathers the work.
@@ -191,8 +193,10 @@ def follow(
     increment = 1.0
     for p in range(len(loads)):
         done, leapt = 0.0, False
+        _predict(motion, loads[p], 1.0, system, work)
+        tangents[p] = work.step
         if trusted[p]:
-            step[:] = known[p] - known[p - 1] if p > 0 else known[p] - motion
+            step[:] = work.step + bends[p]
             if _repeat(motion, loads[p], step, relative, absolute, system, work, counts):
                 done = 1.0
             else:

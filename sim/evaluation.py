@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,7 @@ from sim.objectives import (
 )
 from sim.plan import Plan, concrete_parameters, make_plan
 from sim.scene import Scene
+from sim.statics import Record, StaticSolver
 
 Objective = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
 
@@ -101,8 +104,24 @@ def losses(scene: Scene, plan: Plan) -> Callable[[Array], Array]:
     return of_cases
 
 
-def evaluator(scene: Scene, plan: Plan) -> Callable[[Floats], tuple[float, Floats, Floats]]:
+class Memory(Protocol):
+    """Remembers the equilibrium paths of designs, to start similar ones from."""
+
+    def start(self) -> Sequence[Record] | None:
+        """Records (n_cases,) to start the next evaluation from, if any."""
+        ...
+
+    def keep(self, design: Floats, records: Sequence[Record]) -> None:
+        """Takes the records of an evaluation."""
+        ...
+
+
+def evaluator(
+    scene: Scene, plan: Plan, memory: Memory | None = None
+) -> Callable[[Floats], tuple[float, Floats, Floats]]:
     """Function from a design vector to loss, gradient (n_variables,) and losses of all cases.
+
+    With a ``memory`` the paths of a static scene start from those that it offers.
 
     It raises ``SimulationError`` where the simulation fails.
     """
@@ -113,7 +132,7 @@ def evaluator(scene: Scene, plan: Plan) -> Callable[[Floats], tuple[float, Float
         each = measure(displacement, values)[place]
         return weights @ each, each
 
-    return value_and_gradient(structure(scene), mean, plan.solver, drives)
+    return value_and_gradient(structure(scene), mean, plan.solver, drives, memory)
 
 
 def _simulated(scene: Scene, plan: Plan) -> tuple[tuple[Drive, ...], Ints]:
@@ -127,6 +146,7 @@ def value_and_gradient(
     measure: Callable[[Array, Parameters[Array]], tuple[Array, Array]],
     solver: Solver,
     drives: tuple[Drive, ...],
+    memory: Memory | None = None,
 ) -> Callable[[Floats], tuple[float, Floats, Floats]]:
     """Compiled chain design -> parameters -> motion -> value, with its gradient.
 
@@ -138,6 +158,7 @@ def value_and_gradient(
             parameters.
         solver: of the motion.
         drives: of the cases.
+        memory: of equilibrium paths, for static solvers.
     """
     forwards = jax.jit(of_design)
     measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
@@ -146,7 +167,11 @@ def value_and_gradient(
     def evaluate(design: Floats) -> tuple[float, Floats, Floats]:
         made = forwards(design)
         values = Values(*(np.asarray(part) for part in made))
-        motion, velocity, records = dynamics.forward(solver, values, drives)
+        motion, velocity, records = dynamics.forward(
+            solver, values, drives, _started(solver, memory)
+        )
+        if memory is not None and isinstance(solver, StaticSolver):
+            memory.keep(design, records.records)
         (value, more), (bar_motion, direct) = measured(motion, made)
         through = dynamics.backward(
             solver, records, np.asarray(bar_motion), np.zeros_like(velocity)
@@ -155,3 +180,11 @@ def value_and_gradient(
         return float(value), np.asarray(pull_back(design, bar)), np.asarray(more)
 
     return evaluate
+
+
+def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
+    """A solver for each case that starts from the path remembered, if there is one."""
+    if memory is None or not isinstance(solver, StaticSolver):
+        return None
+    records = memory.start()
+    return None if records is None else [replace(solver, start=record) for record in records]

@@ -41,6 +41,19 @@ class Pattern(NamedTuple):
         n, width = self.size
         return int(self.fronts.panel[-1]) if self.by_fronts else int(n * (width + 1))
 
+    @property
+    def n_dofs(self) -> int:
+        """Size of the matrix."""
+        return int(self.size[0])
+
+    def describe(self) -> str:
+        """How it is stored, in words."""
+        if self.by_fronts:
+            kind = f"{len(self.fronts.update)} fronts of a nested dissection"
+        else:
+            kind = f"a band of half width {self.size[1]}"
+        return f"{self.n_dofs} dofs, {kind}, {self.n_values} numbers"
+
 
 class Matrix(NamedTuple):
     """A symmetric matrix, or its Cholesky factor.

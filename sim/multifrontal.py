@@ -51,7 +51,7 @@ def factorise_fronts(values: Floats, scratch: Floats, fronts: Fronts) -> bool:
             _add_child(fronts.children[c], k, b, panel, block, scratch, fronts)
         own[0], rest[0], whole[0] = k, b, k + b
         dpotrf(lower.ctypes, own.ctypes, panel.ctypes, whole.ctypes, info.ctypes)
-        if info[0] != 0 or not np.isfinite(panel[0]):
+        if info[0] != 0 or not np.isfinite(panel[(k - 1) * (k + b) + k - 1]):  # NaN spreads there
             return False
         if b == 0:
             continue

@@ -137,6 +137,7 @@ def make_plan(
     if scene.static:
         integrator: Literal["static", "implicit", "explicit"] = "static"
         solver = StaticSolver(scene.topology, times, threads=threads)
+        decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:
         integrator = _choose(scene, values, decisions)

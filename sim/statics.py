@@ -20,6 +20,7 @@ class Record:
 
     Attributes:
         states: (n_asked, n_dofs) equilibria.
+        tangents: (n_asked, n_dofs) step to each along the path's tangent at the one before.
         stable: (n_asked,) whether each is a minimum of the energy.
         jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
             point or branched.
@@ -27,6 +28,7 @@ class Record:
     """
 
     states: Floats
+    tangents: Floats
     stable: Ints
     jumped: Ints
     counts: Ints
@@ -46,7 +48,9 @@ class StaticSolver:
         threads: cases solved side by side.
         start: of a similar structure under the same drive, whose steps between the asked loads are
             tried before the path is followed step by step; of the result they change no more than
-            the tolerance allows. Where that structure jumped its step is not tried.
+            the tolerance allows. Where that structure jumped its step is not tried. A step is the
+            tangent's, bent as it was there.
+        substeps: loads to pass on the way to each asked one, that one included.
     """
 
     topology: Topology
@@ -55,44 +59,59 @@ class StaticSolver:
     absolute: float = 1e-11
     threads: int = 1
     start: Record | None = None
+    substeps: int = 1
 
     def refined(self, record: Record) -> StaticSolver:
-        """The same to a hundred times tighter a tolerance: equilibria have no steps to halve."""
+        """One that passes twice the loads, each to a hundred times tighter a tolerance."""
         del record
-        return replace(self, relative=self.relative / 100)
+        return replace(self, relative=self.relative / 100, start=None, substeps=2 * self.substeps)
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
-        loads = drive.values(top.held, self.asked)
-        states = np.zeros((len(loads), top.n_dofs))
+        loads = drive.values(top.held, self._passed)
+        states, tangents = (np.zeros((len(loads), top.n_dofs)) for _ in range(2))
         stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
         counts = np.zeros(4, dtype=np.int64)
-        known, trusted = self._known(states)
+        bends, trusted = self._known(states)
         system = system_of(top, values)
         reached, fraction = follow(
-            loads, known, trusted, system, self.relative, self.absolute, states, stable, jumped,
-            counts,
+            loads, bends, trusted, system, self.relative, self.absolute, states, tangents, stable,
+            jumped, counts,
         )  # fmt: skip
         if reached < len(loads):
             where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()
             unit = int(top.ligament_units[where, 0])
             raise SimulationError(
-                f"no equilibrium found beyond load {reached} of {len(loads)} (at {fraction:.3g} of"
+                f"no equilibrium found beyond load {reached // self.substeps} of"
+                f" {len(self.asked)} (at {fraction:.3g} of"
                 f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
                 " stable state; try a smaller load or more load steps",
-                step=reached,
+                step=reached // self.substeps,
                 unit=unit,
-                states=states[:reached],
+                states=states[:reached][self.substeps - 1 :: self.substeps],
             )
-        record = Record(states, stable, jumped, counts)
-        return states.copy(), np.zeros_like(states), record
+        last = slice(self.substeps - 1, None, self.substeps)
+        on_the_way = jumped.reshape(-1, self.substeps).max(axis=1)
+        record = Record(
+            states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts
+        )
+        return states[last].copy(), np.zeros_like(states[last]), record
+
+    @property
+    def _passed(self) -> Floats:
+        """(n_asked * substeps,) load parameters of all loads passed; the path starts at zero."""
+        way = np.diff(self.asked, prepend=0.0)
+        left = np.arange(self.substeps - 1, -1, -1) / self.substeps
+        return (self.asked[:, None] - way[:, None] * left).ravel()
 
     def _known(self, states: Floats) -> tuple[Floats, Ints]:
-        """States of the start, and whether to try the step to each."""
-        if self.start is None or self.start.states.shape != states.shape:
+        """Departure of the start's path from its tangents, and where it may serve."""
+        start = self.start
+        if start is None or start.states.shape != states.shape:
             return states, np.zeros(len(states), dtype=np.int64)
-        return self.start.states, 1 - self.start.jumped
+        steps = np.diff(start.states, axis=0, prepend=0.0)
+        return steps - start.tangents, 1 - start.jumped
 
     def backward(
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats

@@ -218,7 +218,7 @@ _RESPONSE: Table = {
         "1",
         "whether a state of equilibrium is a minimum of the energy",
         "int8",
-        flags={"not_asked": -1, "unstable": 0, "stable": 1},
+        flags={"not_asked": -1, "unstable": 0, "stable": 1, "stable_after_a_jump": 2},
     ),
     "min_gap": Variable(_OF_CASE, "mm", "smallest gap between units over the history"),
     "overlaps": Variable(_OF_CASE, "1", "overlapping pairs of units over the history", "int64"),

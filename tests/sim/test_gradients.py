@@ -71,10 +71,10 @@ def shaken(bias_deg: float = 20.0, recorded: bool = False) -> Rig:
 
 
 @cache
-def squeezed(depth: float) -> Rig:
-    """5 x 5 squares between plates, of which one moves in."""
-    left = 5 * np.arange(5)
-    return Rig(rotating_squares(), left, left + 4, LinearRamp(-depth, 1.0))
+def squeezed(depth: float, side: int = 5) -> Rig:
+    """Squares between plates, of which one moves in."""
+    left = side * np.arange(side)
+    return Rig(rotating_squares(side), left, left + side - 1, LinearRamp(-depth, 1.0))
 
 
 @cache
@@ -163,6 +163,13 @@ def assert_exact_in_contact(ray: Ray) -> None:
 def test_equilibria(quantity: str) -> None:
     rig = squeezed(4.0)
     assert_exact(Ray(rig, SOLVERS["static"](rig), quantity))
+
+
+def test_equilibria_by_fronts() -> None:
+    """30 x 30 squares, whose tangent is no longer stored as a band."""
+    rig = squeezed(20.0, side=30)
+    assert rig.topology.numbering[1].by_fronts
+    assert_exact(Ray(rig, SOLVERS["static"](rig), "design"))
 
 
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])

@@ -1,13 +1,19 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from sim import kernels
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
-from sim.loads import LinearRamp, TimeSeries
+from sim.lattice import quads
+from sim.loads import LinearRamp, Motion, TimeSeries
+from sim.matrix import number_free_dofs
+from sim.model import Values
 from sim.statics import StaticSolver
 from sim.system import system_of, workspace
 from tests.sim.structures import BARRIER, CUTOFF, NONE, Rig, mixed_polygons, rotating_squares
@@ -141,8 +147,94 @@ def test_nan_never_leaves(broken: str) -> None:
         solve_case(StaticSolver(rig.topology, np.array([0.6, 1.0])), values, drive)
 
 
-def test_an_unstable_equilibrium_is_known_and_has_no_gradient() -> None:
-    """One unit on two stretched ligaments cannot buckle here; the record says so for each load."""
+def test_a_smooth_path_is_stable_and_has_no_jump() -> None:
     rig = squeezed(9.0)
     record = StaticSolver(rig.topology, np.array([0.5, 1.0])).forward(rig.values, rig.drive)[2]
     np.testing.assert_array_equal(record.stable, 1)
+    np.testing.assert_array_equal(record.jumped, 0)
+
+
+def chain(motion: Motion, driven: Ints) -> Rig:
+    """Nine squares in a straight line, the first of them clamped."""
+    return Rig(quads(9, 1, 15.0, 2.25, 0.0), np.array([0]), driven, motion)
+
+
+def test_a_straight_chain_buckles_and_says_so() -> None:
+    """Exactly straight it stays in balance beyond the branching, but not in a minimum."""
+    rig = chain(LinearRamp(-6.0, 1.0), np.array([8]))
+    record = StaticSolver(rig.topology, np.linspace(0.1, 1.0, 10)).forward(rig.values, rig.drive)[2]
+    lateral = np.abs(record.states.reshape(10, 9, 3)[:, :, 1]).max(axis=1)
+    first = int(np.flatnonzero(record.jumped)[0])
+    np.testing.assert_array_equal(record.stable, 1)
+    assert record.jumped.sum() == 1
+    assert (lateral[:first] < 1e-9).all()
+    assert (lateral[first:] > 1.0).all()
+
+
+def snapping() -> Rig:
+    """A chain pushed together with its middle to one side, which then moves to the other side."""
+    times = np.array([0.0, 1.0, 2.0])
+    middle, end = [[0, 0, 0], [-3, 5, 0], [-3, -5, 0]], [[0, 0, 0], [-6, 0, 0], [-6, 0, 0]]
+    motion = np.stack([middle, end], axis=1).astype(float)
+    return chain(TimeSeries(times, motion), np.array([4, 8]))
+
+
+def test_a_snap_is_recorded_and_ends_in_a_minimum() -> None:
+    rig, loads = snapping(), np.linspace(0.0, 2.0, 21)[1:]
+    record = StaticSolver(rig.topology, loads).forward(rig.values, rig.drive)[2]
+    np.testing.assert_array_equal(record.stable, 1)
+    assert (loads[record.jumped == 1] > 1.0).any()
+    for state in record.states:
+        assert np.abs(out_of_balance(rig, state)).max() < 1e-8
+
+
+def test_more_loads_on_the_way_change_nothing() -> None:
+    rig, loads = squeezed(9.0), np.array([0.3, 0.7, 1.0])
+    solver = StaticSolver(rig.topology, loads)
+    states, _, record = solver.forward(rig.values, rig.drive)
+    for finer in (solver.refined(record), replace(solver, substeps=10)):
+        np.testing.assert_allclose(
+            finer.forward(rig.values, rig.drive)[0], states, rtol=0, atol=1e-8
+        )
+
+
+def changed(rig: Rig) -> Values:
+    """Values of the rig with its vertices moved at random by up to 0.3 mm."""
+    rng = np.random.default_rng(0)
+    design = rng.uniform(-0.3, 0.3, rig.space.n_variables)
+    made = rig.parameters(rig.numbers._replace(design=jnp.asarray(design)))
+    return Values(*(np.asarray(part) for part in made))
+
+
+def test_a_path_known_from_a_similar_structure_saves_work_and_changes_nothing() -> None:
+    rig, loads = squeezed(9.0), np.linspace(0.1, 1.0, 10)
+    solver, values = StaticSolver(rig.topology, loads), changed(rig)
+    similar = solver.forward(rig.values, rig.drive)[2]
+    cold = solver.forward(values, rig.drive)[2]
+    warm = replace(solver, start=similar).forward(values, rig.drive)[2]
+    np.testing.assert_allclose(warm.states, cold.states, rtol=0, atol=1e-8)
+    assert warm.counts[1] < cold.counts[1]
+
+
+def test_a_known_path_on_another_branch_is_not_followed() -> None:
+    """The start snaps to one side; here the known path is its mirror image."""
+    rig, loads = snapping(), np.linspace(0.0, 2.0, 21)[1:]
+    solver = StaticSolver(rig.topology, loads)
+    cold = solver.forward(rig.values, rig.drive)[2]
+    mirror = np.tile([1.0, -1.0, -1.0], 9)
+    mirrored = replace(cold, states=cold.states * mirror, tangents=cold.tangents * mirror)
+    warm = replace(solver, start=mirrored).forward(rig.values, rig.drive)[2]
+    np.testing.assert_allclose(warm.states, cold.states, rtol=0, atol=1e-7)
+    np.testing.assert_array_equal(warm.jumped, cold.jumped)
+
+
+def test_band_and_fronts_lead_to_the_same_states() -> None:
+    rig, loads = squeezed(9.0), np.array([0.5, 1.0])
+    found = []
+    for by_fronts in (False, True):
+        top = replace(rig.topology)
+        top.__dict__["numbering"] = number_free_dofs(
+            top.site, top.ligament_units, top.held, by_fronts
+        )
+        found.append(StaticSolver(top, loads, relative=1e-13).forward(rig.values, rig.drive)[0])
+    np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-12 * np.abs(found[0]).max())

@@ -1,0 +1,110 @@
+"""Growth of an equilibrium solve with the lattice: squares pushed together by a tenth at once."""
+
+from __future__ import annotations
+
+from functools import cache, partial
+
+import numpy as np
+
+from benchmarks.frame import Benchmark, Candidate, Outcomes, Run, Sample, Target
+from benchmarks.scenes import work_of
+from sim.dynamics import Drive, solve_case
+from sim.geometry import shape
+from sim.lattice import quads
+from sim.loads import LinearRamp, held_dofs
+from sim.matrix import number_free_dofs
+from sim.model import Material, Topology, Values, parameters, topology
+from sim.observables import observe
+from sim.statics import StaticSolver
+
+SIDES = (15, 30, 60, 120)
+COMPRESSION = 0.1
+ALL_IN_BANDS = 60
+"""Largest lattice that is also solved with a band."""
+
+
+def benchmark() -> Benchmark:
+    """The benchmark."""
+    chosen = [Candidate(_name(side), partial(_solve, side), repeats=3) for side in SIDES]
+    banded = [
+        Candidate(f"{_name(side)}, band", partial(_solve, side, by_fronts=False), repeats=2)
+        for side in SIDES
+        if 15 < side <= ALL_IN_BANDS
+    ]
+    return Benchmark(
+        name="static",
+        title="equilibrium at 10 % compression from rest, squares of 15 to 120 units a side",
+        reference=_strict,
+        candidates=(*chosen, *banded),
+        targets=(
+            Target("exponent of time by units, 30 to 120", _exponent, at_most=1.75, aim=1.5),
+            Target("energy error", _worst, at_most=1e-9),
+        ),
+        short=False,
+    )
+
+
+def _name(side: int) -> str:
+    return f"{side} x {side}"
+
+
+def _exponent(found: Outcomes) -> float:
+    small, large = (
+        found[_name(side)].seconds if _name(side) in found else np.nan for side in (30, 120)
+    )
+    return float(np.log(large / small) / np.log((120 / 30) ** 2))
+
+
+def _worst(found: Outcomes) -> float:
+    return max((outcome.error("energy") for outcome in found.values()), default=np.nan)
+
+
+@cache
+def _posed(side: int) -> tuple[Topology, Values, Drive]:
+    """Ligaments 2.3 mm long, the left column clamped, the right one pushed in."""
+    lattice = quads(side, side, 15.0, 2.3, np.deg2rad(20.0))
+    left = side * np.arange(side)
+    right = left + side - 1
+    material = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)
+    made = parameters(lattice, shape(lattice, lattice.vertices), material)
+    posed = topology(lattice, held_dofs(left, right), *np.deg2rad([-15.0, -10.0]))
+    drive = Drive(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
+    return posed, Values(*(np.asarray(part) for part in made)), drive
+
+
+def _strict() -> Run:
+    """The same equilibria at the end of ten loads, each to a hundredth of the usual residual."""
+
+    def run() -> Sample:
+        found: dict[str, np.ndarray] = {}
+        for side in SIDES:
+            top, values, drive = _posed(side)
+            solver = StaticSolver(top, np.ones(1), relative=1e-12, substeps=10)
+            states = solve_case(solver, values, drive)[0]
+            found[f"energy@{side}"] = _energy(top, values, states)
+        return Sample(found, {})
+
+    return run
+
+
+def _solve(side: int, by_fronts: bool | None = None) -> Run:
+    top, values, drive = _posed(side)
+    top.__dict__["numbering"] = number_free_dofs(top.site, top.ligament_units, top.held, by_fronts)
+    solver = StaticSolver(top, np.ones(1))
+
+    def run() -> Sample:
+        states, _, record = solve_case(solver, values, drive)
+        return Sample({f"energy@{side}": _energy(top, values, states)}, work_of(record))
+
+    if side == SIDES[0]:
+        run()  # compiles
+    else:
+        _solve(SIDES[0])
+        drive.values(top.held, solver.asked)
+        drive.rates(top.held, solver.asked)
+    return run
+
+
+def _energy(top: Topology, values: Values, states: np.ndarray) -> np.ndarray:
+    seen = observe(top, values, states.reshape(len(states), -1, 3))
+    return np.asarray(seen.strain_energy[-1] + seen.contact_energy[-1])

@@ -1,0 +1,101 @@
+"""Figure 4's whole path, loss and gradient, along a walk of designs: each start of a solve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks import scenes
+from benchmarks.frame import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
+from sim.evaluation import evaluator
+from sim.plan import make_plan
+from sim.statics import Record, StaticSolver
+
+COLD, WARM = "from rest", "from the last design"
+STEPS, DESIGNS = 10, 10
+STEP = 0.1
+"""Largest change of a vertex from one design to the next, mm; optimisers move less near the end."""
+
+
+def benchmark() -> Benchmark:
+    """The benchmark."""
+    share = float(DESIGNS)
+    return Benchmark(
+        name="warm",
+        title="loss and gradient over 10 load steps of Figure 4, mean of a walk of 10 designs",
+        reference=_strict,
+        candidates=(Candidate(COLD, _cold, share=share), Candidate(WARM, _warm, share=share)),
+        targets=(
+            Target("whole path", seconds_of(COLD), "s", at_most=0.15),
+            Target(
+                "time from the last design over time from rest",
+                lambda found: seconds_of(WARM)(found) / seconds_of(COLD)(found),
+                at_most=1.0,
+            ),
+            Target("loss error", error_of(WARM, "loss"), at_most=1e-9),
+            Target("gradient error", error_of(WARM, "gradient"), at_most=1e-7),
+        ),
+    )
+
+
+class Start:
+    """Offers the last design's path or none, and counts the work of all."""
+
+    def __init__(self, warm: bool) -> None:
+        self.warm = warm
+        self.total: dict[str, int] = {}
+        self._records: Sequence[Record] | None = None
+
+    def start(self) -> Sequence[Record] | None:
+        """The last design's path."""
+        return self._records if self.warm else None
+
+    def keep(self, design: scenes.Floats, records: Sequence[Record]) -> None:
+        """Takes a path."""
+        del design
+        self._records = records
+        for record in records:
+            for what, count in scenes.work_of(record).items():
+                self.total[what] = self.total.get(what, 0) + count
+
+    def forget(self) -> None:
+        """Begins anew."""
+        self._records = None
+        self.total.clear()
+
+
+def _strict() -> Run:
+    return _walk(1e-13, warm=False)
+
+
+def _cold() -> Run:
+    return _walk(1e-10, warm=False)
+
+
+def _warm() -> Run:
+    return _walk(1e-10, warm=True)
+
+
+def _walk(relative: float, warm: bool) -> Run:
+    scene = replace(scenes.fig4(), steps=STEPS)
+    plan = make_plan(scene)
+    assert isinstance(plan.solver, StaticSolver)
+    memory = Start(warm)
+    strict = replace(plan, solver=replace(plan.solver, relative=relative))
+    evaluate = evaluator(scene, strict, memory)
+    rng = np.random.default_rng(0)
+    walk = np.cumsum(rng.uniform(-STEP, STEP, (DESIGNS, scene.space.n_variables)), axis=0)
+
+    def run() -> Sample:
+        memory.forget()
+        values = {}
+        for number, design in enumerate(walk):
+            loss, gradient, _ = evaluate(design)
+            values[f"loss@{number}"] = np.asarray(loss)
+            values[f"gradient@{number}"] = gradient
+        return Sample(values, dict(memory.total))
+
+    run()
+    return run
