@@ -171,21 +171,15 @@ def test_a_straight_chain_buckles_and_says_so() -> None:
     assert (lateral[first:] > 1.0).all()
 
 
-def snapping() -> Rig:
-    """A chain pushed together with its middle to one side, which then moves to the other side."""
+def bowed() -> Rig:
+    """A chain pushed together with its middle to one side, which then moves to the other side.
+
+    Either half may bow to either side.
+    """
     times = np.array([0.0, 1.0, 2.0])
     middle, end = [[0, 0, 0], [-3, 5, 0], [-3, -5, 0]], [[0, 0, 0], [-6, 0, 0], [-6, 0, 0]]
     motion = np.stack([middle, end], axis=1).astype(float)
     return chain(TimeSeries(times, motion), np.array([4, 8]))
-
-
-def test_a_snap_is_recorded_and_ends_in_a_minimum() -> None:
-    rig, loads = snapping(), np.linspace(0.0, 2.0, 21)[1:]
-    record = StaticSolver(rig.topology, loads).forward(rig.values, rig.drive)[2]
-    np.testing.assert_array_equal(record.stable, 1)
-    assert (loads[record.jumped == 1] > 1.0).any()
-    for state in record.states:
-        assert np.abs(out_of_balance(rig, state)).max() < 1e-8
 
 
 def test_more_loads_on_the_way_change_nothing() -> None:
@@ -217,8 +211,8 @@ def test_a_path_known_from_a_similar_structure_saves_work_and_changes_nothing() 
 
 
 def test_a_known_path_on_another_branch_is_not_followed() -> None:
-    """The start snaps to one side; here the known path is its mirror image."""
-    rig, loads = snapping(), np.linspace(0.0, 2.0, 21)[1:]
+    """The halves bow at the first load; the known path is that of a chain bowed the other way."""
+    rig, loads = bowed(), np.linspace(0.0, 2.0, 21)[1:]
     solver = StaticSolver(rig.topology, loads)
     cold = solver.forward(rig.values, rig.drive)[2]
     mirror = np.tile([1.0, -1.0, -1.0], 9)
