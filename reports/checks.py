@@ -70,7 +70,7 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
         label = f"Pairs in contact, {name}"
         yield number(f"contact_pairs_{name}", label, touching, note="at the end of the path")
         yield from _stability(name, part)
-    yield _shim_strain(problem, response.sel(structure="cloaked"))
+        yield _shim_strain(problem, name, part)
 
 
 def _stability(name: str, part: xr.Dataset) -> Iterator[Fact]:
@@ -81,20 +81,22 @@ def _stability(name: str, part: xr.Dataset) -> Iterator[Fact]:
         yield number(f"unstable_{name}", label, count, note=note)
 
 
-def _shim_strain(problem: Problem, part: xr.Dataset) -> Fact:
-    """Upper bound of a shim's largest strain, as that of a beam between two rigid units."""
-    shims = problem.fabrication.shims
+def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
+    """Largest strain of a shim as a foil bent by the turn of its ends, against the limit."""
     length, limit = problem.lattice.ligament_length, problem.report.shim_strain_limit
+    slenderness = problem.fabrication.shims.thickness / length
     stretch, shear, bend = (
-        float(part[name].max()) for name in ("max_stretch", "max_shear", "max_bend")
+        float(part[each].max()) for each in ("max_stretch", "max_shear", "max_bend")
     )
-    strain = beam_strain(stretch, shear, bend, shims.thickness / length)
+    strain = beam_strain(stretch, 0.0, bend, slenderness)
+    whole = beam_strain(stretch, shear, bend, slenderness)
     note = (
-        f"upper bound for foil of {shims.thickness:g} mm: stretch {stretch:.2g}, relative turn "
-        f"{np.degrees(bend):.3g}°, shear {np.degrees(shear):.3g}°; limit {percent(limit)}: "
+        f"foil of {problem.fabrication.shims.thickness:g} mm, stretched by {percent(stretch)} and "
+        f"bent by {np.degrees(bend):.3g}°; up to {percent(whole)} where the shear of "
+        f"{np.degrees(shear):.3g}° bends it too; limit {percent(limit)}: "
         + ("kept" if strain <= limit else "exceeded")
     )
-    return share("shim_strain", "Largest shim strain, cloaked", strain, note=note)
+    return share(f"shim_strain_{name}", f"Largest shim strain, {name}", strain, note=note)
 
 
 def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -> float:

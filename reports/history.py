@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -45,7 +46,7 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
     aside = at < loss.size / 2  # where another method's curve may run below
-    axes.annotate(
+    label = axes.annotate(
         f"{best:.3f}",
         (at, best),
         xytext=(3, 2) if aside else (0, -4.5),
@@ -54,4 +55,6 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
         va="bottom" if aside else "top",
         fontsize=style.SMALL,
         color=colour,
+        zorder=7,
     )
+    label.set_path_effects([effects.withStroke(linewidth=1.5, foreground="white")])

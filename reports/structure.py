@@ -1,7 +1,7 @@
 """Draws a structure of rigid units at true size, at rest or deformed.
 
 A unit moves as a rigid body: vertex = centroid + u + R(theta) (vertex - centroid). Units are one
-PolyCollection and ligaments one LineCollection, so that a figure of a dozen structures stays small.
+PolyCollection and ligaments one broken line, so that a figure of a dozen structures stays small.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import Colormap, Normalize
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 from numpy.typing import NDArray
 
@@ -122,7 +123,9 @@ def draw(
     corners = deformed(structure, displacement)
     kept = structure.present
     ends = corners[structure.ligament_unit, structure.ligament_vertex]
-    axes.add_collection(LineCollection(list(ends), colors=GREY, linewidths=0.3, zorder=2))
+    gaps = np.full((len(ends), 1, 2), np.nan)  # one broken line is a fraction of many in a file
+    x, y = np.concatenate([ends, gaps], axis=1).reshape(-1, 2).T
+    axes.add_line(Line2D(x, y, color=GREY, linewidth=0.3, solid_capstyle="butt", zorder=2))
     units = PolyCollection(
         [polygon[~np.isnan(polygon[:, 0])] for polygon in corners[kept]],
         edgecolors=INTACT,

@@ -16,14 +16,17 @@ from reports.study import Study
 PER_BAND = 2
 """Studies beside one another, each with its altered and its cloaked structure."""
 
-LEFT, BAR, GAP = 4.0, 13.0, 1.0
+LEFT, BAR, GAP = 4.0, 15.0, 1.0
 CURVES = 46.0
+TALLEST = 110.0
+"""Height in mm that all bands of structures may take."""
 
 
 def build(studies: Sequence[Study]) -> Figure:
     """The whole figure: bands of two studies, then the curves of all."""
     bands = [studies[k : k + PER_BAND] for k in range(0, len(studies), PER_BAND)]
     side = (style.TWO_COLUMNS - LEFT - BAR) / (1 + 2 * min(PER_BAND, len(studies)))
+    side = min(side, TALLEST / (2 * len(bands)))
     tall = 11.0 + 2 * side + 4.0
     rows = -(-2 * len(studies) // 4)
     figure = style.page(len(bands) * tall + rows * CURVES + 1.0)
@@ -106,7 +109,7 @@ def _curves(figure: Figure, studies: Sequence[Study], top: float, letters: Itera
             at = ((2 * k + half) % 4) * whole
             title = measure.label if half == 0 else "contraction"
             style.letter(figure, at, y, next(letters), f"{heading(study)}, {title.lower()}")
-            axes = style.place(figure, at + 10.5, y + 11.5, whole - 13.0, 25.0)
+            axes = style.place(figure, at + 10.5, y + 11.5, whole - 14.0, 25.0)
             if half == 0:
                 curves.measure_panel(axes, study, way, measure)
             else:

@@ -50,7 +50,7 @@ def structure_curves(
             course.values,
             mean.sel(structure=name),
             color=style.STRUCTURE_COLOURS[name],
-            lw=2.0 if name == "intact" else 1.2,
+            lw=1.8 if name == "intact" else 1.2,
             label=display_name(problem, name),
             zorder=3 if name == "intact" else 4,
         )

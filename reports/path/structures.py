@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
@@ -167,4 +168,6 @@ def colour_bar(figure: Figure, shade: Shade, place: tuple[float, float, float]) 
     figure.colorbar(ScalarMappable(shade.norm, shade.colours), cax=bar).set_label(
         shade.label, labelpad=1.5
     )
+    bar.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+    bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
     bar.tick_params(length=1.5)
