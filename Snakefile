@@ -8,7 +8,8 @@ from snakemake.utils import min_version
 from pipeline.sources import source_hash
 from pipeline.workflow import check_problems, check_room, chunks, copies, designs
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
-from pipeline.workflow import packages, section, shown, shown_options, targets
+from pipeline.workflow import package_pages, packages, section, shown, shown_options
+from pipeline.workflow import targets
 
 min_version("9.20")
 
@@ -29,7 +30,7 @@ for target, built in targets().items():
         name:
             f"{target}_fabrication"
         input:
-            packages(built),
+            package_pages(built),
 
 
 include: "pipeline/rules/common.smk"

@@ -116,18 +116,19 @@ def members(wildcards: Wildcards) -> list[str]:
     ]
 
 
-def packages(built: str) -> Callable[[Wildcards], list[str]]:
-    """A function to the packages of a study, or of all studies of a figure, by what it builds."""
+def package_pages(built: str) -> list[str]:
+    """The pages of what is built of a study, or of all studies of a figure."""
+    names = joints().get(built) or [Study.parse(built)]
+    return [f"results/{study}/fabrication/index.html" for study in names]
 
-    def found(_: Wildcards) -> list[str]:
-        names = joints().get(built) or [Study.parse(built)]
-        return [
-            f"results/{study}/fabrication/{structure}/manifest.json"
-            for study in names
-            for structure in structures_built(problem_of(study))
-        ]
 
-    return found
+def packages(wildcards: Wildcards) -> list[str]:
+    """The packages of a study, one for each structure."""
+    study = study_of(wildcards)
+    return [
+        f"results/{study}/fabrication/{structure}/manifest.json"
+        for structure in structures_built(problem_of(study))
+    ]
 
 
 def structures_built(problem: Problem) -> tuple[str, ...]:

@@ -18,3 +18,26 @@ rule fabricate:
     shell:
         "python -m pipeline.fabricate {params.study} --design {input.design}"
         " --structure {wildcards.structure} --out-dir {params.folder} --log {log}"
+
+
+rule fabrication_page:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        packages=packages,
+    output:
+        "results/{name}{preset}/fabrication/index.html",
+    log:
+        "results/{name}{preset}/logs/fabrication_page.log",
+    threads: 1
+    params:
+        study=options,
+        folders=lambda wildcards, input: [
+            path.rpartition("/")[0] for path in input.packages
+        ],
+        problem=section("fabricate"),
+        source=source_hash("reports.fabrication.build"),
+    message:
+        "Drawing the page of what is built of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m reports.fabrication.build {params.study} --packages {params.folders}"
+        " --out {output} --log {log}"

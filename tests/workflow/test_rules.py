@@ -58,6 +58,7 @@ def test_packages_need_the_design_and_nothing_else(sandbox: Sandbox) -> None:
         "design": 2,
         "select": 1,
         "fabricate": 2,
+        "fabrication_page": 1,
         "fig2_fabrication": 1,
     }
 

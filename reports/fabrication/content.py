@@ -1,0 +1,129 @@
+"""What the page of a study's fabrication shows: figures and pictures of each package."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline.fabrication.checks.papers import rows
+from pipeline.problem import Problem
+from reports.fabrication import pictures
+
+TITLES = {
+    "intact": "Intact structure",
+    "altered": "Altered structure",
+    "cloaked": "Cloaked structure",
+}
+COLOURS = {"intact": "#8a8f96", "altered": "#f0a042", "cloaked": "#8d62c0"}
+"""Of printed units, lighter than a structure's own colour so that edges show."""
+
+FIXTURE = "#c8ccd0"
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A figure in words."""
+
+    value: str
+    label: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a file (its path from the page), as base64 of a PNG."""
+
+    file: str
+    caption: str
+    png: str
+
+
+@dataclass(frozen=True)
+class Group:
+    """Pictures under one heading."""
+
+    title: str
+    pictures: Sequence[Picture]
+
+
+@dataclass(frozen=True)
+class Package:
+    """One structure's part of the page; `files` are paths in its folder and their hashes."""
+
+    name: str
+    title: str
+    facts: Sequence[Fact]
+    groups: Sequence[Group]
+    files: Sequence[tuple[str, str]]
+
+
+def package(folder: Path, problem: Problem) -> Package:
+    """What the page shows of a package, all of it read from the package's files."""
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    name = folder.name
+    return Package(
+        name,
+        TITLES.get(name, name),
+        list(_facts(folder, manifest)),
+        [Group(title, list(found)) for title, found in _groups(folder, problem)],
+        sorted(manifest["files"].items()),
+    )
+
+
+def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted keys and values."""
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from parameters(value, f"{above}{key}.")
+        else:
+            listed = value if isinstance(value, list) else [value]
+            yield f"{above}{key}", ", ".join(str(item) for item in listed)
+
+
+def _facts(folder: Path, manifest: Mapping[str, Any]) -> Iterator[Fact]:
+    bill = rows(folder / "bom.csv")
+    total = {row["id"]: row for row in bill if row["item"] == "total"}
+    units, shims = total["units"], total["shims"]
+    kinds = len(manifest["shims"])
+    yield Fact(units["count"], "units", f"{manifest['units'][0]} to {manifest['units'][-1]}")
+    yield Fact(shims["count"], "shims with spares", f"of {kinds} lengths")
+    yield Fact(f"{float(units['mass_g']):.0f} g", "mass of the units", units["note"])
+    volume = float(units["volume_mm3"]) / 1000.0
+    yield Fact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
+    sheets = sum(row["item"] == "sheet" and "_nominal" in row["id"] for row in bill)
+    plates = sum(row["item"] in {"plate", "fixture"} for row in bill)
+    yield Fact(f"{sheets} / {plates}", "sheets to cut / plates to print", "fixtures included")
+
+
+def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, Iterator[Picture]]]:
+    colour = COLOURS.get(folder.name, FIXTURE)
+    whole = folder / "print/assembled.stl"
+    seen = _picture(whole, "the specimen as it is assembled", pictures.assembled(whole, colour))
+    yield "The specimen", iter([seen])
+    yield "Sheets for the laser cutter", _sheets(folder)
+    yield "Plates for the printer", _plates(folder, "print", problem, colour)
+    yield "Fixtures", _plates(folder, "fixture", problem, FIXTURE)
+
+
+def _sheets(folder: Path) -> Iterator[Picture]:
+    for path in sorted(folder.glob("laser/*_nominal.dxf")):
+        kind, number, _ = path.stem.split("_")
+        told = f"{kind}, sheet {number.removeprefix('sheet')}, at nominal size"
+        yield _picture(path, told, pictures.sheet(path))
+
+
+def _plates(folder: Path, kind: str, problem: Problem, colour: str) -> Iterator[Picture]:
+    for path in sorted(folder.glob(f"{kind}/*.3mf")):
+        name, number = path.stem.split("_")
+        told = f"{name}, plate {number.removeprefix('plate')}"
+        yield _picture(path, told, pictures.plate(path, problem.fabrication.print.bed, colour))
+
+
+def _picture(path: Path, caption: str, png: bytes) -> Picture:
+    folder = path.parent.parent
+    file = f"{folder.name}/{path.relative_to(folder).as_posix()}"
+    return Picture(file, caption, base64.b64encode(png).decode("ascii"))
