@@ -1,0 +1,39 @@
+"""The stages of a study by their own command lines, within this process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from pipeline import datasets, design, select, simulate
+from pipeline.problem import load
+
+
+@dataclass(frozen=True)
+class Built:
+    """What the stages made of a study."""
+
+    design: xr.Dataset
+    response: xr.Dataset
+
+    @property
+    def best_loss(self) -> float:
+        """Loss of the shipped design."""
+        shipped = self.design.attrs["shipped_method"]
+        return float(self.design["best_loss"].sel({"method": shipped}))
+
+
+def build(problem: Path, preset: str | None, folder: Path) -> Built:
+    """Designs by every method that the problem asks for, ships the better, simulates it."""
+    study = ["--problem", str(problem), "--quiet"]
+    study += [] if preset is None else ["--preset", preset]
+    ways = []
+    for method in load(problem, preset).optimiser.methods.chosen:
+        ways.append(str(folder / f"design_{method}.nc"))
+        assert design.main([*study, "--method", method, "--out", ways[-1]]) == 0
+    shipped, response = folder / "design.nc", folder / "response.nc"
+    assert select.main([*study, "--designs", *ways, "--out", str(shipped)]) == 0
+    assert simulate.main([*study, "--design", str(shipped), "--out", str(response)]) == 0
+    return Built(datasets.read(shipped, "design"), datasets.read(response, "response"))

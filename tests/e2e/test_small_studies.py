@@ -1,0 +1,84 @@
+"""Small static studies by the real stages, with the losses that they are known to reach."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.environment import ROOT
+from pipeline.problem.loading import overlaid
+from tests.e2e.stages import Built, build
+
+UNCHANGED = 1e-3
+"""Relative difference of a loss that rounding, grown over an optimisation, may make."""
+
+
+@dataclass(frozen=True)
+class Small:
+    """A study's draft with further changes, the loss that it starts from and that it ends at."""
+
+    study: str
+    start: float
+    end: float
+    changes: dict[str, Any] = field(default_factory=dict)
+
+
+SPARED = Small(
+    "fig4",
+    start=1.0698091452,
+    end=0.06486110793,
+    changes={
+        "lattice": {"columns": 5, "rows": 5},
+        "drive": {"amplitude": "4 mm"},
+        "cloak": {"ring": {"inner": "8 mm", "outer": "22 mm"}},
+        "objective": {"region": {"disc": {"radius": "8 mm"}}},
+    },
+)
+HIDDEN = Small("fig5", start=0.4209155415, end=0.1043116033)
+
+
+@pytest.fixture(scope="module", params=[SPARED, HIDDEN], ids=lambda small: small.study)
+def small(request: pytest.FixtureRequest) -> Small:
+    """One of the studies."""
+    chosen: Small = request.param
+    return chosen
+
+
+@pytest.fixture(scope="module")
+def built(small: Small, tmp_path_factory: pytest.TempPathFactory) -> Built:
+    """What the stages make of it."""
+    folder = tmp_path_factory.mktemp(small.study)
+    whole = yaml.safe_load((ROOT / f"experiments/{small.study}/problem.yaml").read_text())
+    draft = whole.pop("presets")["quick"]
+    problem = folder / "problem.yaml"
+    problem.write_text(yaml.safe_dump(overlaid(overlaid(whole, draft), small.changes)))
+    return build(problem, None, folder)
+
+
+def test_the_losses_are_the_known_ones(small: Small, built: Built) -> None:
+    assert float(built.design["loss"].sel({"method": "sqp"})[0]) == pytest.approx(
+        small.start, rel=1e-8
+    )
+    assert built.best_loss == pytest.approx(small.end, rel=UNCHANGED)
+
+
+def test_the_response_has_the_loss_of_the_design(small: Small, built: Built) -> None:
+    found = built.response["loss"].isel(case=0)
+    assert float(found.sel(structure="altered")) == pytest.approx(small.start, rel=1e-8)
+    assert float(found.sel(structure="cloaked")) == pytest.approx(built.best_loss, rel=1e-8)
+
+
+def test_the_shipped_design_can_be_made(built: Built) -> None:
+    assert float(built.design["constraint_margin"].min()) >= 0.0
+    assert float(built.design["smallest_gap"]) >= 0.2
+    assert int(built.design["overlaps"]) == 0
+
+
+def test_every_state_is_a_stable_equilibrium(built: Built) -> None:
+    assert (built.response["stability"] == 1).all()
+    assert float(built.response["displacement_error"].max()) < 1e-8
+    assert np.rad2deg(float(built.response["min_void_angle"].min())) > -15.0
