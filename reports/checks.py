@@ -11,6 +11,9 @@ from pipeline.problem import Problem
 from reports import measures
 from reports.facts import Fact, number, percent, share, worded
 
+JUMPED = 2
+"""Flag of a stable state that the path came to by a jump."""
+
 _MARGINS = {
     "edge_length": "Edge lengths",
     "block_angle": "Block angles",
@@ -79,6 +82,9 @@ def _stability(name: str, part: xr.Dataset) -> Iterator[Fact]:
         label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
         note = f"of {flags.size}; where the tangent is not positive definite"
         yield number(f"unstable_{name}", label, count, note=note)
+        label, count = f"Jumps to another branch, {name}", int((flags == JUMPED).sum())
+        note = "loads reached only past a limit point or a branching"
+        yield number(f"jumps_{name}", label, count, note=note)
 
 
 def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:

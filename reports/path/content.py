@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from reports import content, style
+from reports.checks import JUMPED
 from reports.content import Words
 from reports.facts import Fact
 from reports.page import Page
@@ -106,7 +107,8 @@ def caption(study: Study) -> str:
         "<b>c</b> Snapshots at true size, coloured by "
         f"{shade_of(problem, study.response).field.label}.",
         f"<b>d</b> {measures.measure_of(problem).label}"
-        + ("; the bands hold 90 % of the imperfect cloaks." if study.scatter is not None else "."),
+        + ("; the bands hold 90 % of the imperfect cloaks" if study.scatter is not None else "")
+        + ("; crosses mark jumps to another branch." if _jumps(study) else "."),
     ]
     letters = iter("efg")
     if course(problem, study.response).static and problem.objective.target != "rest":
@@ -121,3 +123,7 @@ def caption(study: Study) -> str:
             "cloaks: median and 5 % to 95 %; dashed without, dotted with the perfect cloak."
         )
     return " ".join(parts)
+
+
+def _jumps(study: Study) -> bool:
+    return bool((study.response["stability"] == JUMPED).any())

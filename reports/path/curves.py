@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from reports import style
+from reports.checks import JUMPED
 from reports.path import scatter
 from reports.path.course import Course, display_name, structures
 from reports.path.measures import Measure
@@ -68,13 +69,24 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
     problem, response = study.problem, study.response
     path_axes(axes, course, measure.symbol)
     names = [name for name in structures(response) if name != "intact"]
-    structure_curves(axes, problem, course, measure.of(response), names)
+    values = measure.of(response)
+    structure_curves(axes, problem, course, values, names)
+    _jumps(axes, course, over_cases(problem, values), response)
     if problem.objective.target == "rest":
         axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
         _bands(axes, study, course, measure, study.scatter)
     axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
     axes.legend(loc="upper left", handlelength=1.2)
+
+
+def _jumps(axes: Axes, course: Course, mean: xr.DataArray, response: xr.Dataset) -> None:
+    """Crosses where a structure came to another branch of equilibria."""
+    jumped = (response["stability"] == JUMPED).any("case")
+    for name in structures(response):
+        at = jumped.sel(structure=name).values
+        colour = style.STRUCTURE_COLOURS[name]
+        axes.plot(course.values[at], mean.sel(structure=name).values[at], "x", color=colour, ms=4)
 
 
 def _bands(axes: Axes, study: Study, course: Course, measure: Measure, copies: xr.Dataset) -> None:

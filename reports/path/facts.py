@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.problem import Problem
+from pipeline.problem.regions import Region
 from reports import checks
 from reports.facts import Fact, grouped, number, share
 from reports.path import measures, scatter
@@ -51,12 +53,25 @@ def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
         yield number("removed_units", "Units removed", removed)
     yield number("cloak_units", "Units redesigned", int((response["region"] == 1).sum()))
     yield number("interest_units", "Units of interest", int(response["roi"].sum()))
+    yield from _radii(problem)
     if path.static:
         yield _displacement_fact(path)
         count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
         yield number("horizon", "Loss taken over", problem.horizon_time, "s")
+
+
+def _radii(problem: Problem) -> Iterator[Fact]:
+    """How far round regions reach."""
+    for key, label, region in (
+        ("interest_radius", "Radius of the region of interest", problem.objective.region),
+        ("cloak_radius", "Radius of the cloak", problem.cloak),
+    ):
+        bounds = region.bounds if isinstance(region, Region) else None
+        if bounds is not None:
+            note = f"{bounds[2] / problem.lattice.spacing:.4g} s"
+            yield number(key, label, bounds[2], "mm", note=note)
 
 
 def _displacement_fact(path: Course) -> Fact:

@@ -151,6 +151,21 @@ def test_the_figure_names_structures_units_and_the_papers_label(shield: Study) -
     assert "DRAFT" not in words
 
 
+def test_a_jump_is_marked_and_counted(shield: Study) -> None:
+    response = shield.response.copy(deep=True)
+    response["stability"][1, 0, 4] = checks.JUMPED
+    jumped = dataclasses.replace(shield, datasets=shield.datasets | {"response": response})
+    assert values(jumped)["jumps_cloaked"].value == 1
+    assert values(jumped)["jumps_altered"].value == 0
+    crosses = [
+        line for axes in made(jumped).axes for line in axes.lines if line.get_marker() == "x"
+    ]
+    points = np.concatenate([np.asarray(line.get_xydata()) for line in crosses])
+    np.testing.assert_allclose(points, [[7.5, 0.1 * values(shield)["rotation_altered"].value / 2]])
+    assert "crosses mark jumps" in content.caption(jumped)
+    assert "crosses" not in content.caption(shield)
+
+
 def test_absent_units_are_not_in_the_player(smile: Study) -> None:
     intact, voided, _ = content.animation(smile)["structures"]
     count = [len(part["owner"]) for part in (intact, voided)]
