@@ -15,6 +15,7 @@ from pipeline.fabrication.lettering import extent, text, turned
 from pipeline.fabrication.parts import Circle, Floats, Part, Specimen, Strokes
 from pipeline.problem.fabrication import Fabrication
 
+_SPECK = 0.01  # mm, shorter lines are left out
 _RIM = 10.0  # mm of the template around the specimen
 _TOOTH = 8.0  # mm, length of the comb's teeth
 _HANDLE = 12.0  # mm, back of the comb
@@ -119,14 +120,14 @@ def _template(number: int, specimen: Specimen, tile: Polygon, wanted: Fabricatio
         np.asarray(piece.coords)
         for unit in specimen.units
         for piece in shapely.get_parts(unit.outline.exterior.intersection(inner))
-        if piece.geom_type == "LineString"
+        if piece.length > _SPECK
     ]
     if wanted.shims.strips:
         lines += [
             np.asarray(piece.coords)
             for _, points in strips(specimen)
             for piece in shapely.get_parts(LineString(points).intersection(inner))
-            if piece.geom_type == "LineString"
+            if piece.length > _SPECK
         ]
     x0, y0, _, _ = tile.bounds
     name = f"TEMPLATE{number}"

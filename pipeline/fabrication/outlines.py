@@ -14,6 +14,8 @@ from pipeline.fabrication.slots import side_truncations
 from pipeline.problem.fabrication import Fabrication
 
 GRID = 1e-5  # mm; coordinates are rounded to it
+_BACK = 2.0  # slot widths by which cuts begin outside of the vertex
+_SHORT = 1e-4  # mm; shorter edges are left out
 _ROUND = 12  # segments per quarter circle
 
 
@@ -54,11 +56,9 @@ def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], wanted: Fabrica
 
 def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
     """The body with its slots cut in, and the tips beside their mouths cut back."""
-    waste = [
-        piece for slot in slots for piece in (_channel(slot, wanted), *_tips(body, slot, wanted))
-    ]
+    waste = [piece for slot in slots for piece in (_channel(slot), *_tips(body, slot, wanted))]
     made = _largest(body.difference(shapely.union_all(waste)))
-    return _largest(shapely.set_precision(made, GRID))
+    return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
 
 
 def _frame(slot: Slot) -> tuple[Floats, Floats]:
@@ -79,10 +79,9 @@ def _rectangle(slot: Slot, start: float, stop: float, right: float, left: float)
     return Polygon([slot.mouth + s * along + t * across for s, t in corners])
 
 
-def _channel(slot: Slot, wanted: Fabrication) -> Polygon:
+def _channel(slot: Slot) -> Polygon:
     """The slot, lengthened outwards until it has left the unit."""
-    start = -3.0 * slot.width - wanted.slots.thicken
-    return _rectangle(slot, start, slot.depth, -slot.width / 2, slot.width / 2)
+    return _rectangle(slot, -_BACK * slot.width, slot.depth, -slot.width / 2, slot.width / 2)
 
 
 def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
@@ -90,8 +89,8 @@ def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
     cuts = side_truncations(body, slot, wanted)
     half, width = slot.width / 2, slot.width / 2 + wanted.slots.tip + GRID
     for length, (right, left) in zip(cuts, ((-width, -half), (half, width)), strict=True):
-        if length > 0.0:
-            yield _rectangle(slot, -3.0 * slot.width, length, right, left)
+        if length > GRID:
+            yield _rectangle(slot, -_BACK * slot.width, length, right, left)
 
 
 def _largest(shape: BaseGeometry) -> Polygon:

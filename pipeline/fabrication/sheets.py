@@ -14,6 +14,7 @@ from pipeline.fabrication.parts import Circle, Part
 from pipeline.problem.fabrication import Laser
 
 _MITRE = 5.0
+_SHORT = 1e-4  # mm; shorter edges are left out
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def compensated(part: Part, kerf: float, file: str) -> Part:
         what = f"a kerf of {kerf:g} mm closes a slot or a hole of part {part.id}"
         remedy = "lower the kerf, or raise fabrication.slots.clearance"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
-    outline = shapely.orient_polygons(grown)
+    outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)
     return replace(part, outline=outline, holes=holes)
 

@@ -21,7 +21,9 @@ from pipeline.problem.fabrication import Fabrication
 _TURNS = np.deg2rad(np.arange(-85.0, 86.0, 5.0))
 _DEPTH_STEP = 0.25  # mm; few different lengths of shims
 _KEPT = 600  # candidates per slot that are combined
+_VISITS = 50_000  # choices looked at before the best so far is taken
 _HAIR = 1e-6  # mm
+_SPARE = 0.015  # mm by which walls are thicker than asked, for what rounding takes
 _COST_OF_TURN = 1 / np.deg2rad(30.0)  # as dear as 1 mm less depth
 _COST_OF_KINK = 1 / np.deg2rad(60.0)  # where the shim leaves the slot, against the ligament
 
@@ -154,7 +156,7 @@ def _candidates(
     """Slots at a corner, turned by ``turns`` from the wanted direction, with thick enough walls."""
     mouth, directions = _directions(polygon, corner, wanted, turns)
     walls = _walls(room, mouth, directions, depths, wanted.slot_width)
-    thick = walls >= wanted.minimum_wall - _HAIR
+    thick = walls >= wanted.minimum_wall + _SPARE
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
     truncation = truncations(room, mouth, directions, depths, wanted).max(axis=0)
     kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
@@ -233,33 +235,48 @@ def side_truncations(body: Polygon, slot: Slot, wanted: Fabrication) -> tuple[fl
 
 
 def _together(offered: Sequence[Candidates], wanted: Fabrication) -> list[Candidates] | None:
-    """The cheapest choice of one candidate per corner whose slots keep their distance."""
-    least = wanted.minimum_wall + wanted.slot_width - _HAIR
+    """The cheapest choice of one candidate per corner whose slots keep their distance.
+
+    Candidates come in ascending order of their cost. A choice strikes out what does not go with it
+    at the corners after it, whose cheapest remaining candidates bound the cost.
+    """
+    least = wanted.minimum_wall + wanted.slot_width + _SPARE
     fits = {
         (a, b): _distances(offered[a], offered[b]) >= least
         for b in range(len(offered))
         for a in range(b)
     }
     best: tuple[float, list[int]] = (np.inf, [])
+    visits = _VISITS
 
-    def descend(picked: list[int], cost: float) -> None:
-        nonlocal best
+    def descend(picked: list[int], left: list[NDArray[np.bool_]], cost: float) -> None:
+        nonlocal best, visits
         corner = len(picked)
         if corner == len(offered):
             best = (cost, picked)
             return
-        left = sum(float(later.cost.min()) for later in offered[corner + 1 :])
-        allowed = np.ones(len(offered[corner]), dtype=bool)
-        for earlier, choice in enumerate(picked):
-            allowed &= fits[earlier, corner][choice]
-        for choice in np.flatnonzero(allowed).tolist():
+        for choice in np.flatnonzero(left[0]).tolist():
             total = cost + float(offered[corner].cost[choice])
-            if total + left >= best[0]:
-                break  # candidates come in ascending order of their cost
-            descend([*picked, choice], total)
+            if total >= best[0] or visits == 0:
+                return
+            visits -= 1
+            after = [
+                allowed & fits[corner, later][choice]
+                for later, allowed in enumerate(left[1:], corner + 1)
+            ]
+            if (
+                all(allowed.any() for allowed in after)
+                and total
+                + sum(
+                    float(offered[later].cost[allowed.argmax()])
+                    for later, allowed in enumerate(after, corner + 1)
+                )
+                < best[0]
+            ):
+                descend([*picked, choice], after, total)
 
-    descend([], 0.0)
-    if len(best[1]) < len(offered):
+    descend([], [np.ones(len(found), dtype=bool) for found in offered], 0.0)
+    if not best[1] and offered:
         return None
     return [found.pick(np.array([at])) for found, at in zip(offered, best[1], strict=True)]
 

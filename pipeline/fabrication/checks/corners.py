@@ -152,9 +152,9 @@ def _listed(vertices: Sequence[int]) -> str:
 
 
 def _true_to_design(shape: Shape, filled: Geometry, asked: Fabrication) -> Iterator[Fault]:
-    """Nothing beyond the design, and nothing lost but at its corners."""
+    """Nothing beyond the design but what may thicken it, nothing lost but at its corners."""
     made, design = shape.made, shape.design
-    beyond = made.difference(design.buffer(TOLERANCE))
+    beyond = made.difference(design.buffer(asked.slots.thicken + TOLERANCE))
     if not beyond.is_empty:
         yield _fault(shape, "it reaches beyond the design", "minimum_gap", "report a bug", beyond)
     lost = design.buffer(-TOLERANCE).difference(filled).difference(_corners(shape, asked))
