@@ -13,6 +13,9 @@ from sim.errors import SimulationError
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 
+ROUNDING = 4e-14
+"""Of the end of a ligament, mm: what its axial stiffness makes of it is no force to balance."""
+
 
 @dataclass(frozen=True)
 class Record:
@@ -75,9 +78,10 @@ class StaticSolver:
         counts = np.zeros(4, dtype=np.int64)
         bends, trusted = self._known(states)
         system = system_of(top, values)
+        floor = max(self.absolute, ROUNDING * float(values.law[:, 0].max()))
         reached, fraction = follow(
-            loads, bends, trusted, system, self.relative, self.absolute, states, tangents, stable,
-            jumped, counts,
+            loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
+            counts,
         )  # fmt: skip
         if reached < len(loads):
             where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()

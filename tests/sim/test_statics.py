@@ -61,6 +61,17 @@ def test_states_in_contact_stay_inside_the_barrier() -> None:
     assert (angles < CUTOFF).sum() > 5
 
 
+def test_a_stiff_inclusion_is_in_balance_as_far_as_rounding_allows() -> None:
+    rig = squeezed(3.0)
+    touched = (rig.topology.ligament_units == 12).any(axis=1)
+    law = np.where(touched[:, None], 2000.0, 1.0) * rig.values.law
+    stiff = rig.values._replace(law=law)
+    solver = StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4))
+    states, _, record = solver.forward(stiff, rig.drive)
+    finer, _, _ = solver.refined(record).forward(stiff, rig.drive)
+    np.testing.assert_allclose(states, finer, atol=1e-9)
+
+
 def test_the_end_of_a_path_does_not_depend_on_its_steps() -> None:
     rig = squeezed(9.0)
     at_once, in_steps = path(rig, np.array([1.0])), path(rig, np.linspace(0.05, 1.0, 20))
