@@ -18,6 +18,7 @@ from pipeline.problem.fabrication import Fabrication
 _QUARTER = 8  # segments per quarter circle
 _PEN_QUARTER = 2  # of the round ends of strokes
 _SPECK = 1e-6  # mm^2
+_RESOLVED = 1e-4  # mm; single precision in an STL would make triangles of shorter edges collapse
 _RIM = 0.15  # mm that letters leave of the outline
 _GRID = 1e-3  # mm, of letters
 
@@ -83,7 +84,7 @@ class Solid:
         x0, y0, _, _ = self.bounds
         stack = [_extruded(layer) for layer in self.layers]
         whole = Manifold.batch_boolean(stack, OpType.Add).translate((-x0, -y0, 0.0))
-        found = whole.to_mesh64()
+        found = whole.simplify(_RESOLVED).to_mesh64()
         return Mesh(
             np.asarray(found.vert_properties)[:, :3], np.asarray(found.tri_verts, dtype=np.int64)
         )

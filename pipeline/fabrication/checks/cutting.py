@@ -24,18 +24,16 @@ NOMINAL = "nominal"
 
 def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
     """Faults of all drawings in a package's folder."""
+    paths = sorted(path for path in folder.glob("*.dxf") if not path.stem.endswith("_r12"))
     variants: dict[tuple[str, str], list[Drawing]] = {}
-    for path in sorted(folder.glob("*.dxf")):
-        if path.stem.endswith("_r12"):
-            continue
-        drawing = drawings.read(path)
+    for path in paths:
         kind, _, variant = path.stem.split("_")
-        variants.setdefault((kind, variant), []).append(drawing)
+        variants.setdefault((kind, variant), []).append(drawings.read(path))
+    yield from _units(folder, variants.get(("units", NOMINAL), []), wanted, asked)
+    for drawing in (drawing for found in variants.values() for drawing in found):
         yield from _sheet(drawing, asked)
         yield from _formats(drawing, folder, asked)
     yield from _kerfs(variants, asked)
-    units = variants.get(("units", NOMINAL), [])
-    yield from _units(folder, units, wanted, asked)
 
 
 def _sheet(drawing: Drawing, asked: Fabrication) -> Iterator[Fault]:
@@ -46,7 +44,7 @@ def _sheet(drawing: Drawing, asked: Fabrication) -> Iterator[Fault]:
 def thickness(file: Path, asked: Fabrication) -> float:
     """Of the material that a sheet is cut from, by the file's name."""
     foil = asked.shims.thickness
-    kinds = {"units": asked.thickness, "shims": foil, "strips": foil}
+    kinds = {"units": asked.thickness, "coupon": asked.thickness, "shims": foil, "strips": foil}
     return kinds.get(file.name.partition("_")[0], asked.laser.template_thickness)
 
 

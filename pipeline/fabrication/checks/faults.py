@@ -109,12 +109,15 @@ def _window(fault: Fault) -> dict[str, tuple[float, float]]:
 
 def _plot(axes: Axes, shape: Geometry, colour: str, width: float) -> None:
     """Points, lines and outlines of polygons."""
+    from matplotlib.collections import LineCollection
     from shapely import get_coordinates, get_parts
 
-    for part in get_parts(shape):
+    parts = get_parts(shape)
+    points = [get_coordinates(part) for part in parts if part.geom_type == "Point"]
+    lines = [get_coordinates(part) for part in parts if part.geom_type.startswith("Line")]
+    for part in parts:
         if part.geom_type == "Polygon":
-            for ring in (part.exterior, *part.interiors):
-                axes.plot(*get_coordinates(ring).T, color=colour, linewidth=width)
-        else:
-            marker = "o" if part.geom_type == "Point" else None
-            axes.plot(*get_coordinates(part).T, color=colour, linewidth=width, marker=marker)
+            lines += [get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
+    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
+    for point in points:
+        axes.plot(*point.T, color=colour, marker="o")

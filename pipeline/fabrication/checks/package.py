@@ -42,6 +42,7 @@ def check_package(
     steps: Iterable[Iterator[Fault]] = (
         printing.check(folder / "print", wanted, asked),
         cutting.check(folder / "laser", wanted, asked),
+        printing.check_fixtures(folder / "fixture", asked),
         papers.check(folder, wanted),
     )
     for step in steps:
@@ -50,5 +51,5 @@ def check_package(
     stop([replace(fault, file=fault.file.relative_to(folder)) for fault in faults], pictures)
 
 
-STEPS = 3
+STEPS = 4
 """How often `check_package` tells of progress."""

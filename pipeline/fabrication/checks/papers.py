@@ -42,7 +42,10 @@ def rows(path: Path) -> list[dict[str, str]]:
 def _bill(path: Path, wanted: Wanted) -> Iterator[Fault]:
     """Each unit once, and shims for each ligament and some to spare."""
     listed = rows(path)
-    units = Counter(row["id"] for row in listed if row["item"] == "unit")
+    units: Counter[str] = Counter()
+    for row in listed:
+        if row["item"] == "unit":
+            units[row["id"]] += int(row["count"])
     yield from every_unit(units, wanted, path)
     shims = sum(int(row["count"]) for row in listed if row["item"] == "shim")
     if shims <= wanted.ligaments:

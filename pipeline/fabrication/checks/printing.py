@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,25 @@ def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
         if not faults and label in wanted.polygons:
             yield from _unit(label, solid, wanted, asked)
     yield from _plates(folder, units, wanted, asked)
+    for path in sorted(folder.glob("coupon_*.3mf")):
+        yield from plates.check_plate(solids.read_3mf(path), asked.print)
     yield from _assembled(solids.read_stl(folder / "assembled.stl"), wanted, asked)
+
+
+def check_fixtures(folder: Path, asked: Fabrication) -> Iterator[Fault]:
+    """Faults of clamps, adapter and jig: solids, each on one plate as in its own file."""
+    parts = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("*.stl"))}
+    for solid in parts.values():
+        yield from solids.check(solid)
+    names: list[str] = []
+    for path in sorted(folder.glob("*.3mf")):
+        plate = solids.read_3mf(path)
+        names += [solid.name for solid in plate]
+        yield from plates.check_plate(plate, asked.print)
+        yield from _others(plate, parts)
+    if sorted(names) != sorted(parts):
+        what = "the plates do not hold each of the fixture's parts once"
+        yield Fault("the fixture", what, "fixture", solids.BUG, folder)
 
 
 def levels(asked: Fabrication) -> list[float]:
@@ -64,10 +82,15 @@ def _plates(
         plate = solids.read_3mf(path)
         names += [solid.name for solid in plate]
         yield from plates.check_plate(plate, asked.print)
-        for solid in plate:
-            if solid.name in units and not _same(solid, units[solid.name]):
-                yield fault(solid, f"it is another part than {units[solid.name].file.name}")
+        yield from _others(plate, units)
     yield from every_unit(Counter(names), wanted, folder)
+
+
+def _others(plate: Sequence[Solid], parts: Mapping[str, Solid]) -> Iterator[Fault]:
+    """Objects of a plate that are not what their own files hold."""
+    for solid in plate:
+        if solid.name in parts and not _same(solid, parts[solid.name]):
+            yield fault(solid, f"it is another part than {parts[solid.name].file.name}")
 
 
 def _same(one: Solid, other: Solid) -> bool:

@@ -30,7 +30,7 @@ TOLERANCE = 1e-3
 """Lengths of a mesh are right to this, mm (binary STL holds single precision)."""
 
 VOLUME_TOLERANCE = 1e-3
-_BUG = "run the same command again; if it stays, the exporter has a bug"
+BUG = "run the same command again; if it stays, the exporter has a bug"
 _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
 
@@ -173,7 +173,7 @@ def volume(solid: Solid, levels: Sequence[float]) -> Iterator[Fault]:
         yield fault(solid, f"its volume is {made:.2f} mm^3, area times height {wanted:.2f} mm^3")
 
 
-def fault(solid: Solid, what: str, key: str = "print", remedy: str = _BUG) -> Fault:
+def fault(solid: Solid, what: str, key: str = "print", remedy: str = BUG) -> Fault:
     """A fault of the whole solid, seen from the top."""
     around: tuple[Geometry, ...] = ()
     points = solid.vertices[np.isfinite(solid.vertices).all(axis=1), :2]
@@ -185,5 +185,5 @@ def fault(solid: Solid, what: str, key: str = "print", remedy: str = _BUG) -> Fa
 
 def _unreadable(path: Path, why: str) -> UserError:
     return UserError(
-        f"a mesh that was just written cannot be read back: {why}", file=path, remedy=_BUG
+        f"a mesh that was just written cannot be read back: {why}", file=path, remedy=BUG
     )
