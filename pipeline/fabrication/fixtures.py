@@ -126,7 +126,7 @@ def _grip(
     place = [unit.column if upright else unit.row for unit in specimen.units]
     mine = group[0].column if upright else group[0].row
     low = mine - min(place) <= max(place) - mine  # which side of the specimen the bolts are on
-    room = max(wanted.print.bed) - 2 * wanted.print.margin
+    room = wanted.print.bed[1 if upright else 0] - 2 * wanted.print.margin
     start, stop = (y0, y1) if upright else (x0, x1)
     edge = float(whole[0 if upright else 1] if low else whole[2 if upright else 3])
     pitch, flange = wanted.fixture.bolt_pitch, wanted.fixture.pad

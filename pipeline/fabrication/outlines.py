@@ -14,7 +14,7 @@ from pipeline.fabrication.slots import side_truncations
 from pipeline.problem.fabrication import Fabrication
 
 GRID = 1e-5  # mm; coordinates are rounded to it
-_BACK = 2.0  # slot widths by which cuts begin outside of the vertex
+_BACK = 3.0  # slot widths by which cuts begin outside of the vertex
 _SHORT = 1e-4  # mm; shorter edges are left out
 _ROUND = 12  # segments per quarter circle
 
@@ -59,6 +59,12 @@ def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
     waste = [piece for slot in slots for piece in (_channel(slot), *_tips(body, slot, wanted))]
     made = _largest(body.difference(shapely.union_all(waste)))
     return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
+
+
+def wall(made: Polygon, slot: Slot) -> float:
+    """Thinnest wall around the inner end of a slot in a unit as it is made, mm."""
+    rest = made.exterior.difference(_channel(slot).buffer(_SHORT * 10))
+    return float(_across(slot).distance(rest))
 
 
 def _frame(slot: Slot) -> tuple[Floats, Floats]:

@@ -23,7 +23,6 @@ _DEPTH_STEP = 0.25  # mm; few different lengths of shims
 _KEPT = 600  # candidates per slot that are combined
 _VISITS = 50_000  # choices looked at before the best so far is taken
 _HAIR = 1e-6  # mm
-_SPARE = 0.015  # mm by which walls are thicker than asked, for what rounding takes
 _COST_OF_TURN = 1 / np.deg2rad(30.0)  # as dear as 1 mm less depth
 _COST_OF_KINK = 1 / np.deg2rad(60.0)  # where the shim leaves the slot, against the ligament
 
@@ -156,7 +155,7 @@ def _candidates(
     """Slots at a corner, turned by ``turns`` from the wanted direction, with thick enough walls."""
     mouth, directions = _directions(polygon, corner, wanted, turns)
     walls = _walls(room, mouth, directions, depths, wanted.slot_width)
-    thick = walls >= wanted.minimum_wall + _SPARE
+    thick = walls >= wanted.minimum_wall - _HAIR
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
     truncation = truncations(room, mouth, directions, depths, wanted).max(axis=0)
     kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
@@ -240,7 +239,7 @@ def _together(offered: Sequence[Candidates], wanted: Fabrication) -> list[Candid
     Candidates come in ascending order of their cost. A choice strikes out what does not go with it
     at the corners after it, whose cheapest remaining candidates bound the cost.
     """
-    least = wanted.minimum_wall + wanted.slot_width + _SPARE
+    least = wanted.minimum_wall + wanted.slot_width - _HAIR
     fits = {
         (a, b): _distances(offered[a], offered[b]) >= least
         for b in range(len(offered))

@@ -22,6 +22,7 @@ from pipeline.problem.fabrication import Fabrication
 _STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the most that a unit may grow
 _NEAR = 3.0  # mm; farther neighbours never matter
 _HAIR = 1e-6
+_ROUNDING = 1e-3  # mm, of outlines as they are made
 
 
 @dataclass(frozen=True)
@@ -211,16 +212,29 @@ def _body(
             failure = error
             continue
         body = outlines.lugs(plain, room, chosen, wanted) if share > 0.0 else plain
-        held = tuple(_measured(body, slot, wanted) for slot in chosen)
-        if all(slot.depth - slot.truncation >= wanted.slots.depth_min - _HAIR for slot in held):
+        held = _measured(body, chosen, wanted)
+        if all(_holds(slot, wanted) for slot in held):
             return body, held
     raise _no_slot(label, failure, wanted, file)
 
 
-def _measured(body: Polygon, slot: Slot, wanted: Fabrication) -> Slot:
-    """The slot with its truncation in the body as it is made."""
-    cuts = slots.side_truncations(body, slot, wanted)
-    return replace(slot, truncation=max(cuts))
+def _measured(body: Polygon, chosen: Sequence[Slot], wanted: Fabrication) -> tuple[Slot, ...]:
+    """The slots with their truncations and walls in the body as it is made."""
+    made = outlines.cut(body, chosen, wanted)
+    return tuple(
+        replace(
+            slot,
+            truncation=max(slots.side_truncations(body, slot, wanted)),
+            wall=min(slot.wall, outlines.wall(made, slot)),
+        )
+        for slot in chosen
+    )
+
+
+def _holds(slot: Slot, wanted: Fabrication) -> bool:
+    """Whether a shim is held long enough, between thick enough walls."""
+    grip = slot.depth - slot.truncation
+    return grip >= wanted.slots.depth_min - _HAIR and slot.wall >= wanted.minimum_wall - _ROUNDING
 
 
 def _no_slot(label: str, failure: NoRoomError, wanted: Fabrication, file: Path) -> UserError:
