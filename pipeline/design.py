@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline import cli, problem
+from pipeline import cli, failures, problem
 from pipeline.errors import UserError
 
 if TYPE_CHECKING:
@@ -94,6 +94,7 @@ def optimise(
             key="optimiser.methods",
             remedy=f"add optimiser.methods.{method}.evaluations",
         )
+    constraints = Constraints(scene.space, limits_of(asked))
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
@@ -111,12 +112,16 @@ def optimise(
                 return minimise(
                     method,  # type: ignore[arg-type]
                     journal.wrap(evaluator(scene, plan, paths)),
-                    Constraints(scene.space, limits_of(asked)),
+                    constraints,
                     np.zeros(scene.space.n_variables),
                     options=_options(asked, method),
                     callback=show,
                 )
-        except (InfeasibleStartError, SimulationError, JournalInUseError) as error:
+        except InfeasibleStartError as error:
+            raise failures.infeasible(error, constraints, source) from error
+        except SimulationError as error:
+            raise failures.unsolved(error, scene, "initial", plan.solver.asked, None) from error
+        except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 
 

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import cli, problem
-from pipeline.errors import UserError
-from pipeline.measuring import Measured, Structure, Times, measure
+from pipeline import cli, failures, problem
+from pipeline.measuring import Floats, Measured, Structure, Times, measure
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
     from sim.batch import Case
+    from sim.errors import SimulationError
     from sim.plan import Plan
     from sim.scene import Scene
 
@@ -37,16 +37,75 @@ def parser() -> argparse.ArgumentParser:
 
 
 def work(args: argparse.Namespace) -> None:
-    """Reads problem and design, simulates the structures, writes their response."""
+    """Reads problem and design, simulates the structures, writes their response.
+
+    Raises:
+        UserError: a structure could not be followed to its end; what was computed is kept.
+    """
     from pipeline import datasets, provenance
     from pipeline.scenes import scene_of
 
     asked = problem.load(args.problem, args.preset)
     design = datasets.read(args.design, "design")
     scene = scene_of(asked, args.problem.parent)
-    made, plans = response_dataset(asked, structures_of(scene, design), args.threads)
+    structures = structures_of(scene, design)
+    try:
+        made, plans = response_dataset(asked, structures, args.threads)
+    except StoppedError as stopped:
+        kept = _keep(asked, structures, stopped, args)
+        where = structures[stopped.name].scene
+        raise failures.unsolved(
+            stopped.error, where, stopped.name, stopped.asked, kept
+        ) from stopped
     origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
+
+
+class StoppedError(Exception):
+    """A structure whose motion could not be followed to its end."""
+
+    def __init__(self, name: str, error: SimulationError, asked: Floats) -> None:
+        super().__init__(name)
+        self.name, self.error, self.asked = name, error, asked
+
+
+def _keep(
+    asked: Problem,
+    structures: dict[str, Structure],
+    stopped: StoppedError,
+    args: argparse.Namespace,
+) -> Path | None:
+    """Writes the response of a static path as far as all structures can be followed, if at all."""
+    from pipeline import datasets, provenance
+
+    scene, step = structures[stopped.name].scene, stopped.error.step
+    whole = scene.steps or 1
+    reached = 0.0 if not step else stopped.asked[step - 1] / scene.duration
+    steps = int(whole * reached * (1 + 1e-9))
+    if not scene.static or scene.steps is None or steps == 0:
+        return None
+    shorter = {
+        name: each._replace(scene=_until(each.scene, steps)) for name, each in structures.items()
+    }
+    try:
+        made, plans = response_dataset(asked, shorter, args.threads)
+    except StoppedError as again:
+        return _keep(asked, shorter, again, args)
+    out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
+    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
+    datasets.write(made, out, "response", origin)
+    return out
+
+
+def _until(scene: Scene, steps: int) -> Scene:
+    """A static scene whose path ends after so many of its load steps."""
+    assert scene.steps is not None
+    return replace(
+        scene,
+        duration=scene.duration * steps / scene.steps,
+        steps=steps,
+        reference=scene.reference and _until(scene.reference, steps),
+    )
 
 
 def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, Structure]:
@@ -86,7 +145,11 @@ def times_of(asked: Problem, scene: Scene) -> Times:
 def response_dataset(
     asked: Problem, structures: dict[str, Structure], threads: int
 ) -> tuple[xr.Dataset, dict[str, object]]:
-    """The dataset ``response`` of the structures, and the plan of each."""
+    """The dataset ``response`` of the structures, and the plan of each.
+
+    Raises:
+        StoppedError: a structure could not be followed to its end.
+    """
     from pipeline.responses import dataset
     from sim.batch import run_batch
     from sim.plan import make_plan
@@ -105,10 +168,8 @@ def response_dataset(
             measured[name] = []
             for outcome in run_batch(cases, reduce, threads):
                 if outcome.value is None:
-                    raise UserError(
-                        f"the {name} structure cannot be simulated: {outcome.failure}",
-                        remedy="lower drive.amplitude, or ask for solver.accuracy: tight",
-                    )
+                    assert outcome.error is not None
+                    raise StoppedError(name, outcome.error, times.asked)
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
     return dataset(asked, structures, times.asked[times.shown], measured), plans

@@ -48,6 +48,7 @@ class Outcome(Generic[R]):
 
     value: R | None
     failure: str | None = None
+    error: SimulationError | None = None
 
 
 Measure = Callable[[Solved], R]
@@ -78,6 +79,6 @@ def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
     try:
         displacement, velocity, record = solve_case(case.solver, case.values, case.drive)
     except SimulationError as error:
-        return Outcome(None, str(error))
+        return Outcome(None, str(error), error)
     solved = Solved(case, displacement.reshape(shape), velocity.reshape(shape), record)
     return Outcome(measure(solved))

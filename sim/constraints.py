@@ -237,6 +237,14 @@ class Constraints:
         """Smallest margin of each kind at the places that the design can change."""
         return _worst(self.space.lattice, self.kinds, self.vertices(design))
 
+    def named(self, number: int) -> tuple[str, str]:
+        """Kind of one of the values, and the vertices and units that it is about, in words."""
+        for kind in self.kinds:
+            if number < len(kind.places):
+                return kind.name, _vertices(self.space.lattice, kind.places[number])
+            number -= len(kind.places)
+        raise IndexError("there are not so many constraints")
+
     @cached_property
     def _local(self) -> Callable[[Array], tuple[Array, Array]]:
         requirements = self.kinds
@@ -316,6 +324,16 @@ def _worst(lattice: Lattice, requirements: tuple[Kind, ...], vertices: Floats) -
         where = " and ".join(f"unit ({i}, {j})" for i, j in lattice.index[list(units)])
         worst[kind.name] = Margin(kind.name, float(values[place]), kind.unit, units, where)
     return worst
+
+
+def _vertices(lattice: Lattice, place: Ints) -> str:
+    """The vertices of a place, by their numbers within their units."""
+    words = []
+    for unit in np.unique(lattice.unit[place]):
+        own = np.unique(place[lattice.unit[place] == unit]) - lattice.first_vertex[unit]
+        i, j = lattice.index[unit]
+        words.append(f"vertex {', '.join(map(str, own))} of unit [{i}, {j}]")
+    return " and ".join(words)
 
 
 KIND_NAMES = tuple({"convex": "convexity"}.get(field.name, field.name) for field in fields(Limits))

@@ -7,14 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import datasets, design, select, simulate
 from pipeline.errors import UserError
 from pipeline.problem import cloak_units, interest_units, load, void_units
 from pipeline.scenes import scene_of
-from pipeline.structures import present_ligaments
 from sim.evaluation import evaluator
 from sim.plan import make_plan
-from tests.pipeline.static import HEART, HOLE, MIMIC, RIGID_HEART, SHIELD, SMILE, write
+from tests.pipeline.static import HEART, MIMIC, RIGID_HEART, SHIELD, SMILE, write
 
 
 @pytest.mark.parametrize(
@@ -96,34 +94,3 @@ def test_a_bad_void_is_told(tmp_path: Path, more: str, what: str, key: str) -> N
     assert what in caught.value.what
     assert caught.value.key == key
     assert caught.value.remedy
-
-
-def test_a_small_void_from_problem_to_response(tmp_path: Path) -> None:
-    problem = write(tmp_path, HOLE, size=5, amplitude=3.0)
-    study = ["--problem", str(problem), "--quiet", "--out"]
-    made, chosen, response = (str(tmp_path / f"{name}.nc") for name in ("design_sqp", "d", "r"))
-    assert design.main([*study, made, "--method", "sqp"]) == 0
-    assert select.main([*study, chosen, "--designs", made]) == 0
-    assert simulate.main([*study, response, "--design", chosen]) == 0
-
-    shipped, moved = datasets.read(chosen, "design"), datasets.read(response, "response")
-    void = shipped["region"].values == 3
-    assert np.flatnonzero(void).tolist() == [12]
-    np.testing.assert_array_equal(np.isnan(shipped["vertices"].values).all(axis=(1, 2)), void)
-    assert not np.isnan(shipped["vertices_initial"]).any()
-    assert np.count_nonzero(~present_ligaments(shipped)) == 4
-    assert present_ligaments(shipped, "intact").all()
-
-    assert moved["structure"].values.tolist() == ["intact", "altered", "cloaked"]
-    gone = np.isnan(moved["displacement"].values).all(axis=(1, 2, 4))
-    np.testing.assert_array_equal(gone, [np.zeros(25, bool), void, void])
-    intact, altered, cloaked = moved["loss"].values[:, 0]
-    assert intact == 0.0
-    assert cloaked < 0.9 * altered
-    assert cloaked == pytest.approx(float(shipped["best_loss"][0]), rel=1e-9)
-    assert (moved["stability"] == 1).all()
-    push = moved["drive_displacement"].sel(xy="x").values[0]
-    np.testing.assert_allclose(push, -3.0 * moved["time"])
-    work = np.trapezoid(moved["drive_force"].sel(xy="x").values, push, axis=-1)
-    energy = (moved["strain_energy"] + moved["contact_energy"]).values[..., -1]
-    np.testing.assert_allclose(work, energy, rtol=0.02)
