@@ -270,7 +270,9 @@ def _start_is_feasible(problem: Problem) -> Findings:
     }
     for name, (asked, has, unit) in start.items():
         if asked is not None and asked > has:
+            first = lattice.name(cloak_units(problem)[0])
             what = f"infeasible at the start: the undeformed units have {has:g} {unit}"
+            what += f" (vertex 0 of unit {first} and all alike)"
             yield Finding(what, ("constraints", name), f"ask for at most {has:.3g} {unit}")
 
 
