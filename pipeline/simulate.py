@@ -151,14 +151,27 @@ def response_dataset(
         StoppedError: a structure could not be followed to its end.
     """
     from pipeline.responses import dataset
+
+    times = times_of(asked, structures["altered"].scene)
+    measured, plans = measured_cases(structures, times, threads)
+    return dataset(asked, structures, times.asked[times.shown], measured), plans
+
+
+def measured_cases(
+    structures: dict[str, Structure], times: Times, threads: int
+) -> tuple[dict[str, list[Measured]], dict[str, object]]:
+    """Every case of every structure, and the plan of each structure.
+
+    Raises:
+        UserError: a structure cannot be simulated.
+    """
     from sim.batch import run_batch
     from sim.plan import make_plan
 
-    scene = structures["altered"].scene
-    times = times_of(asked, scene)
     measured: dict[str, list[Measured]] = {}
     plans: dict[str, object] = {}
-    with cli.progress(len(structures) * len(scene.motions), "response") as bar:
+    n_cases = len(structures["altered"].scene.motions)
+    with cli.progress(len(structures) * n_cases, "response") as bar:
         for name, structure in structures.items():
             plan = make_plan(structure.scene, structure.vertices, times.asked, every_case=True)
             plans[name] = plan.record()
@@ -172,7 +185,7 @@ def response_dataset(
                     raise StoppedError(name, outcome.error, times.asked)
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
-    return dataset(asked, structures, times.asked[times.shown], measured), plans
+    return measured, plans
 
 
 def _cases(structure: Structure, plan: Plan) -> Iterator[Case]:

@@ -7,12 +7,13 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from pipeline import cli, problem
 from pipeline.errors import UserError
+from pipeline.measuring import UNSTABLE, Measured
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from pipeline.problem import Problem
 
 LOG = logging.getLogger(__name__)
+
+Table = dict[str, list[Measured]]
 
 AS_RUN = "as run"
 FINER = (2, 10)
@@ -75,30 +78,66 @@ def variants(asked: Problem) -> dict[str, Problem]:
 
 def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
     """The dataset ``verification``; a variant that cannot be simulated keeps its reason."""
+    from pipeline.responses import loss_units
+    from pipeline.scenes import scene_of
+    from pipeline.simulate import measured_cases, structures_of, times_of
+
+    posed = variants(asked)
+    found: dict[str, Table] = {}
+    status = dict.fromkeys(posed, "ok")
+    for name, variant in posed.items():
+        structures = structures_of(scene_of(variant, folder), design)
+        times = times_of(variant, structures["altered"].scene)
+        try:
+            found[name], _ = measured_cases(structures, times, threads)
+        except UserError as error:
+            if name == AS_RUN:
+                raise
+            LOG.warning("%s: %s", name, error.what)
+            status[name] = error.what
+    shares = {name: _share(asked, variant) for name, variant in posed.items()}
+    made = _dataset(found, shares, status)
+    made["loss"].attrs["units"] = loss_units(asked)
+    return made
+
+
+def _dataset(
+    found: dict[str, Table], shares: dict[str, float], status: dict[str, str]
+) -> xr.Dataset:
     import xarray as xr
 
-    from pipeline.scenes import scene_of
-    from pipeline.simulate import response_dataset, structures_of
+    as_run = found[AS_RUN]
+    rows = [
+        [
+            _numbers(found[name][structure], cases, shares[name]) if name in found else NOTHING
+            for structure, cases in as_run.items()
+        ]
+        for name in status
+    ]
+    columns = {
+        field: np.array([[getattr(numbers, field) for numbers in row] for row in rows])
+        for field in Numbers._fields
+    }
+    return xr.Dataset(
+        {name: (("check", "structure"), values) for name, values in columns.items()}
+        | {"status": (("check",), list(status.values()))},
+        {"check": list(status), "structure": list(as_run)},
+    )
 
-    rows: list[xr.Dataset] = []
-    as_run: xr.Dataset | None = None
-    posed = variants(asked)
-    for variant in posed.values():
-        structures = structures_of(scene_of(variant, folder), design)
-        try:
-            made, _ = response_dataset(variant, structures, threads)
-        except UserError as error:
-            if as_run is None:
-                raise
-            LOG.warning("%s", error.what)
-            rows.append(_nothing(rows[0], error.what))
-        else:
-            as_run = made if as_run is None else as_run
-            rows.append(_row(made, as_run, _share(asked, variant)))
-    whole = xr.concat(rows, dim=xr.DataArray(list(posed), dims="check", name="check"))
-    assert as_run is not None
-    whole["loss"].attrs["units"] = as_run["loss"].attrs["units"]
-    return whole
+
+class Numbers(NamedTuple):
+    """What is kept of a structure under one variant: the extremes of its load cases."""
+
+    loss: float
+    departure: float
+    min_void_angle: float
+    gap: float
+    overlaps: int
+    contact_pairs: int
+    unstable: int
+
+
+NOTHING = Numbers(np.nan, np.nan, np.nan, np.nan, 0, 0, 0)
 
 
 def _share(asked: Problem, variant: Problem) -> float:
@@ -109,37 +148,20 @@ def _share(asked: Problem, variant: Problem) -> float:
     return float(np.sqrt(asked.horizon.steps / variant.horizon.steps)) if mimics else 1.0
 
 
-def _row(made: xr.Dataset, as_run: xr.Dataset, share: float) -> xr.Dataset:
-    """What is kept of one variant, by structure: the extremes of its load cases."""
-    import xarray as xr
-
-    apart = (made["displacement"] - as_run["displacement"]).isel(dof=slice(0, 2))
-    distance = ((apart**2).sum("dof") ** 0.5).max(("case", "time", "unit"))
-    unstable = (made["stability"] == 0).sum(("case", "time"))
-    kept = {
-        "loss": share * made["loss"].mean("case"),
-        "departure": distance,
-        "min_void_angle": made["min_void_angle"].min(("case", "time")),
-        "gap": made["min_gap"].min("case"),
-        "overlaps": made["overlaps"].max("case"),
-        "contact_pairs": made["contact_pairs"].isel(time=-1).max("case"),
-        "unstable": unstable,
-        "status": xr.DataArray("ok"),
-    }
-    return xr.Dataset(
-        {name: values.drop_vars("time", errors="ignore") for name, values in kept.items()}
+def _numbers(cases: list[Measured], as_run: list[Measured], share: float) -> Numbers:
+    apart = [
+        np.linalg.norm((one.displacement - other.displacement)[..., :2], axis=-1).max()
+        for one, other in zip(cases, as_run, strict=True)
+    ]
+    return Numbers(
+        loss=share * float(np.mean([case.loss for case in cases])),
+        departure=float(max(apart)),
+        min_void_angle=min(float(case.observables.void_angle.min()) for case in cases),
+        gap=min(float(np.nanmin(case.gap)) for case in cases),
+        overlaps=max(int(np.nanmax(case.overlapping)) for case in cases),
+        contact_pairs=max(int(case.observables.contact_pairs[-1]) for case in cases),
+        unstable=sum(int((case.stability == UNSTABLE).sum()) for case in cases),
     )
-
-
-def _nothing(row: xr.Dataset, reason: str) -> xr.Dataset:
-    """A row like another one without its values."""
-    import xarray as xr
-
-    empty = {
-        name: xr.zeros_like(values) if values.dtype.kind == "i" else xr.full_like(values, np.nan)
-        for name, values in row.drop_vars("status").items()
-    }
-    return xr.Dataset({**empty, "status": xr.DataArray(reason)})
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -30,11 +30,13 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         loss = history["loss"].values
         count, best = int(np.isfinite(loss).sum()), float(history["best_loss"])
         name, at = str(method).upper(), int(history["best_evaluation"])
+        unit = design["best_loss"].attrs["units"]
         soon = measures.first_within(loss[:count], best, 0.9)
         note = f"best feasible after {at}, 90 % of the way after {soon}"
         yield number(f"evaluations_{method}", f"Evaluations, {name}", count, note=note)
         note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
-        yield number(f"best_{method}", f"Best feasible loss, {name}", best, digits=3, note=note)
+        label = f"Best feasible loss, {name}"
+        yield number(f"best_{method}", label, best, unit, digits=3, note=note)
         violation = float(history["violation"].isel(evaluation=at))
         label = f"Largest constraint violation of it, {name}"
         yield number(f"violation_{method}", label, violation, digits=2, note="scaled; 0: feasible")
