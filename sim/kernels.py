@@ -20,6 +20,7 @@ import numpy as np
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.matrix import Matrix, add
+from sim.multifrontal import entry
 
 
 class Network(NamedTuple):
@@ -230,6 +231,10 @@ def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, matrix: Matr
     """
     _trigonometry(motion, turn)
     block, place = np.empty((6, 6)), np.empty(6, dtype=np.int64)
+    # taken apart here: passing the matrix for each entry would cost more than all the rest
+    values, width, fronts = matrix.values, matrix.pattern.size[1], matrix.pattern.fronts
+    owner, first, edge = fronts.owner, fronts.first, fronts.edge
+    boundary, panel = fronts.boundary, fronts.panel
     for k in range(net.unit.shape[0]):
         _ligament_block(k, motion, turn, net, block)
         for m in range(3):
@@ -237,7 +242,14 @@ def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, matrix: Matr
             place[3 + m] = free[3 * net.unit[k, 1] + m]
         for row in range(6):
             for column in range(row + 1):
-                add(matrix, place[row], place[column], block[row, column])
+                i, j = max(place[row], place[column]), min(place[row], place[column])
+                if j < 0:
+                    continue
+                if width >= 0:
+                    values[j * width + i] += block[row, column]
+                else:
+                    at = entry(i, j, owner, first, edge, boundary, panel)
+                    values[at] += block[row, column]
     for k in net.touching:
         curvature = _contact_curvature(motion, net, k)
         if curvature > 0.0:

@@ -143,7 +143,9 @@ def add(of: Matrix, i: int, j: int, value: float) -> None:
     row, column = max(i, j), min(i, j)
     width = of.pattern.size[1]
     if width < 0:
-        of.values[entry(of.pattern.fronts, row, column)] += value
+        f = of.pattern.fronts
+        at = entry(row, column, f.owner, f.first, f.edge, f.boundary, f.panel)
+        of.values[at] += value
     else:
         of.values[column * width + row] += value
 

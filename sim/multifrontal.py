@@ -8,25 +8,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.dissection import Fronts
 from sim.lapack import dgemv, dpotrf, dsyrk, dtrsm, dtrsv
 
 
 @compiled
-def entry(fronts: Fronts, row: int, column: int) -> int:
-    """Where the entry (row >= column) lies among the factor's values; its dofs must be coupled."""
-    front = fronts.owner[column]
-    first, end = fronts.first[front], fronts.first[front + 1]
-    low, high = fronts.edge[front], fronts.edge[front + 1]
-    start = fronts.panel[front] + (column - first) * (end - first + high - low)
+def entry(
+    row: int, column: int, owner: Ints, firsts: Ints, edge: Ints, boundary: Ints, panel: Ints
+) -> int:
+    """Where the entry (row >= column) lies among the factor's values; its dofs must be coupled.
+
+    It takes the arrays of ``Fronts`` one by one: passing a tuple of them costs more
+    than the search.
+    """
+    front = owner[column]
+    first, end = firsts[front], firsts[front + 1]
+    low, high = edge[front], edge[front + 1]
+    start = panel[front] + (column - first) * (end - first + high - low)
     if row < end:
         return start + row - first
     here = low
     while low < high:
         middle = (low + high) // 2
-        if fronts.boundary[middle] < row:
+        if boundary[middle] < row:
             low = middle + 1
         else:
             high = middle
