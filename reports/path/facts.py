@@ -32,7 +32,8 @@ def collect(study: Study) -> list[Fact]:
         *grouped("Optimisation", checks.history_facts(study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
         *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
-        *grouped("Load steps and contact law", checks.variant_facts(study.verification)),
+        *grouped("Contact", checks.contact_facts(study.response)),
+        *grouped("Load steps", checks.variant_facts(study.verification)),
         *grouped("Imperfect copies", robustness_facts(study)),
     ]
 

@@ -151,6 +151,19 @@ def test_the_figure_names_structures_units_and_the_papers_label(shield: Study) -
     assert "DRAFT" not in words
 
 
+def test_losses_under_either_law_of_contact(shield: Study) -> None:
+    dims = ("structure", "contact_law", "case")
+    losses = np.array([[[0.92], [0.9]], [[0.05], [0.06]]])
+    both = shield.response.assign_coords(contact_law=["angle", "geometric"]).assign(
+        loss_by_contact=(dims, losses, {"units": "N mm"}),
+        overlaps_by_contact=(dims, np.array([[[2.0], [0.0]], [[8.0], [0.0]]])),
+        gap_by_contact=(dims, np.full((2, 2, 1), 0.02)),
+    )
+    found = values(dataclasses.replace(shield, datasets=shield.datasets | {"response": both}))
+    assert found["contact_geometric_cloaked"].note.startswith("20.0 % against the run; 0 overl")
+    assert found["contact_angle_cloaked"].note.startswith("0.0 % against the run; 8 overlapping")
+
+
 def test_a_jump_is_marked_and_counted(shield: Study) -> None:
     response = shield.response.copy(deep=True)
     response["stability"][1, 0, 4] = checks.JUMPED
