@@ -1,0 +1,94 @@
+"""Mistakes in a problem or a design: one message with what to change, nothing half written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import xarray as xr
+import yaml
+
+from pipeline import datasets, fabricate
+from tests.pipeline.fabrication import built
+
+Edit = Callable[[Path], None]
+
+
+def parameters(**values: object) -> Edit:
+    """A section `fabrication` of the problem file."""
+
+    def edit(folder: Path) -> None:
+        path = folder / "problem.yaml"
+        problem = yaml.safe_load(path.read_text(encoding="utf-8"))
+        path.write_text(yaml.safe_dump(problem | {"fabrication": values}), encoding="utf-8")
+
+    return edit
+
+
+def cut_short(folder: Path) -> None:
+    path = folder / "design.nc"
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def overlapping(folder: Path) -> None:
+    design = built.design()
+    design["vertices"][1] += [-3.0, 0.0]
+    design.to_netcdf(folder / "design.nc")
+
+
+MISTAKES: dict[str, tuple[Edit, tuple[str, ...]]] = {
+    "overlap": (overlapping, ("the units A1 and B1 overlap", "constraints.gap")),
+    "slot cuts through": (
+        parameters(minimum_wall="4 mm", slots={"thicken": "0 mm"}),
+        ("is too slender for slots", "fabrication.minimum_wall"),
+    ),
+    "small bed": (
+        parameters(print={"bed": ["18 mm", "18 mm"], "margin": "5 mm"}),
+        ("does not fit on a bed", "fabrication.print.bed"),
+    ),
+    "small sheet": (
+        parameters(laser={"sheet": ["20 mm", "20 mm"]}),
+        ("does not fit on a sheet", "fabrication.laser.sheet"),
+    ),
+    "negative kerf": (parameters(laser={"kerf": "-0.1 mm"}), ("fabrication.laser.kerf",)),
+    "material": (parameters(material="wood"), ("fabrication.material", "PLA")),
+    "cut short": (cut_short, ("design.nc",)),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A problem and a design that are right, until one of them is edited."""
+    (tmp_path / "problem.yaml").write_bytes(built.PROBLEM.read_bytes())
+    built.design().to_netcdf(tmp_path / "design.nc")
+    whole = datasets.read
+
+    def read(path: Path, kind: datasets.Kind) -> xr.Dataset:
+        """The small design lacks what only the optimiser writes."""
+        try:
+            return xr.load_dataset(path)
+        except (OSError, ValueError):
+            return whole(path, kind)
+
+    monkeypatch.setattr(datasets, "read", read)
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_makes_one_message_and_no_package(
+    folder: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    edit, expected = MISTAKES[name]
+    edit(folder)
+    out = folder / "fabrication/cloaked"
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    ended = fabricate.main([*words, "--structure", "cloaked", "--out-dir", str(out), "--quiet"])
+    told = capsys.readouterr().err
+    assert ended == 2, told
+    assert told.count("error:") == 1
+    assert "Traceback" not in told
+    for part in expected:
+        assert part in told
+    assert not out.exists()
+    assert not list(folder.glob("fabrication/.*"))
