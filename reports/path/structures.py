@@ -99,7 +99,7 @@ def _load_arrows(axes: Axes, structure: Structure, direction: float) -> None:
     ends = structure.centroid[structure.present & (structure.support == DRIVEN)]
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
-    reach = 0.08 * float(np.ptp(structure.centroid[structure.present], axis=0).max())
+    reach = 0.055 * float(np.ptp(structure.centroid[structure.present], axis=0).max())
     for x, y in ends[few[1:-1] if len(few) == 5 else few]:
         start = np.array([x, y]) - 1.3 * reach * along
         end = np.array([x, y]) - 0.3 * reach * along

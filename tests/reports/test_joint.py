@@ -11,10 +11,10 @@ from pipeline.errors import UserError
 from pipeline.problem import joint
 from pipeline.problem.joint import Joint
 from reports import style
-from reports.joint import content, figure, studies
+from reports.joint import build, content, figure, studies
 from reports.publishing import publish
 from reports.study import Study
-from tests.reports import pictures
+from tests.reports import pictures, static
 
 ASKED = Joint(title="Two voids", studies=("fig_smile", "fig_frown"))
 
@@ -56,6 +56,21 @@ def test_the_page_shows_every_structure_once(report: Path) -> None:
     assert names == [
         "Intact", "Smile: voided", "Smile: cloaked", "Frown: voided", "Frown: cloaked",
     ]  # fmt: skip
+
+
+def test_command_line(tmp_path: Path) -> None:
+    experiments = tmp_path / "experiments"
+    for name in (*ASKED.studies, "fig"):
+        (experiments / name).mkdir(parents=True)
+    for name in ASKED.studies:
+        static.written(experiments / name, static.SMILE)
+    asked = experiments / "fig" / "figure.yaml"
+    asked.write_text("title: Two voids\nstudies: [fig_smile, fig_frown]\n")
+    words = ["--figure", str(asked), "--results", str(experiments)]
+    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 0
+    assert {"fig.pdf", "fig.svg", "fig.png", "index.html", "fig_frown_robustness.csv"} <= {
+        path.name for path in (tmp_path / "report").iterdir()
+    }
 
 
 def test_the_committed_figure_names_studies() -> None:
