@@ -48,6 +48,6 @@ def _kernels() -> str:
     file holds what it calls.
     """
     digest = hashlib.sha256()
-    for path in sorted((ROOT / "sim").glob("*.py")):
+    for path in sorted([*(ROOT / "sim").glob("*.py"), *(ROOT / "pipeline/tracking").glob("*.py")]):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -13,7 +13,7 @@ from typing import Literal
 SCHEMA_VERSION = 1
 
 Type = Literal["float64", "int64", "int8", "str"]
-Kind = Literal["design", "design_method", "response", "sweep", "scatter", "verification"]
+Kind = Literal["design", "design_method", "response", "sweep", "scatter", "verification", "track"]
 
 
 @dataclass(frozen=True)
@@ -299,6 +299,58 @@ _VERIFICATION: Table = {
     "status": Variable(("check",), "1", "ok, or why there is no result", "str"),
 }
 
+_TRACKED = ("time", "unit", "dof")
+
+_TRACK: Table = {
+    "time": _label(("time",), "s", "time of the frame since the start of the window"),
+    "dof": _RESPONSE_LABELS["dof"],
+    "vertices": replace(_SHAPE["vertices"], long_name="vertices at rest, counter-clockwise"),
+    "displacement": Variable(
+        _TRACKED, "mm (ux, uy), rad (theta)", "displacement of the units", gaps=True
+    ),
+    "sigma": Variable(
+        _TRACKED,
+        "mm (ux, uy), rad (theta)",
+        "standard uncertainty of the displacement",
+        gaps=True,
+    ),
+    "quality": Variable(
+        ("time", "unit"),
+        "1",
+        "whether the unit was found, or why not",
+        "int8",
+        flags={
+            "good": 0,
+            "out_of_frame": 1,
+            "hidden": 2,
+            "glare": 3,
+            "poor_fit": 4,
+            "strayed": 5,
+            "absent": 6,
+        },
+    ),
+    "timing": Variable(
+        ("time",),
+        "1",
+        "timing of the frame: a duplicate shows the instant before, a frame is missing before",
+        "int8",
+        flags={"steady": 0, "duplicate": 1, "dropped": 2},
+    ),
+    "frame": Variable(("time",), "1", "number of the frame in the file, from zero", "int64"),
+    "camera_homography": Variable(
+        ("row", "column"), "px, mm", "homography from the specimen's plane to undistorted pixels"
+    ),
+    "camera_centre": Variable(("xy",), "px", "centre of the distortion"),
+    "camera_radial": Variable(
+        ("power",), "1", "distortion at half the image's larger side: square and fourth power"
+    ),
+    "camera_residual": Variable(
+        ("unit", "xy"), "px", "first frame: place of the unit less that by design", gaps=True
+    ),
+    "image_size": Variable(("xy",), "px", "width and height of the image", "int64"),
+    "blur": Variable((), "px", "standard deviation of the camera's blur at edges"),
+}
+
 TABLES: Mapping[Kind, Table] = {
     "design": _UNIT | _CASE | _METHOD | _NETWORK | _SHAPE | _per_method(_HISTORY),
     "design_method": _UNIT | _CASE | _NETWORK | _SHAPE | _HISTORY,
@@ -306,6 +358,7 @@ TABLES: Mapping[Kind, Table] = {
     "sweep": _SWEEP,
     "scatter": _SCATTER,
     "verification": _VERIFICATION,
+    "track": _UNIT | _TRACK,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -316,5 +369,6 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "sweep": {},
     "scatter": {},
     "verification": {},
+    "track": {"recording": "the recording's YAML, as read", "synthetic": "yes if rendered"},
 }
 """What each kind tells in attributes of its own, beside its provenance."""

@@ -34,7 +34,7 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     try:
         problem = Problem.model_validate(data, context={FOLDER: document.path.parent})
     except ValidationError as error:
-        raise _told(error, document, data, preset) from error
+        raise told(error, document, data, preset) from error
     for finding in findings(problem):
         raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
     return _with_recording(problem, document)
@@ -82,9 +82,10 @@ def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
     return presets[name]
 
 
-def _told(
+def told(
     error: ValidationError, document: Document, data: dict[str, Any], preset: str | None
 ) -> UserError:
+    """The first of the errors of validation, in words; `data` is the document with its preset."""
     first, *others = error.errors(include_url=False)
     keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
     what, remedy, key = _in_words(first)

@@ -26,6 +26,15 @@ SIZES = {
     "noise": 2,
     "sample": 4,
     "check": 3,
+    "row": 3,
+    "column": 3,
+    "power": 2,
+}
+
+
+_ATTRIBUTES: dict[str, dict[str, str]] = {
+    "design": {"shipped_method": "sqp"},
+    "track": {"recording": "{}", "synthetic": "no"},
 }
 
 
@@ -41,7 +50,7 @@ def sample(kind: Kind, seed: int = 0) -> xr.Dataset:
         {name: value for name, value in filled.items() if name not in labels},
         {name: filled[name] for name in labels},
     )
-    return dataset.assign_attrs(shipped_method="sqp") if kind == "design" else dataset
+    return dataset.assign_attrs(_ATTRIBUTES.get(kind, {}))
 
 
 def _values(name: str, variable: Variable, random: np.random.Generator) -> np.ndarray:

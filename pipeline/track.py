@@ -1,0 +1,179 @@
+"""Stage: turns the video of a specimen into the motions of its units, with their uncertainty."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import cli
+from pipeline.errors import UserError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.tracking.follow import Track
+    from pipeline.tracking.recording import Recording
+
+LOG = logging.getLogger(__name__)
+
+ABSENT = 6
+DESCRIPTION = """\
+Track the units of a specimen through a video.
+
+  python -m pipeline.track RECORDING.yaml --out track.nc
+  python -m pipeline.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
+
+The second writes NAME_recording.yaml and NAME_design.nc for a described test video, which the
+first then tracks.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.track", DESCRIPTION, study=False)
+    made.add_argument("words", nargs="+", metavar="[import] YAML", help="what to read")
+    made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
+    made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
+    made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="import")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Imports a description, or tracks a recording.
+
+    Raises:
+        UserError: a fault of the files, or a video that does not show the design.
+    """
+    if args.words[0] == "import" and len(args.words) == 2:
+        _import(Path(args.words[1]), args.video, args.out_dir)
+    elif len(args.words) == 1 and args.out is not None:
+        _track(Path(args.words[0]), args.out)
+    else:
+        remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
+        raise UserError("one recording and --out are wanted", remedy=remedy)
+
+
+def _import(path: Path, video: Path | None, folder: Path) -> None:
+    from pipeline import datasets, provenance
+    from pipeline.tracking import importing
+
+    described = importing.description(path)
+    shown = importing.video_of(path) if video is None else video
+    name = shown.stem
+    origin = {
+        "problem": "{}",
+        "problem_hash": provenance.file_hash(path),
+        "parents": json.dumps({"description": provenance.file_hash(path)}),
+    }
+    datasets.write(importing.design(described), folder / f"{name}_design.nc", "design", origin)
+    text = importing.recording_text(described, shown.resolve(), f"{name}_design.nc")
+    (folder / f"{name}_recording.yaml").write_text(text, encoding="utf-8")
+    LOG.info("python -m pipeline.track %s --out %s", folder / f"{name}_recording.yaml", "track.nc")
+
+
+def _track(path: Path, out: Path) -> None:
+    from pipeline import datasets, provenance
+    from pipeline.tracking import recording as recordings
+
+    asked = recordings.load(path)
+    source, video = path.parent / asked.design, path.parent / asked.video
+    design = datasets.read(source, "design")
+    track = followed(asked, design, video, path)
+    origin = {
+        "recording": asked.model_dump_json(),
+        "synthetic": "yes" if asked.synthetic else "no",
+        "parents": json.dumps(
+            {"design": provenance.file_hash(source), "video": provenance.file_hash(video)},
+            sort_keys=True,
+        ),
+        "packages": json.dumps(dict(provenance.package_versions()), sort_keys=True),
+        "git_commit": provenance.git_commit(),
+    }
+    datasets.write(dataset(design, track), out, "track", origin)
+
+
+def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
+    """The track of a recording, told about in a line at its end.
+
+    Raises:
+        UserError: naming the recording's file where the video does not show the design.
+    """
+    from pipeline.tracking.follow import follow
+    from pipeline.tracking.specimen import of_design
+    from pipeline.tracking.video import frames
+
+    end = np.inf if asked.window.end is None else asked.window.end
+    shown = frames(video, asked.window.start, end)
+    scale = None if asked.pixel_size is None else 1 / asked.pixel_size
+    try:
+        track = follow(shown, of_design(design), scale)
+    except UserError as error:
+        if error.file is None:
+            error.file = str(source)
+        raise
+    lost = float(np.mean(track.quality != 0))
+    LOG.info(
+        "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm, %.3f deg;"
+        " %d timing faults",
+        len(track.time),
+        track.quality.shape[1],
+        100 * lost,
+        np.nanmedian(track.sigma[..., :2]),
+        np.rad2deg(np.nanmedian(track.sigma[..., 2])),
+        np.count_nonzero(track.timing),
+    )
+    return track
+
+
+def dataset(design: xr.Dataset, track: Track) -> xr.Dataset:
+    """The dataset ``track``: units as in the design, those that are absent without motion."""
+    import xarray as xr
+
+    units = design.sizes["unit"]
+    present = np.isfinite(design["vertices"].values[:, 0, 0])
+    camera, pixel = track.calibration.camera, track.calibration.pixel
+    motion = ("time", "unit", "dof")
+
+    def spread(values: np.ndarray, fill: float) -> np.ndarray:
+        out = np.full((values.shape[0], units, *values.shape[2:]), fill, values.dtype)
+        out[:, present] = values
+        return out
+
+    residual = np.full((units, 2), np.nan)
+    residual[present] = track.calibration.residual
+    variables = {
+        "vertices": design["vertices"],
+        "displacement": (motion, spread(track.displacement, np.nan)),
+        "sigma": (motion, spread(track.sigma, np.nan)),
+        "quality": (("time", "unit"), spread(track.quality, ABSENT)),
+        "timing": (("time",), track.timing.astype(np.int8)),
+        "frame": (("time",), track.frame),
+        "camera_homography": (("row", "column"), camera.homography),
+        "camera_centre": (("xy",), camera.centre),
+        "camera_radial": (("power",), camera.radial),
+        "camera_residual": (("unit", "xy"), residual),
+        "image_size": (("xy",), np.array(camera.size)),
+        "blur": ((), track.calibration.blur / pixel),
+    }
+    coordinates = {
+        **{name: design[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), track.time),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

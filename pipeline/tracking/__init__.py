@@ -1,0 +1,1 @@
+"""From the video of a specimen to the motions of its units; knows nothing of the simulation."""

@@ -1,0 +1,130 @@
+"""A whole video: camera and templates from its first frame, then all frames in sequence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.tracking import timing, uncertainty
+from pipeline.tracking.arrays import Floats, Image, Ints
+from pipeline.tracking.calibrate import Calibration, calibrate
+from pipeline.tracking.find import Sighting, sight
+from pipeline.tracking.fitting import Fitter
+from pipeline.tracking.specimen import Specimen
+from pipeline.tracking.template import Learner
+from pipeline.tracking.tracker import Found, Tracker
+from pipeline.tracking.video import Frame
+
+_ENOUGH = 0.6
+"""Least part of the units that a first frame must show for the design to be its own."""
+
+
+class Track(NamedTuple):
+    """Motions of the units of a specimen.
+
+    Attributes:
+        time: (frames,) s.
+        frame: (frames,) numbers in the file.
+        displacement: (frames, units, 3) from the first frame on, mm and rad, NaN where missing.
+        sigma: the standard uncertainties, likewise.
+        quality: (frames, units) as in `tracker`.
+        timing: (frames,) as in `timing`.
+        calibration: of the camera.
+    """
+
+    time: Floats
+    frame: Ints
+    displacement: Floats
+    sigma: Floats
+    quality: Ints
+    timing: Ints
+    calibration: Calibration
+
+
+def follow(
+    frames: Iterator[Frame],
+    specimen: Specimen,
+    px_per_mm: float | None = None,
+    tell: Callable[[], None] | None = None,
+) -> Track:
+    """Tracks the specimen; what is kept of a frame are its poses, so memory hardly grows.
+
+    Args:
+        frames: in sequence; the first shows the specimen at rest.
+        specimen: what they show.
+        px_per_mm: roughly.
+        tell: is called after each frame.
+
+    Raises:
+        UserError: no frames, or the specimen is not in the first one.
+    """
+    first = next(frames, None)
+    if first is None:
+        raise UserError("the video has no frame in this window", key="window", remedy="widen it")
+    calibration = calibrate(first.image, specimen, _sighted(first.image, specimen, px_per_mm))
+    tracker = Tracker(specimen, fitter(first.image, specimen, calibration))
+    times, numbers, poses, sigmas, qualities = [], [], [], [], []
+    for frame in _all(first, frames):
+        found = tracker.step(frame.image)
+        times.append(frame.time)
+        numbers.append(frame.index)
+        poses.append(found.fits.pose.copy())
+        sigmas.append(_image_sigma(found))
+        qualities.append(found.quality.astype(np.int8))
+        if tell is not None:
+            tell()
+    motion = np.array(poses)
+    motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
+    sigma = uncertainty.calibrated(motion, np.array(sigmas, float), specimen.centre)
+    time = np.array(times) - times[0]
+    return Track(
+        time,
+        np.array(numbers),
+        motion,
+        np.where(np.isfinite(motion), sigma, np.nan),
+        np.array(qualities),
+        timing.faults(motion, sigma),
+        calibration,
+    )
+
+
+def fitter(image: Image, specimen: Specimen, calibration: Calibration) -> Fitter:
+    """Templates as a first frame shows the units, at rest."""
+    learner = Learner(specimen, calibration.grid, calibration.blur, calibration.pixel)
+    rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
+    learner.add(image, calibration.camera, rest, photometry, np.ones(specimen.count))
+    return Fitter(calibration.camera, learner.templates())
+
+
+def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:
+    yield first
+    yield from others
+
+
+def _image_sigma(found: Found) -> Floats:
+    return uncertainty.standard_errors(found.fits.scatter, found.fits.blocks).astype(np.float32)
+
+
+def _sighted(image: Image, specimen: Specimen, px_per_mm: float | None) -> Sighting:
+    if image.max() < 8 or np.ptp(image) < 8:
+        raise UserError(
+            "the first frame is black or without contrast",
+            key="window.start",
+            remedy="start where the specimen is lit",
+        )
+    sighting = sight(image, specimen, px_per_mm)
+    if len(sighting.unit) < _ENOUGH * specimen.count:
+        where = ""
+        if len(sighting.blob):
+            low, high = sighting.blob.min(axis=0), sighting.blob.max(axis=0)
+            where = f", matched from ({low[0]:.0f}, {low[1]:.0f}) to ({high[0]:.0f}, {high[1]:.0f})"
+        raise UserError(
+            f"the first frame does not show this design: {sighting.blobs} units found, "
+            f"{len(sighting.unit)} of {specimen.count} in their places{where} px",
+            key="design",
+            remedy="give the design of the specimen and its pixel_size, upright, not mirrored",
+        )
+    return sighting

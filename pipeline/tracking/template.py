@@ -1,0 +1,184 @@
+"""Templates of the units: from their outlines alone, or learned from frames of the video.
+
+An outline blurred as the camera blurs it finds units whose faces are unknown; what the frames show
+then takes its place, whatever it is: dots, speckle, or the bare edge.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from pipeline.tracking.arrays import Floats, Image, Singles
+from pipeline.tracking.camera import Camera
+from pipeline.tracking.patch import Templates
+from pipeline.tracking.specimen import Specimen
+from pipeline.tracking.spline import coefficients, sample
+
+NODES_PER_PIXEL = 1.6
+_REACH = 2.5
+"""The blurred edge is used so many standard deviations of the blur to the outside, and a pixel."""
+
+
+class Grid:
+    """Nodes about the centroids of all units, with their distances to outline and joints.
+
+    Attributes:
+        step: distance of the nodes, mm.
+        half: from the middle to the last node, mm.
+        x, y: (nodes, nodes) places relative to the centroid, mm.
+        inside: (units, nodes, nodes) signed distance to the outline, positive inside, mm.
+        joint: (units, nodes, nodes) distance to the nearest vertex that bears a ligament, mm.
+    """
+
+    def __init__(self, specimen: Specimen, px_per_mm: float, reach: float) -> None:
+        self.step = 1 / (NODES_PER_PIXEL * px_per_mm)
+        nodes = int(np.ceil((specimen.radius.max() + reach) / self.step)) + 3
+        self.half = nodes * self.step
+        line = np.arange(-nodes, nodes + 1) * self.step
+        self.x, self.y = np.meshgrid(line, line)
+        shape = (specimen.count, *self.x.shape)
+        self.inside = np.empty(shape, np.float32)
+        self.joint = np.empty(shape, np.float32)
+        for unit in range(specimen.count):
+            polygon = specimen.polygon(unit)
+            self.inside[unit] = self._signed_distance(polygon)
+            ends = polygon[specimen.joined[unit, : len(polygon)]]
+            self.joint[unit] = self._distance(ends)
+
+    def _distance(self, points: Floats) -> Floats:
+        far = np.full(self.x.shape, np.inf)
+        for x, y in points:
+            far = np.minimum(far, np.hypot(self.x - x, self.y - y))
+        return far
+
+    def _signed_distance(self, polygon: Floats) -> Floats:
+        far = np.full(self.x.shape, np.inf)
+        odd = np.zeros(self.x.shape, dtype=bool)
+        for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+            ex, ey = bx - ax, by - ay
+            along = ((self.x - ax) * ex + (self.y - ay) * ey) / (ex * ex + ey * ey)
+            along = np.clip(along, 0, 1)
+            far = np.minimum(far, np.hypot(self.x - ax - along * ex, self.y - ay - along * ey))
+            if by != ay:
+                crossing = (self.y < ay) != (self.y < by)
+                odd ^= crossing & (self.x < ax + (self.y - ay) * ex / ey)
+        return np.where(odd, far, -far)
+
+
+def _smooth(value: Floats, low: float, high: float) -> Floats:
+    share = np.clip((value - low) / (high - low), 0, 1)
+    return share * share * (3 - 2 * share)
+
+
+def _templates(
+    specimen: Specimen, grid: Grid, brightness: Floats, weight: Floats, pixel: float
+) -> Templates:
+    """Splines through the brightness; nodes without weight get the mean, so that none ring."""
+    del pixel
+    total = weight.sum(axis=(1, 2))
+    mean = (brightness * weight).sum(axis=(1, 2)) / total
+    square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
+    coefs = np.stack([coefficients(face) for face in brightness])
+    distance = np.hypot(grid.x, grid.y)
+    reach = np.array([distance[mask > 0].max() for mask in weight])
+    return Templates(
+        coefs,
+        weight.astype(np.float32),
+        grid.half,
+        grid.step,
+        specimen.centre,
+        np.sqrt(square),
+        reach,
+    )
+
+
+def outlines(specimen: Specimen, grid: Grid, blur: float, pixel: float) -> Templates:
+    """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
+
+    Args:
+        specimen: the units.
+        grid: the nodes.
+        blur: standard deviation of the camera's blur, mm.
+        pixel: size of a pixel, mm.
+    """
+    sharp = np.clip(grid.inside / grid.step + 0.5, 0, 1)
+    spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
+    faces = np.stack([cv2.GaussianBlur(face, (0, 0), float(spread)) for face in sharp])
+    outside = _REACH * blur + 0.5 * pixel
+    weight = _smooth(grid.inside, -outside - pixel, -outside)
+    weight *= 1 - _smooth(grid.inside, outside, outside + pixel)
+    weight *= _smooth(grid.joint, outside, outside + 2 * pixel)
+    return _templates(specimen, grid, faces.astype(np.float64), weight, pixel)
+
+
+class Learner:
+    """Averages what frames show of the units, each seen from the unit's own frame.
+
+    Args:
+        specimen: the units.
+        grid: the nodes.
+        blur: standard deviation of the camera's blur, mm.
+        pixel: size of a pixel, mm.
+    """
+
+    def __init__(self, specimen: Specimen, grid: Grid, blur: float, pixel: float) -> None:
+        self._specimen, self._grid, self._pixel = specimen, grid, pixel
+        outside = _REACH * blur + 0.5 * pixel
+        weight = _smooth(grid.inside, -outside - pixel, -outside)
+        beyond = _smooth(-grid.inside, -0.5 * blur, 0.5 * blur)
+        self._weight = weight * (1 - beyond * (1 - _smooth(grid.joint, 3 * pixel, 4 * pixel)))
+        self._wanted = [
+            np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(specimen.count)
+        ]
+        self._sum = np.zeros(grid.inside.shape)
+        self._count = np.zeros(grid.inside.shape)
+
+    def add(
+        self, image: Image, camera: Camera, pose: Floats, photometry: Floats, share: Floats
+    ) -> None:
+        """Adds a frame.
+
+        Args:
+            image: the frame.
+            camera: the camera.
+            pose: (units, 3) where the units are; NaN for those to leave out.
+            photometry: (units, 4) gain, offset and slopes that the frame has over the template.
+            share: (units,) weight of the units.
+        """
+        coefs = coefficients(image.astype(np.float64))
+        grid = self._grid
+        for unit in np.nonzero(np.isfinite(pose[:, 0]) & (share > 0))[0]:
+            rows, columns = self._wanted[unit]
+            x, y = grid.x[rows, columns], grid.y[rows, columns]
+            cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
+            place = self._specimen.centre[unit] + pose[unit, :2]
+            points = place + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
+            seen = camera.project(points)
+            value = np.empty(len(x))
+            sample(coefs, np.ascontiguousarray(seen[:, 0]), np.ascontiguousarray(seen[:, 1]), value)
+            gain, offset, sx, sy = photometry[unit]
+            value = (value - offset - (sx * x + sy * y) / grid.half) / gain
+            good = np.isfinite(value)
+            self._sum[unit, rows[good], columns[good]] += share[unit] * value[good]
+            self._count[unit, rows[good], columns[good]] += share[unit]
+
+    def templates(self) -> Templates:
+        """The mean of what was added."""
+        seen = self._count > 0
+        face = np.divide(self._sum, self._count, out=np.zeros_like(self._sum), where=seen)
+        weight = np.where(seen, self._weight, 0)
+        level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
+        face = np.where(seen, face, level[:, None, None])
+        return _templates(self._specimen, self._grid, face, weight, self._pixel)
+
+
+def plane_of(camera: Camera) -> Singles:
+    """Place (rows, columns, 2) in the specimen's plane of every pixel, mm."""
+    columns, rows = camera.size
+    u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
+    out = np.empty((rows, columns, 2), np.float32)
+    for row in range(0, rows, 64):  # a few rows at a time: the inverse needs several copies
+        strip = slice(row, row + 64)
+        out[strip] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
+    return out

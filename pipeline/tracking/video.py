@@ -1,0 +1,100 @@
+"""Frames of a video, one after the other, with the file's own time stamps."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import numpy as np
+
+from pipeline.errors import UserError
+from pipeline.tracking.arrays import Image
+
+LOG = logging.getLogger(__name__)
+
+_READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
+"""Formats whose first plane is the brightness in 8 bit, as it is."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture of the video.
+
+    Attributes:
+        index: from zero.
+        time: since the file's first frame, s, by the file's time stamps.
+        image: (rows, columns) brightness.
+    """
+
+    index: int
+    time: float
+    image: Image
+
+
+def frames(path: Path, start: float = 0.0, end: float = float("inf")) -> Iterator[Frame]:
+    """Decodes the video once, in sequence; nothing but the present frame is held.
+
+    A file that breaks off ends there, with a warning.
+
+    Args:
+        path: the video.
+        start: of the time window, s; the first frame of the file is at zero.
+        end: of the time window, s.
+
+    Raises:
+        UserError: no such file, or none that can be read as a video.
+    """
+    try:
+        with av.open(str(path)) as container:
+            yield from _decoded(container, path, start, end)
+    except FileNotFoundError as error:
+        raise UserError("no such video", file=path, remedy="check the path") from error
+    except av.FFmpegError as error:
+        remedy = "give a video that ffprobe can read; copy the file again if it is broken"
+        raise UserError(
+            f"not a readable video: {error.strerror}", file=path, remedy=remedy
+        ) from error
+
+
+def _decoded(
+    container: av.container.InputContainer, path: Path, start: float, end: float
+) -> Iterator[Frame]:
+    if not container.streams.video:
+        raise UserError("the file holds no video", file=path, remedy="give a video file")
+    stream = container.streams.video[0]
+    first: float | None = None
+    index = 0
+    decoded = iter(container.decode(stream))
+    while True:
+        try:
+            frame = next(decoded, None)
+        except av.FFmpegError as error:
+            if index == 0:
+                raise
+            LOG.warning("warning: %s breaks off after %d frames: %s", path, index, error.strerror)
+            return
+        if frame is None:
+            return
+        stamp = _nominal(stream, index) if frame.pts is None else float(frame.time)
+        first = stamp if first is None else first
+        time = stamp - first
+        if time > end:
+            return
+        if time >= start:
+            yield Frame(index, time, _brightness(frame))
+        index += 1
+
+
+def _nominal(stream: av.VideoStream, index: int) -> float:
+    return index / float(stream.average_rate or 1)
+
+
+def _brightness(frame: av.VideoFrame) -> Image:
+    if frame.format.name not in _READY:
+        return frame.to_ndarray(format="gray").astype(np.uint8)
+    plane = frame.planes[0]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+    return np.ascontiguousarray(rows[:, : plane.width])

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.tracking import camera as cameras
+from pipeline.tracking.camera import Camera
+from pipeline.tracking.rigid import rigid_motion, robust_motion
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def some_camera(random: np.random.Generator) -> Camera:
+    matrix = np.array([[4.0, 0.1, 30.0], [0.1, -4.0, 970.0], [0.0, 0.0, 1.0]])
+    matrix[:2, :2] += 0.1 * random.normal(size=(2, 2))
+    matrix[2, :2] = 1e-4 * random.normal(size=2)
+    return Camera(
+        matrix, 500 + 10 * random.normal(size=2), 0.02 * random.normal(size=2), (1000, 1000)
+    )
+
+
+@given(seeds)
+def test_what_a_camera_sees_is_where_it_was(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    camera = some_camera(random)
+    points = random.uniform(0, 220, (50, 2))
+    np.testing.assert_allclose(camera.unproject(camera.project(points)), points, atol=1e-9)
+
+
+@given(st.integers(0, 20))
+def test_a_camera_is_found_from_what_it_sees(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    camera = some_camera(random)
+    points = np.stack(np.meshgrid(*2 * [np.linspace(0, 220, 10)]), axis=-1).reshape(-1, 2)
+    pixels = camera.project(points)
+    found = cameras.fit(points, pixels, camera.size, 1e-3)
+    np.testing.assert_allclose(found.project(points), pixels, atol=2e-3)
+
+
+@given(seeds)
+def test_a_rigid_motion_is_found_exactly(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    turn, shift = random.uniform(-3, 3), random.normal(size=2)
+    points = random.normal(size=(int(random.integers(2, 9)), 2))
+    cos, sin = np.cos(turn), np.sin(turn)
+    moved = points @ np.array([[cos, sin], [-sin, cos]]) + shift
+    found, by = rigid_motion(points, moved)
+    np.testing.assert_allclose(found, turn, atol=1e-9)
+    np.testing.assert_allclose(by, shift, atol=1e-9)
+
+
+def test_an_outlier_does_not_move_a_unit() -> None:
+    points = np.random.default_rng(3).normal(size=(8, 2))
+    moved = points + np.array([0.3, -0.2])
+    moved[4] += 5.0
+    turn, shift, weight = robust_motion(points, moved, 1e-3)
+    np.testing.assert_allclose([turn, *shift], [0, 0.3, -0.2], atol=1e-6)
+    assert weight[4] == 0.0

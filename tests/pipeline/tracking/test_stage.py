@@ -1,0 +1,79 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from pipeline import datasets, track
+from tests.pipeline.tracking.conftest import CLIPS
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """The bare clip, imported."""
+    assert track.main(["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)]) == 0
+    return tmp_path / "f_silhouette_recording.yaml"
+
+
+def refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """What the stage says when it refuses; it must leave nothing behind."""
+    out = recording.with_name("track.nc")
+    assert track.main([str(recording), "--out", str(out)]) == 2
+    assert not out.exists()
+    return capsys.readouterr().err
+
+
+def changed(recording: Path, old: str, new: str) -> None:
+    text = recording.read_text(encoding="utf-8")
+    assert old in text
+    recording.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
+    out = recording.with_name("track.nc")
+    assert track.main([str(recording), "--out", str(out)]) == 0
+    made = datasets.read(out, "track")
+    design = datasets.read(recording.with_name("f_silhouette_design.nc"), "design")
+    assert made["displacement"].dims == ("time", "unit", "dof")
+    np.testing.assert_array_equal(made["unit"], design["unit"])
+    np.testing.assert_allclose(np.diff(made["time"]), 1 / 300, atol=1e-6)
+    assert (made["quality"] == 0).all()
+    assert made.attrs["synthetic"] == "yes"
+
+
+def test_another_design_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8")
+    other = recording.with_name("other.yaml")
+    other.write_text(text.replace("spacing_mm: 15.0", "spacing_mm: 27.0"), encoding="utf-8")
+    video = str(CLIPS / "f_silhouette.mp4")
+    folder = str(recording.parent)
+    assert track.main(["import", str(other), "--video", video, "--out-dir", folder]) == 0
+    assert "does not show this design" in refused(recording, capsys)
+
+
+def test_what_is_no_video_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changed(recording, str(CLIPS / "f_silhouette.mp4"), str(CLIPS / "README.md"))
+    assert "not a readable video" in refused(recording, capsys)
+
+
+def test_black_frames_are_refused(
+    recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    black = tmp_path / "black.mkv"
+    with av.open(str(black), "w") as container:
+        stream = container.add_stream("ffv1", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 320, 240, "gray"
+        frame = av.VideoFrame.from_ndarray(np.zeros((240, 320), np.uint8), format="gray")
+        container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    changed(recording, str(CLIPS / "f_silhouette.mp4"), str(black))
+    assert "black or without contrast" in refused(recording, capsys)
+
+
+def test_a_key_without_its_unit_is_refused(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changed(recording, "pixel_size: 0.365 mm", "pixel_size: 0.365")
+    assert "pixel_size" in refused(recording, capsys)
