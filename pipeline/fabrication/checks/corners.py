@@ -65,7 +65,7 @@ def closed(made: Polygon, width: float) -> Geometry:
 
 def _found(shape: Polygon, made: Polygon, corners: Floats) -> Found:
     """Measures of one slot."""
-    vertex = int(shapely.distance(shapely.points(corners), shape).argmin())
+    vertex = _owner(shape, corners)
     ends, width = _ends(shape, corners[vertex])
     inner, mouth = ends
     axis = _unit(np.mean(inner, axis=0) - np.mean(mouth, axis=0))
@@ -74,6 +74,16 @@ def _found(shape: Polygon, made: Polygon, corners: Floats) -> Found:
     around = shapely.union(made, shape.buffer(2e-4)).boundary
     wall = float(line.distance(around.difference(shape.buffer(0.1 * width))))
     return Found(vertex, shape, line, depth, width, wall, _lip(made, inner, axis))
+
+
+def _owner(shape: Polygon, corners: Floats) -> int:
+    """The vertex that a slot comes from: near to it, and above all on its axis."""
+    box = np.asarray(shapely.minimum_rotated_rectangle(shape).exterior.coords)[:3]
+    sides = np.diff(box, axis=0)
+    along = _unit(sides[np.argmax(np.linalg.norm(sides, axis=1))])
+    to = corners - np.asarray(shape.centroid.coords[0])
+    aside = np.abs(to[:, 0] * along[1] - to[:, 1] * along[0])
+    return int((shapely.distance(shapely.points(corners), shape) + 10.0 * aside).argmin())
 
 
 def _ends(shape: Polygon, vertex: Floats) -> tuple[tuple[Floats, Floats], float]:
