@@ -39,6 +39,9 @@ _MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 def write_stl(meshes: Iterable[Mesh], path: Path) -> None:
     """Write meshes as one binary STL, in mm."""
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes]).astype("<f4")
+    # Edges below single precision collapse; the triangles beside them go, and no hole is left.
+    distinct = (corners != np.roll(corners, 1, axis=1)).any(axis=2).all(axis=1)
+    corners = corners[distinct]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     facets = np.zeros(
