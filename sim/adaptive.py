@@ -9,9 +9,10 @@ import numpy as np
 from sim import grid
 from sim.arrays import Floats
 from sim.dynamics import Drive
-from sim.errors import SimulationError
+from sim.errors import SimulationError, StrangersMeet
 from sim.esdirk import CONVERGED, march
 from sim.implicit import ImplicitSolver
+from sim.meeting import refuse_strangers
 from sim.model import Values
 from sim.system import system_of
 
@@ -42,6 +43,21 @@ def adapted(
     Raises:
         SimulationError: the step became too short to go on.
     """
+    try:
+        return _adapted(solver, values, drive, tolerance, first, largest)
+    except StrangersMeet as met:
+        known = solver.coupling(met.pairs)
+        return adapted(known, values, drive, tolerance, first, largest)
+
+
+def _adapted(
+    solver: ImplicitSolver,
+    values: Values,
+    drive: Drive,
+    tolerance: float,
+    first: float,
+    largest: float,
+) -> ImplicitSolver:
     end = float(solver.times[-1])
     times, state = [0.0], (np.zeros(solver.topology.n_dofs), np.zeros(solver.topology.n_dofs))
     step = min(first, end)
@@ -81,6 +97,7 @@ def _attempt(
     status, _, _ = march(
         times, held, system, tableau.stages, tableau.nodes, solver.tolerance, u, v, a, counts
     )
+    refuse_strangers(system.contacts)
     if status != CONVERGED:
         return None, np.inf
     difference = step * (tableau.error @ v[0]) * top.scale

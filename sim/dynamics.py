@@ -22,7 +22,7 @@ from jax.custom_derivatives import SymbolicZero
 from jax.flatten_util import ravel_pytree
 
 from sim.arrays import Floats, Ints
-from sim.errors import SimulationError
+from sim.errors import SimulationError, StrangersMeet
 from sim.loads import Motion, held_values
 from sim.model import Parameters, Topology, Values
 
@@ -91,6 +91,10 @@ class Solver(Protocol):
         """One with half the steps that a record was made with, to estimate its error by."""
         ...
 
+    def coupling(self, pairs: Ints) -> Solver:
+        """One with room in the tangent for contact of more pairs (n, 2) of units."""
+        ...
+
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Any]:
         """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
 
@@ -98,6 +102,7 @@ class Solver(Protocol):
 
         Raises:
             SimulationError: a step failed.
+            StrangersMeet: units met whose coupling the tangent has no room for.
         """
         ...
 
@@ -115,7 +120,10 @@ def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Fl
         SimulationError: a step failed, or there are no finite numbers to start from.
     """
     _refuse_nan(values, drive)
-    displacement, velocity, record = solver.forward(values, drive)
+    try:
+        displacement, velocity, record = solver.forward(values, drive)
+    except StrangersMeet as met:
+        return solve_case(solver.coupling(met.pairs), values, drive)
     held = solver.topology.held
     displacement[:, held] = drive.values(held, solver.asked)
     velocity[:, held] = drive.rates(held, solver.asked)

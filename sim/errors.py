@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 
 
 class SimulationError(RuntimeError):
@@ -26,3 +26,15 @@ class SimulationError(RuntimeError):
         self.step = step
         self.unit = unit
         self.states = states
+
+
+class StrangersMeet(SimulationError):  # noqa: N818  (a turn that a solve takes, no fault)
+    """Units came near each other whose coupling the tangent has no room for.
+
+    Args:
+        pairs: (n, 2) units.
+    """
+
+    def __init__(self, pairs: Ints) -> None:
+        super().__init__(f"units {pairs[0, 0]} and {pairs[0, 1]} meet; solve again with them")
+        self.pairs = pairs

@@ -18,7 +18,6 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
-from sim.kernels import smallest_void
 from sim.matrix import add, clear, factorise, solve
 from sim.potential import admissible_step, gradient, hessian_product, mixed, tangent
 from sim.system import Bars, System, Workspace, workspace
@@ -148,8 +147,9 @@ def _stage_base(
 
 @compiled
 def _guess(
-    s: int, nodes: Floats, u: Floats, a: Floats, base: Base, system: System, motion: Floats
-) -> None:
+    s: int, nodes: Floats, u: Floats, a: Floats, base: Base, system: System, work: Workspace,
+    motion: Floats,
+) -> None:  # fmt: skip
     """Guess of a stage: the acceleration extrapolated over the last stages, for all dofs alike.
 
     Held dofs are extrapolated too and moved to their values together with the others: a driven unit
@@ -160,7 +160,8 @@ def _guess(
     else:
         w = (nodes[s] - nodes[s - 2]) / (nodes[s - 1] - nodes[s - 2])
         motion[:] = base.u + base.k * (base.v + base.k * (w * a[s - 1] + (1.0 - w) * a[s - 2]))
-    if smallest_void(motion, system.net)[0] <= 0.0:
+    work.step[:] = motion - u[s - 1]
+    if admissible_step(u[s - 1], system, work.step) <= 1.0:
         motion[:] = u[s - 1]
 
 
@@ -229,7 +230,7 @@ def march(
             fresh, factored_k = False, base.k
         for s in range(1, n_stages):
             _stage_base(s, h, stages, u[n], v[n], a[n], base)
-            _guess(s, nodes, u[n], a[n], base, system, motion)
+            _guess(s, nodes, u[n], a[n], base, system, work, motion)
             target = drive[n * (n_stages - 1) + s]
             status, fresh, rate = _solve_stage(
                 motion, target, base, tolerance * h, system, work, fresh, rate, counts

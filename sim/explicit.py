@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim import grid
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.kickdrift import Outputs, Steps, run, sweep_back
+from sim.meeting import refuse_overlap, refuse_strangers
 from sim.model import Topology, Values
 from sim.modes import highest_frequency
+from sim.observables import observe
 from sim.splitting import BLANES_MOAN, Splitting
 from sim.system import as_values, empty_bars, system_of
 
@@ -28,10 +30,12 @@ class Record:
     Attributes:
         steps: as taken.
         checkpoints: (n_segments, 2, n_dofs) displacement and velocity.
+        topology: as solved, with room for all units that met.
     """
 
     steps: Steps
     checkpoints: Floats
+    topology: Topology
 
 
 @dataclass(frozen=True)
@@ -62,19 +66,25 @@ class ExplicitSolver:
         """See ``dynamics.Solver``."""
         return replace(self, n_steps=2 * record.steps.n_steps)
 
+    def coupling(self, pairs: Ints) -> ExplicitSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, topology=self.topology.coupling(pairs))
+
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
         system = system_of(top, values)
+        refuse_overlap(system.contacts)
         stable = self._steps_for(highest_frequency(top, values))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(values, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
             failed = run(steps, self._outputs(steps.n_steps), system, checkpoints, u, v)
+            refuse_strangers(system.contacts)
             needed = 2 * stable if failed >= 0 else self._steps_in_contact(values, u)
             if needed <= stable:
-                return u, v, Record(steps, checkpoints)
+                return u, v, Record(steps, checkpoints, top)
             stable = needed
         raise SimulationError(
             f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
@@ -95,18 +105,17 @@ class ExplicitSolver:
 
     def _steps_in_contact(self, values: Values, states: Floats) -> int:
         """Steps that are stable in the one of the states whose contact is closest, 0 if none is."""
-        top = self.topology
-        motion = states.reshape(len(states), -1, 3)
-        closest = top.smallest_void_angle(values.void, motion)
-        if closest.min() >= top.cutoff:
+        contact = observe(self.topology, values, states.reshape(len(states), -1, 3)).contact_energy
+        if contact.max() == 0.0:
             return 0
-        return self._steps_for(highest_frequency(top, values, motion[closest.argmin()]))
+        closest = states[contact.argmax()]
+        return self._steps_for(highest_frequency(self.topology, values, closest))
 
     def backward(
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
-        top, steps = self.topology, record.steps
+        top, steps = record.topology, record.steps
         system = system_of(top, values)
         bars = empty_bars(system, steps.drive.shape)
         bar_decay, bar_gain = np.zeros_like(steps.decay), np.zeros_like(steps.gain)

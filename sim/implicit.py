@@ -11,6 +11,7 @@ from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.esdirk import CONVERGED, adjoint, march
+from sim.meeting import refuse_overlap, refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 from sim.tableau import ESDIRK3, Tableau
@@ -27,6 +28,7 @@ class Record:
         u, v, a: (n_steps + 1, n_stages, n_dofs) stage values.
         touching: ligaments in which contact was computed.
         counts: (3,) gradients, factorisations, solves.
+        topology: as solved, with room for all units that met.
     """
 
     times: Floats
@@ -35,6 +37,7 @@ class Record:
     a: Floats
     touching: Ints
     counts: Ints
+    topology: Topology
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,10 @@ class ImplicitSolver:
         """Ligaments in which contact is computed."""
         return np.flatnonzero(values.void.min(axis=1) < self.topology.cutoff + self.turn_allowance)
 
+    def coupling(self, pairs: Ints) -> ImplicitSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, topology=self.topology.coupling(pairs))
+
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         record = self._march(values, drive, self.touching(values))
@@ -90,6 +97,7 @@ class ImplicitSolver:
     def _march(self, values: Values, drive: Drive, touching: Ints) -> Record:
         top, tableau, times = self.topology, self.tableau, self.times
         system = system_of(top, values, touching)
+        refuse_overlap(system.contacts)
         counts = np.zeros(3, dtype=np.int64)
         for _ in range(MAX_SPLITS):
             shape = (len(times), len(tableau.nodes), top.n_dofs)
@@ -98,8 +106,9 @@ class ImplicitSolver:
             status, step, worst = march(
                 times, held, system, tableau.stages, tableau.nodes, self.tolerance, u, v, a, counts
             )
+            refuse_strangers(system.contacts)
             if status == CONVERGED:
-                return Record(times, u, v, a, touching, counts)
+                return Record(times, u, v, a, touching, counts, top)
             times = grid.split_step(times, step)
         raise SimulationError(
             f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
@@ -113,7 +122,7 @@ class ImplicitSolver:
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
-        top, n_times = self.topology, len(record.times)
+        top, n_times = record.topology, len(record.times)
         system = system_of(top, values, record.touching)
         value, slope = grid.hermite_matrices(record.times, self.asked)
         bar_states = value.T @ bar_u + slope.T @ bar_v

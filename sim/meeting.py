@@ -9,8 +9,9 @@ import numpy as np
 
 from sim.arrays import Ints
 from sim.clearance import close_pairs
+from sim.errors import SimulationError, StrangersMeet
 from sim.lattice import Lattice
-from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX, Contacts, Watch
+from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX, Contacts, Watch, find
 
 if TYPE_CHECKING:
     from sim.model import Values
@@ -91,6 +92,24 @@ def contacts_of(meeting: Meeting | None, values: Values, n_units: int) -> Contac
     )
 
 
+def refuse_overlap(contacts: Contacts) -> None:
+    """Raises an error that names two units which overlap before anything moves."""
+    rest = np.zeros_like(contacts.watch.state)
+    if len(contacts.pairs) > 0 and find(rest, contacts) < 0:
+        refuse_strangers(contacts)
+        raise SimulationError(
+            f"units {contacts.watch.overlap[0]} and {contacts.watch.overlap[1]} overlap at rest;"
+            " ask for a gap between units, or take contact: angle"
+        )
+
+
+def refuse_strangers(contacts: Contacts) -> None:
+    """Raises ``StrangersMeet`` if a solve ended since the tangent has no room for a pair."""
+    count = contacts.watch.found[1]
+    if count > 0:
+        raise StrangersMeet(contacts.watch.strangers[:count].copy())
+
+
 def _watch(meeting: Meeting, n_units: int) -> Watch:
     """Scratch that belongs to no state yet."""
     n_vertices, n_watched = len(meeting.following), len(meeting.first[1:])
@@ -105,4 +124,5 @@ def _watch(meeting: Meeting, n_units: int) -> Watch:
         strangers=np.zeros((MAX_STRANGERS, 2), dtype=np.int64),
         terms=np.zeros((TERMS_PER_VERTEX * n_vertices, 3), dtype=np.int64),
         found=np.zeros(2, dtype=np.int64),
+        overlap=np.full(2, -1),
     )

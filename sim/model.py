@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -145,6 +145,11 @@ class Topology:
         """(n_free,) ids of the free dofs in the tangent's order."""
         number = self.numbering[0]
         return np.argsort(np.where(number < 0, len(number), number), kind="stable")[: self.n_free]
+
+    def coupling(self, pairs: Ints) -> Topology:
+        """The same with room in the tangent for contact of more pairs (n, 2) of units."""
+        assert self.meeting is not None
+        return replace(self, meeting=self.meeting.with_pairs(pairs))
 
     @property
     def n_units(self) -> int:

@@ -35,6 +35,7 @@ class Watch(NamedTuple):
         strangers: (MAX_STRANGERS, 2) units of pairs that the tangent has no room for.
         terms: (n, 3) vertex, and the start and end of an edge; the end is -1 for a vertex alone.
         found: (2,) number of terms, -1 if the state is not admissible, and number of strangers.
+        overlap: (2,) units that overlap, if the state is not admissible.
     """
 
     state: Floats
@@ -47,6 +48,7 @@ class Watch(NamedTuple):
     strangers: Ints
     terms: Ints
     found: Ints
+    overlap: Ints
 
 
 class Contacts(NamedTuple):
@@ -245,7 +247,7 @@ def _collect(contacts: Contacts) -> None:
                 if dx * dx + dy * dy >= far * far:
                     continue
                 if is_inside(v, other, contacts):
-                    watch.found[0] = -1
+                    watch.found[0], watch.overlap[0], watch.overlap[1] = -1, a, b
                     return
                 _append_near(v, other, one == a, contacts)
 

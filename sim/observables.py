@@ -12,6 +12,8 @@ from jax import Array
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.energy import LigamentStrain, ligament_strain
+from sim.errors import StrangersMeet
+from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
 from sim.potential import gradient
 from sim.system import System, system_of
@@ -51,7 +53,12 @@ def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
     """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
-    _visit(states, system_of(topology, values), energies, forces)
+    system = system_of(topology, values)
+    _visit(states, system, energies, forces)
+    try:
+        refuse_strangers(system.contacts)
+    except StrangersMeet as met:
+        return observe(topology.coupling(met.pairs), values, motion)
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
     voids = topology.smallest_void_angles(values.void, motion)

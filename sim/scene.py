@@ -27,6 +27,8 @@ class Scene:
         lattice: the initial structure.
         material: constants.
         barrier, cutoff: contact angles, rad.
+        contact_distance: activation distance of contact on the distance of units, mm; None for
+            contact on the void angles.
         clamped: (n,) ids (3 unit + dof) of dofs that rest.
         driven: (n,) units that follow the drive, all three dofs.
         motions: the drive of each load case.
@@ -63,6 +65,7 @@ class Scene:
     samples: int = 201
     steps: int | None = None
     reference: Scene | None = None
+    contact_distance: float | None = None
     frozen: Ints | None = None
     symmetry: Symmetry = "none"
     accuracy: Accuracy = "default"
@@ -101,7 +104,8 @@ class Scene:
     def topology(self) -> Topology:
         """The fixed structure; differentiable by what the design can change."""
         moved = np.unique(self.lattice.unit[self.space.free_vertices])
-        return topology(self.lattice, self.held, self.barrier, self.cutoff, moved)
+        distance = self.contact_distance
+        return topology(self.lattice, self.held, self.barrier, self.cutoff, moved, distance)
 
     @cached_property
     def region_ligaments(self) -> Ints:

@@ -10,6 +10,7 @@ from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.equilibrium import adjoint, follow
 from sim.errors import SimulationError
+from sim.meeting import refuse_overlap, refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 
@@ -28,6 +29,7 @@ class Record:
         jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
             point or branched.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
+        topology: as solved, with room for all units that met.
     """
 
     states: Floats
@@ -35,6 +37,7 @@ class Record:
     stable: Ints
     jumped: Ints
     counts: Ints
+    topology: Topology
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,10 @@ class StaticSolver:
         del record
         return replace(self, relative=self.relative / 100, start=None, substeps=2 * self.substeps)
 
+    def coupling(self, pairs: Ints) -> StaticSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, topology=self.topology.coupling(pairs))
+
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
@@ -79,10 +86,12 @@ class StaticSolver:
         bends, trusted = self._known(states)
         system = system_of(top, values)
         floor = max(self.absolute, ROUNDING * float(values.law[:, 0].max()))
+        refuse_overlap(system.contacts)
         reached, fraction = follow(
             loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
             counts,
         )  # fmt: skip
+        refuse_strangers(system.contacts)
         if reached < len(loads):
             where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()
             unit = int(top.ligament_units[where, 0])
@@ -98,7 +107,7 @@ class StaticSolver:
         last = slice(self.substeps - 1, None, self.substeps)
         on_the_way = jumped.reshape(-1, self.substeps).max(axis=1)
         record = Record(
-            states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts
+            states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts, top
         )
         return states[last].copy(), np.zeros_like(states[last]), record
 
@@ -122,7 +131,7 @@ class StaticSolver:
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         del bar_v
-        top = self.topology
+        top = record.topology
         system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
         unstable = adjoint(record.states, bar_u, system, top.designed, bars)
