@@ -8,9 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline.contacts import LAWS, by_contact
 from pipeline.measuring import Measured, Structure
 from pipeline.problem import Problem
-from pipeline.scenes import lattice_of
+from pipeline.scenes import contact_distance, lattice_of
 from pipeline.structures import Variables, network_variables, spread, unit_coordinates
 
 Floats = NDArray[np.float64]
@@ -49,9 +50,10 @@ def dataset(
         **_over_units(asked, structures, measured),
         **_over_steps(measured),
         **_over_cases(measured),
+        **by_contact(structures, contact_distance(asked)),
         "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
     }
-    for name in ("loss", "loss_samples"):
+    for name in ("loss", "loss_samples", "loss_by_contact"):
         variables[name] = (*variables[name], {"units": loss_units(asked)})
     return xr.Dataset(variables, _coordinates(asked, structures, times))
 
@@ -136,4 +138,5 @@ def _coordinates(asked: Problem, structures: dict[str, Structure], times: Floats
         "amplitude": (("case",), [getattr(asked.drive, "amplitude", np.nan)] * len(directions)),
         "time": (("time",), times),
         "dof": (("dof",), ["ux", "uy", "theta"]),
+        "contact_law": (("contact_law",), list(LAWS)),
     }

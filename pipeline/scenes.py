@@ -15,6 +15,7 @@ from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp, TimeSeries
 from sim import loads
 from sim.constraints import Limits
+from sim.contact import activation_distance
 from sim.lattice import Lattice
 from sim.model import Material
 from sim.scene import Scene
@@ -57,6 +58,7 @@ def scene_of(
         material=material,
         barrier=problem.contact.barrier_angle,
         cutoff=problem.contact.cutoff_angle,
+        contact_distance=contact_distance(problem) if problem.contact.law == "geometric" else None,
         clamped=clamped_dofs(problem, intact),
         driven=driven_units(problem, intact),
         motions=made,
@@ -88,6 +90,13 @@ def scene_of(
 
 def _units(ids: Iterable[int]) -> NDArray[np.int64]:
     return np.array(sorted(ids), dtype=np.int64)
+
+
+def contact_distance(problem: Problem) -> float:
+    """Activation distance of geometric contact, whether or not the problem asks for it, mm."""
+    asked = problem.contact.distance
+    ligament, gap = problem.lattice.ligament_length, problem.constraints.gap
+    return activation_distance(ligament, gap) if asked is None else asked
 
 
 def limits_of(problem: Problem) -> Limits:

@@ -108,7 +108,7 @@ def _edges(vertices: Array, ring: Array, law: DistanceLaw) -> Array:
 def activation_distance(ligament_length: float, gap: float | None = None) -> float:
     """Default activation distance: a twelfth of the ligaments' length, or the smallest gap, mm.
 
-    Units of a design that keeps the ``gap`` do not push each other at rest; and the ends of a
-    ligament, joined but not in contact, are far beyond it.
+    Units of a design that keeps a ``gap`` above zero do not push each other at rest; and the ends
+    of a ligament, joined but not in contact, are far beyond it.
     """
-    return min(ligament_length / 12.0, np.inf if gap is None else gap)
+    return min(ligament_length / 12.0, gap or np.inf)

@@ -172,12 +172,15 @@ _RESPONSE_LABELS: Table = {
     "frequency": Variable(("case",), "Hz", "frequency of the drive", gaps=True, coordinate=True),
     "amplitude": Variable(("case",), "mm", "amplitude of the drive", gaps=True, coordinate=True),
     "time": _label(("time",), "s", "time since the start of the drive"),
+    "contact_law": _names("contact_law", "law of contact", "angle", "geometric"),
     "dof": _names("dof", "degree of freedom", "ux", "uy", "theta"),
 }
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
 _STEP = ("structure", "case", "time")
 _OF_CASE = ("structure", "case")
+
+_BY_LAW = ("structure", "contact_law", "case")
 
 _RESPONSE: Table = {
     "vertices": Variable(
@@ -231,6 +234,18 @@ _RESPONSE: Table = {
     ),
     "displacement_error": Variable(
         _OF_CASE, "1", "estimated relative error of the displacement in the region of interest"
+    ),
+    "loss_by_contact": Variable(
+        _BY_LAW, "1", "loss under either law of contact, static studies", gaps=True, also=ENERGY
+    ),
+    "overlaps_by_contact": Variable(
+        _BY_LAW,
+        "1",
+        "overlapping pairs of units over the load steps under either law of contact",
+        gaps=True,
+    ),
+    "gap_by_contact": Variable(
+        _BY_LAW, "mm", "smallest gap over the load steps under either law of contact", gaps=True
     ),
 }
 

@@ -64,6 +64,14 @@ def _contact(problem: Problem) -> Findings:
         yield Finding(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
 
 
+def _contact_distance(problem: Problem) -> Findings:
+    distance, gap = problem.contact.distance, problem.constraints.gap
+    room = problem.lattice.ligament_length if gap is None else gap
+    if distance is not None and distance > room:
+        what = f"units {room:g} mm apart at rest are within the contact distance, {distance:g} mm"
+        yield Finding(what, ("contact", "distance"), f"keep it to {room:g} mm, or leave it out")
+
+
 def _smallest_void(lattice: Quads) -> float:
     return 90.0 - 2.0 * abs(math.degrees(lattice.bias_angle))
 
@@ -312,6 +320,7 @@ def _optimiser(problem: Problem) -> Findings:
 _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _lattice,
     _contact,
+    _contact_distance,
     _units_exist,
     _drive_is_free,
     _horizon,

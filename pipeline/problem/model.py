@@ -81,12 +81,17 @@ class Material(Section):
 
 
 class Contact(Section):
-    """Contact through the void angles: none above the cut-off, without bound at the barrier."""
+    """Contact of units: on the void angles of bonded ones (the authors'), or on true distances.
 
-    law: Literal["angle"]
+    On angles there is none above the cut-off and no bound at the barrier; on distances none beyond
+    `distance` and no bound at a touch. Designs are judged by both.
+    """
+
+    law: Literal["angle", "geometric"]
     stiffness: ContactStiffness
     barrier_angle: Angle
     cutoff_angle: Angle
+    distance: Length | None = None
 
 
 class Support(Section):

@@ -171,6 +171,7 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
     power = (scaled**2).sum(axis=(-1, -2))[..., horizon]
     loss = np.trapezoid(power, time[horizon], axis=-1) / time[horizon][-1]
     per_time, per_case = ("structure", "case", "time"), ("structure", "case")
+    per_law = ("structure", "contact_law", "case")
     shapes = [lattice.padded(lattice.vertices), lattice.padded(cloaked(chosen, lattice))]
     n_cases = len(_drive(chosen).directions)
     zeros = np.zeros(motion.shape[:3])
@@ -201,12 +202,16 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
             "loss_samples": (per_case, SAMPLES * loss),
             "loss_error": (per_case, np.full(loss.shape, LOSS_ERROR)),
             "displacement_error": (per_case, np.full(loss.shape, 2e-3)),
+            "loss_by_contact": (per_law, np.stack([loss, loss], axis=1)),
+            "overlaps_by_contact": (per_law, np.zeros((len(loss), 2, n_cases))),
+            "gap_by_contact": (per_law, np.full((len(loss), 2, n_cases), 0.08)),
         },
         _labels(chosen, lattice)
         | {
             "structure": ["altered", "cloaked"],
             "time": time,
             "dof": ["ux", "uy", "theta"],
+            "contact_law": ["angle", "geometric"],
             "frequency": ("case", np.full(n_cases, frequency)),
             "amplitude": ("case", np.full(n_cases, _drive(chosen).amplitude)),
         },

@@ -1,0 +1,64 @@
+"""Losses and overlaps of structures under either law of contact, as variables of a response."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pipeline.measuring import Structure
+    from sim.contact_laws import Judgement
+
+LOG = logging.getLogger(__name__)
+
+LAWS = ("angle", "geometric")
+_DIMS = ("structure", "contact_law", "case")
+_MEASURES = {
+    "loss_by_contact": "loss",
+    "overlaps_by_contact": "overlaps",
+    "gap_by_contact": "gap",
+}
+
+
+def by_contact(structures: dict[str, Structure], distance: float) -> dict[str, tuple[Any, ...]]:
+    """Loss, overlaps and smallest gap of static structures under either law.
+
+    NaN in studies of motion in time, and where a structure cannot be simulated under a law.
+
+    Args:
+        structures: by name.
+        distance: activation distance of geometric contact, mm.
+    """
+    judged = [
+        [_judge(name, structure, law, distance) for law in LAWS]
+        for name, structure in structures.items()
+    ]
+    n_cases = len(next(iter(structures.values())).scene.motions)
+
+    def gather(field: str) -> NDArray[np.float64]:
+        return np.array(
+            [[_part(one, field, n_cases) for one in of_laws] for of_laws in judged], dtype=float
+        )
+
+    return {name: (_DIMS, gather(field)) for name, field in _MEASURES.items()}
+
+
+def _part(judgement: Judgement | None, field: str, n_cases: int) -> NDArray[np.float64]:
+    return np.full(n_cases, np.nan) if judgement is None else getattr(judgement, field)
+
+
+def _judge(name: str, structure: Structure, law: str, distance: float) -> Judgement | None:
+    from sim.contact_laws import by_distance, judge
+    from sim.errors import SimulationError
+
+    if not structure.scene.static:
+        return None
+    scene = by_distance(structure.scene, distance if law == "geometric" else None)
+    try:
+        return judge(scene, structure.vertices)
+    except SimulationError as error:
+        LOG.warning("%s structure under %s contact: %s", name, law, error)
+        return None
