@@ -176,7 +176,10 @@ class Topology:
             touching = np.zeros(0, dtype=np.int64)
         contact = np.empty((n, 3))
         contact[:, 0] = values.contact
-        contact[:, 1], contact[:, 2] = self.barrier, self.cutoff
+        by_angle = self.meeting is None
+        contact[:, 1], contact[:, 2] = (
+            (self.barrier, self.cutoff) if by_angle else (-np.inf, -np.inf)
+        )
         return Network(
             unit=self.ligament_units,
             arm=np.array(values.arm, dtype=float, order="C"),

@@ -205,6 +205,25 @@ def is_inside(v: int, unit: int, contacts: Contacts) -> bool:
 
 
 @compiled
+def _side(p: int, q: int, v: int, place: Floats) -> bool:
+    """Whether vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
+    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
+    return ex * (place[v, 1] - place[p, 1]) > ey * (place[v, 0] - place[p, 0])
+
+
+@compiled
+def _crosses(v: int, unit: int, contacts: Contacts) -> bool:
+    """Whether the edge that starts at ``v`` crosses one of a unit's."""
+    place, w = contacts.watch.place, contacts.following[v]
+    for p in range(contacts.first[unit], contacts.first[unit + 1]):
+        q = contacts.following[p]
+        apart = _side(v, w, p, place) == _side(v, w, q, place)
+        if not apart and _side(p, q, v, place) != _side(p, q, w, place):
+            return True
+    return False
+
+
+@compiled
 def _append(v: int, p: int, q: int, contacts: Contacts) -> None:
     watch = contacts.watch
     if watch.found[0] == len(watch.terms):  # more than units with edges of any length can have
@@ -246,7 +265,7 @@ def _collect(contacts: Contacts) -> None:
                 dy = watch.place[v, 1] - watch.centre[other, 1]
                 if dx * dx + dy * dy >= far * far:
                     continue
-                if is_inside(v, other, contacts):
+                if is_inside(v, other, contacts) or _crosses(v, other, contacts):
                     watch.found[0], watch.overlap[0], watch.overlap[1] = -1, a, b
                     return
                 _append_near(v, other, one == a, contacts)

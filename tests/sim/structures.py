@@ -131,12 +131,14 @@ class Rig:
         lattice: the network; every vertex but those of the driven units is a design variable.
         clamped, driven: units.
         motion: of the driven units.
+        distance: activation distance of contact between units, mm; None for that on void angles.
     """
 
     lattice: Lattice
     clamped: Ints
     driven: Ints
     motion: Motion
+    distance: float | None = None
 
     @cached_property
     def space(self) -> DesignSpace:
@@ -144,7 +146,8 @@ class Rig:
 
     @cached_property
     def topology(self) -> Topology:
-        return topology(self.lattice, held_dofs(self.clamped, self.driven), BARRIER, CUTOFF)
+        held = held_dofs(self.clamped, self.driven)
+        return topology(self.lattice, held, BARRIER, CUTOFF, distance=self.distance)
 
     @property
     def numbers(self) -> Numbers:

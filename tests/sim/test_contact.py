@@ -8,12 +8,24 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import shapely
+import shapely.affinity
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from jax import Array
 
 from sim import contact_kernels
 from sim.arrays import Floats, Numbers
-from sim.clearance import displaced, polygons
-from sim.contact import DistanceLaw, Polygon, pair_energy
+from sim.clear_step import FAR, clear_step
+from sim.clearance import clearance, displaced, polygons
+from sim.contact import (
+    DistanceLaw,
+    Polygon,
+    barrier,
+    edge_energy,
+    pair_energy,
+    vertices_energy,
+)
 from sim.geometry import shape
 from sim.kernels import Sensitivity
 from sim.lattice import Lattice
@@ -172,3 +184,112 @@ def test_mixed_derivatives(case: Crowd) -> None:
     assert_equal(out.corner, wanted.corner)
     assert_equal(out.centroid, wanted.centroid)
     assert_equal(out.contact, wanted.stiffness)
+
+
+pair = jax.jit(lambda a, b, one, other: pair_energy(a, b, one, other, LAW))
+STILL = np.zeros(3)
+
+
+def near(seed: int, gap: float) -> tuple[Polygon, Polygon, Floats]:
+    """Two random units, and the motion of the second that leaves so small a gap to the first."""
+    rng = np.random.default_rng(seed)
+    rings = [ring(rng, 5, 5.0), ring(rng, 5, 5.0)]
+    angle = rng.uniform(0, 2 * np.pi)
+    towards = np.array([np.cos(angle), np.sin(angle)])
+    first, second = (shapely.Polygon(r) for r in rings)
+
+    def distance(along: float) -> float:
+        return float(first.distance(shapely.affinity.translate(second, *(along * towards))))
+
+    low, high = 0.0, 30.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if distance(middle) > gap else (middle, high)
+    zero = np.zeros(2)
+    return Polygon(zero, rings[0]), Polygon(zero, rings[1]), np.array([*(high * towards), 0.0])
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.floats(1.0001, 1.5))
+def test_there_is_no_contact_beyond_the_activation_distance(seed: int, share: float) -> None:
+    one, other, motion = near(seed, share * REACH)
+    assert float(pair(STILL, motion, one, other)) == 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.floats(0.02, 0.9))
+def test_within_it_there_is_wherever_units_are_closest(seed: int, share: float) -> None:
+    """At least a part of the barrier at that distance: the weight dips next to an edge's end."""
+    one, other, motion = near(seed, share * REACH)
+    alone = float(barrier(jnp.asarray((share * REACH) ** 2), LAW))
+    assert float(pair(STILL, motion, one, other)) > 0.04 * alone
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_energy_has_no_bound_at_a_touch(seed: int) -> None:
+    """It grows at least as the power -4/5 of the distance."""
+    closer = [near(seed, gap * REACH) for gap in (1e-2, 1e-3, 1e-4, 1e-5)]
+    energies = [float(pair(STILL, motion, one, other)) for one, other, motion in closer]
+    assert (np.diff(np.log10(energies)) > 0.75).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.floats(-100.0, 100.0), st.floats(-3.0, 3.0))
+def test_moving_both_units_as_one_changes_nothing(seed: int, shift: float, turn: float) -> None:
+    one, other, motion = near(seed, 0.3 * REACH)
+    c, s = np.cos(turn), np.sin(turn)
+    x, y, theta = motion
+    moved = np.array([c * x - s * y + shift, s * x + c * y, theta + turn])
+    whole = float(pair(np.array([shift, 0.0, turn]), moved, one, other))
+    assert whole == pytest.approx(float(pair(STILL, motion, one, other)), rel=1e-10)
+
+
+@jax.jit
+def curvature(vertex: Array, edge: Array) -> Array:
+    """Second derivatives (6, 6) of the energy of a vertex with an edge and its two ends."""
+
+    def energy(points: Array) -> Array:
+        v, p, q = points.reshape(3, 2)
+        ends = vertices_energy(v, p, LAW) + vertices_energy(v, q, LAW)
+        return ends + edge_energy(v, p, q, LAW)
+
+    return jax.hessian(energy)(jnp.concatenate([vertex, edge.ravel()]))
+
+
+@pytest.mark.parametrize(
+    ("place", "across"),
+    [
+        ((0.0, 0.3), (1.0, 0.0)),
+        ((REACH, 0.3), (1.0, 0.0)),
+        ((5.0 - REACH, 0.3), (1.0, 0.0)),
+        ((5.0, 0.3), (1.0, 0.0)),
+        ((2.5, REACH), (0.0, 1.0)),
+        ((-0.6 * REACH, 0.8 * REACH), (0.6, -0.8)),
+    ],
+)
+def test_second_derivatives_do_not_jump(
+    place: tuple[float, float], across: tuple[float, float]
+) -> None:
+    """Where the nearest feature, the fading or the contact itself begins and ends."""
+    edge = np.array([[5.0, 0.0], [0.0, 0.0]])  # its outside is above
+    here = [
+        np.asarray(curvature(np.array(place) + step * np.array(across), edge))
+        for step in (-1e-7, 1e-7)
+    ]
+    size = np.abs(np.asarray(curvature(np.array([2.5, 0.3]), edge))).max()
+    assert np.abs(here[1] - here[0]).max() < 1e-4 * size
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_no_units_meet_within_the_step_limit(seed: int) -> None:
+    """And the limit is not far below the first meeting, found by small steps."""
+    case = crowd(seed % 6)
+    step = np.random.default_rng(seed).normal(size=12) * np.tile([2.0, 2.0, 0.5], 4)
+    limit = min(clear_step(case.motion, case.contacts, step), FAR)
+    multiples = np.linspace(0.0, FAR, 1201)
+    states = case.motion + multiples[:, None] * step
+    overlaps = clearance(case.lattice, case.lattice.vertices, states.reshape(-1, 4, 3)).overlaps
+    meeting = multiples[overlaps > 0]
+    first = meeting[0] if len(meeting) else FAR
+    assert limit <= first
+    assert limit >= 0.8 * (first - multiples[1])
