@@ -113,10 +113,12 @@ def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
 
 @compiled
 def _gap(a: int, b: int, contacts: Contacts) -> float:
-    """Distance of the outlines of two units that do not cross."""
+    """Distance of the outlines of two units, zero if they cross."""
     smallest = np.inf
     for one, other in ((a, b), (b, a)):
         for v in range(contacts.first[one], contacts.first[one + 1]):
+            if one == a and _crosses(v, other, contacts):
+                return 0.0
             for p in range(contacts.first[other], contacts.first[other + 1]):
                 q = contacts.following[p]
                 smallest = min(smallest, _square_to_edge(v, p, q, contacts.watch.place))

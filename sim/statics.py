@@ -29,7 +29,7 @@ class Record:
         jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
             point or branched.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
-        topology: as solved, with room for all units that met.
+        topology: as solved, with room for all units that met; None if it was the solver's.
     """
 
     states: Floats
@@ -37,7 +37,7 @@ class Record:
     stable: Ints
     jumped: Ints
     counts: Ints
-    topology: Topology
+    topology: Topology | None = None
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class StaticSolver:
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         del bar_v
-        top = record.topology
+        top = record.topology or self.topology
         system = system_of(top, values)
         bars = empty_bars(system, (len(record.states), len(top.held)))
         unstable = adjoint(record.states, bar_u, system, top.designed, bars)
