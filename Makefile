@@ -7,7 +7,7 @@ STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml 
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup test test-slow clients lint format bench lock clean $(STUDIES) $(addsuffix _fabrication,$(STUDIES))
+.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(STUDIES) $(addsuffix _fabrication,$(STUDIES))
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
@@ -17,6 +17,7 @@ help:
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
 	@echo "make bench     measure speed against the baselines"
+	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
 	@echo "make setup     only make .venv from requirements.lock"
 	@echo "make lock      renew requirements.lock from pyproject.toml (with Python 3.11)"
@@ -71,6 +72,9 @@ format: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+bench-tracking: setup
+	$(BIN)/python -m benchmarks.tracking --folder "$(VIDEOS)"
 
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }

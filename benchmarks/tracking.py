@@ -15,7 +15,6 @@ from pipeline.tracking.follow import follow
 from pipeline.tracking.specimen import of_design
 from pipeline.tracking.video import frames
 
-FOLDER = Path("/work/shared/videos/public")
 _GROSS = (0.3, 0.3, np.deg2rad(3))
 
 
@@ -71,7 +70,7 @@ def main() -> int:
     """Prints the table; returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.tracking", description=__doc__)
     parser.add_argument("names", nargs="*", help="videos, by their file names; all by default")
-    parser.add_argument("--folder", type=Path, default=FOLDER, help="where they are")
+    parser.add_argument("--folder", type=Path, required=True, help="where they are")
     asked = parser.parse_args()
     videos = [path for path in sorted(asked.folder.iterdir()) if path.suffix in (".mp4", ".mkv")]
     print(f"{'RMSE':<34}{'x px':>8}{'y px':>8}{'rot deg':>8}{'bias mm':>10}{'gross':>7}", end="")
