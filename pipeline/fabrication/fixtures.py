@@ -28,6 +28,7 @@ _LUG = 2.5  # mm, thickness of the adapter's fingers
 _JIG_RIM, _JIG_BASE, _JIG_WALL = 6.0, 2.4, 4.0  # mm
 _THIN = 0.4  # mm, half of the thinnest wall that a jig keeps
 _PEN = 0.5  # mm
+_MERGED = 0.02  # mm by which strokes grow: two that touch in a point would leave an open mesh
 _LETTER = 4.0  # mm
 
 
@@ -255,7 +256,8 @@ def _plate(
     left, low, _, _ = tile.bounds
     title = turned(text(name, _LETTER), 0.0, (left + width / 2 + 1.5, low + height / 2 + 1.0))
     sunk = shapely.union_all([written, pen(title, _PEN)]).intersection(tile.buffer(-0.5))
-    floor = shapely.set_precision(tile.difference(sunk.difference(walls.buffer(0.01))), 1e-3)
+    letters = shapely.set_precision(sunk.difference(walls.buffer(2 * _MERGED)), 1e-3)
+    floor = tile.difference(letters.buffer(_MERGED, join_style="mitre"))
     deep = _JIG_BASE - wanted.labels.depth
     return Solid(
         name,

@@ -42,7 +42,7 @@ def check_package(
     steps: Iterable[Iterator[Fault]] = (
         printing.check(folder / "print", wanted, asked),
         cutting.check(folder / "laser", wanted, asked),
-        printing.check_fixtures(folder / "fixture"),
+        printing.check_fixtures(folder / "fixture", asked),
         papers.check(folder, wanted),
     )
     for step in steps:

@@ -37,13 +37,16 @@ def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
     yield from _assembled(solids.read_stl(folder / "assembled.stl"), wanted, asked)
 
 
-def check_fixtures(folder: Path) -> Iterator[Fault]:
-    """Faults of clamps, adapter and jig: each on one plate as in its own file."""
+def check_fixtures(folder: Path, asked: Fabrication) -> Iterator[Fault]:
+    """Faults of clamps, adapter and jig: solids, each on one plate as in its own file."""
     parts = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("*.stl"))}
+    for solid in parts.values():
+        yield from solids.check(solid)
     names: list[str] = []
     for path in sorted(folder.glob("*.3mf")):
         plate = solids.read_3mf(path)
         names += [solid.name for solid in plate]
+        yield from plates.check_plate(plate, asked.print)
         yield from _others(plate, parts)
     if sorted(names) != sorted(parts):
         what = "the plates do not hold each of the fixture's parts once"
