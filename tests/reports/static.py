@@ -150,13 +150,15 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
             "amplitude": ("case", [_amplitude(chosen)]),
             "time": time,
             "dof": ["ux", "uy", "theta"],
+            "contact_law": ["angle", "geometric"],
         },
     )
 
 
 def _filled(kind: datasets.Kind, shape: tuple[int, ...]) -> dict[str, Any]:
     """Every variable of a kind on (structure, case, time, ...) with a small constant."""
-    sizes = dict(zip(("structure", "case", "time", "unit", "dof"), shape, strict=True)) | {"xy": 2}
+    sizes = dict(zip(("structure", "case", "time", "unit", "dof"), shape, strict=True))
+    sizes |= {"xy": 2, "contact_law": 2}
     return {
         name: (variable.dims, np.full([sizes[dim] for dim in variable.dims], value))
         for name, variable in TABLES[kind].items()
