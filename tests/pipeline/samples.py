@@ -20,6 +20,7 @@ SIZES = {
     "constraint": 5,
     "structure": 3,
     "time": 11,
+    "contact_law": 2,
     "dof": 3,
     "direction": 3,
     "frequency": 3,
