@@ -20,7 +20,7 @@ MAX_CORRECTIONS = 60
 MAX_BACKTRACKS = 30
 MAX_SHIFTS = 40
 FIRST_SHIFT = 1e-4
-"""Of an indefinite tangent, over the axial stiffness."""
+"""Of an indefinite tangent, over the median axial stiffness: a few ligaments may be far stiffer."""
 KEEP_FACTOR, RENEW_FACTOR = 1e-2, 0.1
 """A step that reduces the residual by more than the one has a factor worth keeping, until a step
 reduces it by less than the other."""
@@ -67,7 +67,7 @@ def factorise_shifted(motion: Floats, system: System, work: Workspace, counts: I
             return tries
         if tries == 0:
             counts[SHIFTED] += 1
-            shift = FIRST_SHIFT * np.abs(system.net.law[:, 0]).max()
+            shift = FIRST_SHIFT * np.median(system.net.law[:, 0])
         else:
             shift *= 4.0
     return -1

@@ -57,7 +57,8 @@ def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], wanted: Fabrica
 def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
     """The body with its slots cut in, and the tips beside their mouths cut back."""
     waste = [piece for slot in slots for piece in (_channel(slot), *_tips(body, slot, wanted))]
-    made = _largest(body.difference(shapely.union_all(waste)))
+    # On a grid: in full precision GEOS's union may drop a piece whose edge touches another's.
+    made = _largest(body.difference(shapely.union_all(waste, grid_size=GRID)))
     return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
 
 
