@@ -6,13 +6,12 @@ import argparse
 import logging
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import cli, problem
+from pipeline import cli, parts, problem
 from pipeline.errors import UserError
 
 if TYPE_CHECKING:
@@ -29,30 +28,12 @@ Floats = NDArray[np.float64]
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
-    made = cli.parser("pipeline.sweep", "Map the loss over direction and frequency.", study=False)
-    commands = made.add_subparsers(dest="command", required=True)
-    run = commands.add_parser("run", help="compute one part of the map", allow_abbrev=False)
-    run.add_argument("--problem", type=Path, required=True, metavar="YAML")
-    run.add_argument("--preset", metavar="NAME")
-    run.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    run.add_argument("--chunk", type=int, required=True, help="number of this part, from zero")
-    run.add_argument("--chunks", type=int, required=True, help="number of parts")
-    run.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
-    gather = commands.add_parser("gather", help="join the parts", allow_abbrev=False)
-    gather.add_argument("--parts", type=Path, nargs="+", required=True, metavar="NC")
-    for command in (run, gather):
-        command.add_argument("--out", type=Path, required=True, metavar="NC")
-        command.add_argument("--log", type=Path, metavar="FILE", default=argparse.SUPPRESS)
-        command.add_argument("--quiet", action="store_true", default=argparse.SUPPRESS)
-    return made
+    return parts.parser("pipeline.sweep", "Map the loss over direction and frequency.")
 
 
 def work(args: argparse.Namespace) -> None:
     """Computes a part of the map, or joins all parts."""
-    if args.command == "run":
-        _run(args)
-    else:
-        _gather(args)
+    parts.work(args, _run, "sweep", "frequency")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -162,21 +143,6 @@ def _column(
     cases = (Case(values, at_frequency.drives[k], plan.solver, int(k)) for k in plan.simulated)
     outcomes = list(run_batch(cases, reduce, threads))
     return (outcomes[k] for k in np.searchsorted(plan.simulated, plan.case_of))
-
-
-def _gather(args: argparse.Namespace) -> None:
-    import xarray as xr
-
-    from pipeline import datasets
-
-    parts = [datasets.read(path, "sweep") for path in args.parts]
-    for path, read in zip(args.parts, parts, strict=True):
-        if read.attrs["parents"] != parts[0].attrs["parents"]:
-            raise UserError(
-                "the part belongs to another design", file=path, remedy="remove it and run again"
-            )
-    whole = xr.concat(parts, dim="frequency", combine_attrs="drop").sortby("frequency")
-    datasets.write(whole, args.out, "sweep", dict(parts[0].attrs))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
@@ -15,33 +15,36 @@ from reports.study import Study
 from reports.tables import Table
 
 
-class Kind(Protocol):
-    """The parts of a report, each made from a study; the page comes last, from all the others."""
+@dataclass(frozen=True)
+class Kind:
+    """The parts of a report, each made from a study.
 
-    def facts(self, study: Study) -> list[Fact]:
-        """Numbers computed from the datasets."""
-        ...
+    Attributes:
+        facts: numbers computed from the datasets.
+        tables: what the curves show.
+        figure: the figure at two-column width.
+        page: the page, from the study, facts, tables, SVG of the figure and names of its files.
+    """
 
-    def tables(self, study: Study) -> list[Table]:
-        """What the curves show."""
-        ...
-
-    def figure(self, study: Study) -> Figure:
-        """The figure at two-column width."""
-        ...
-
-    def page(
-        self, study: Study, facts: Sequence[Fact], tables: Sequence[Table], svg: str,
-        figure_files: Sequence[str],
-    ) -> Page:  # fmt: skip
-        """The page."""
-        ...
+    facts: Callable[[Study], list[Fact]]
+    tables: Callable[[Study], list[Table]]
+    figure: Callable[[Study], Figure]
+    page: Callable[[Study, Sequence[Fact], Sequence[Table], str, Sequence[str]], Page]
 
 
 def of(problem: Problem) -> Kind:
     """The report of a problem: shielding from a shaken source with its map, or along a path."""
-    from reports.fig2.report import Shielding
-    from reports.path.report import Path
-
     shaken = isinstance(problem.drive, Harmonic | RampHarmonic)
-    return Shielding() if shaken and problem.sweep is not None else Path()
+    return _shielding() if shaken and problem.sweep is not None else _along_a_path()
+
+
+def _shielding() -> Kind:
+    from reports.fig2 import content, facts, figure, tables
+
+    return Kind(facts.collect, tables.build, figure.build, content.build)
+
+
+def _along_a_path() -> Kind:
+    from reports.path import content, facts, figure, tables
+
+    return Kind(facts.collect, tables.build, figure.build, content.build)

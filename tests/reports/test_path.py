@@ -11,10 +11,9 @@ from pipeline.errors import UserError
 from pipeline.problem.report import Paper
 from reports import checks, facts, kinds, style
 from reports.build import publish
-from reports.fig2.report import Shielding
+from reports.fig2 import facts as shielding
 from reports.path import content, course, figure, measures, scatter
 from reports.path import facts as path_facts
-from reports.path.report import Path as PathReport
 from reports.study import Study
 from tests.reports import pictures, static
 
@@ -37,10 +36,10 @@ def motion(study: Study, structure: str) -> np.ndarray:
 
 
 def test_the_problem_decides_on_the_report(study: Study, shield: Study, smile: Study) -> None:
-    assert isinstance(kinds.of(study.problem), Shielding)
-    assert isinstance(kinds.of(study.problem.model_copy(update={"sweep": None})), PathReport)
-    assert isinstance(kinds.of(shield.problem), PathReport)
-    assert isinstance(kinds.of(smile.problem), PathReport)
+    assert kinds.of(study.problem).facts is shielding.collect
+    assert kinds.of(study.problem.model_copy(update={"sweep": None})).facts is path_facts.collect
+    assert kinds.of(shield.problem).facts is path_facts.collect
+    assert kinds.of(smile.problem).facts is path_facts.collect
 
 
 def test_mean_rotation_by_hand(shield: Study) -> None:
