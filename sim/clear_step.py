@@ -15,7 +15,8 @@ import numpy as np
 
 from sim.arrays import Floats
 from sim.compiling import compiled
-from sim.neighbours import Contacts, find
+from sim.neighbours import find
+from sim.outlines import Contacts
 
 FAR = 1.2
 """Multiples of a step that are looked at: somewhat more than solvers keep of the limit."""

@@ -18,9 +18,10 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
-from sim.kernels import Sensitivity
 from sim.matrix import Matrix, add
-from sim.neighbours import Contacts, find, term
+from sim.neighbours import find, term
+from sim.network import Sensitivity
+from sim.outlines import Contacts
 
 
 @compiled

@@ -1,7 +1,7 @@
 """Energy of one ligament and of one contact pair: the definition that all else is derived from.
 
-The compiled kernels (sim/kernels.py) are tested against the automatic derivatives of these
-functions.
+The compiled kernels (sim/ligament_kernels.py, sim/void_kernels.py) are tested against the automatic
+derivatives of these functions.
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ from sim.arrays import Ints
 from sim.clearance import close_pairs
 from sim.errors import SimulationError, StrangersMeet
 from sim.lattice import Lattice
-from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX, Contacts, Watch, find
+from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX, find
+from sim.outlines import Contacts, Watch
 
 if TYPE_CHECKING:
     from sim.model import Values

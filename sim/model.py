@@ -12,10 +12,10 @@ from jax import Array
 
 from sim.arrays import Floats, Ints, Numbers
 from sim.geometry import Shape
-from sim.kernels import Network
 from sim.lattice import Lattice
 from sim.matrix import Pattern, number_free_dofs
 from sim.meeting import Meeting, meeting_units
+from sim.network import Network
 
 A = TypeVar("A")
 

@@ -10,119 +10,15 @@ counts as not admissible, and the solve is to be repeated with more room.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
+from sim.outlines import Contacts, crosses, gap_between, is_inside, place_vertices
 
 MAX_STRANGERS = 256
 TERMS_PER_VERTEX = 16
-
-
-class Watch(NamedTuple):
-    """What is known of the last state looked at; overwritten at will.
-
-    Attributes:
-        state: (n_dofs,) that state.
-        place: (n_vertices, 2) its vertices, mm.
-        centre: (n_units, 2) its centroids, mm.
-        searched: (n_dofs,) the state of the last sweep.
-        moved: (n_units,) bound of the motion of each unit's points since then, mm.
-        gap: (n_pairs,) distance of the pairs then, or a lower bound of it, mm.
-        room: (1,) smallest distance of two strangers then, or a lower bound of it, mm.
-        strangers: (MAX_STRANGERS, 2) units of pairs that the tangent has no room for.
-        terms: (n, 3) vertex, and the start and end of an edge; the end is -1 for a vertex alone.
-        found: (2,) number of terms, -1 if the state is not admissible, and number of strangers.
-        overlap: (2,) units that overlap, if the state is not admissible.
-    """
-
-    state: Floats
-    place: Floats
-    centre: Floats
-    searched: Floats
-    moved: Floats
-    gap: Floats
-    room: Floats
-    strangers: Ints
-    terms: Ints
-    found: Ints
-    overlap: Ints
-
-
-class Contacts(NamedTuple):
-    """Units that may meet, as the kernels take them; without pairs there is no contact.
-
-    Attributes:
-        pairs: (n_pairs, 2) units, ascending, whose coupling the tangent has room for.
-        first: (n_units + 1,) start of each polygon in the vertices.
-        owner: (n_vertices,) unit of each vertex.
-        following: (n_vertices,) its counter-clockwise neighbour.
-        corner: (n_vertices, 2) arm at rest, mm.
-        centroid: (n_units, 2) at rest, mm.
-        radius: (n_units,) longest arm, mm.
-        energy: scale of the barrier, N mm.
-        per_stiffness: its derivative by the contact stiffness of a single ligament, rad^2.
-        distance: activation distance, mm.
-        reach: distance up to which the sweep finds pairs, mm.
-        margin: motion of a unit after which it is repeated, mm.
-        watch: scratch.
-    """
-
-    pairs: Ints
-    first: Ints
-    owner: Ints
-    following: Ints
-    corner: Floats
-    centroid: Floats
-    radius: Floats
-    energy: float
-    per_stiffness: float
-    distance: float
-    reach: float
-    margin: float
-    watch: Watch
-
-
-@compiled
-def place_vertices(motion: Floats, contacts: Contacts) -> None:
-    """Notes the positions of all vertices and centroids in a state."""
-    watch = contacts.watch
-    for unit in range(len(contacts.radius)):
-        c, s = math.cos(motion[3 * unit + 2]), math.sin(motion[3 * unit + 2])
-        x = contacts.centroid[unit, 0] + motion[3 * unit]
-        y = contacts.centroid[unit, 1] + motion[3 * unit + 1]
-        watch.centre[unit, 0], watch.centre[unit, 1] = x, y
-        for v in range(contacts.first[unit], contacts.first[unit + 1]):
-            rx, ry = contacts.corner[v, 0], contacts.corner[v, 1]
-            watch.place[v, 0] = x + c * rx - s * ry
-            watch.place[v, 1] = y + s * rx + c * ry
-
-
-@compiled
-def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
-    """Squared distance of vertex ``v`` to the edge from ``p`` to ``q``."""
-    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
-    dx, dy = place[v, 0] - place[p, 0], place[v, 1] - place[p, 1]
-    along = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
-    dx -= along * ex
-    dy -= along * ey
-    return dx * dx + dy * dy
-
-
-@compiled
-def _gap(a: int, b: int, contacts: Contacts) -> float:
-    """Distance of the outlines of two units, zero if they cross."""
-    smallest = np.inf
-    for one, other in ((a, b), (b, a)):
-        for v in range(contacts.first[one], contacts.first[one + 1]):
-            if one == a and _crosses(v, other, contacts):
-                return 0.0
-            for p in range(contacts.first[other], contacts.first[other + 1]):
-                q = contacts.following[p]
-                smallest = min(smallest, _square_to_edge(v, p, q, contacts.watch.place))
-    return math.sqrt(smallest)
 
 
 @compiled
@@ -142,7 +38,7 @@ def _position(a: int, b: int, pairs: Ints) -> int:
 def _note(a: int, b: int, contacts: Contacts) -> None:
     """Notes the gap of two units nearer than the reach."""
     watch = contacts.watch
-    gap = min(_gap(a, b, contacts), contacts.reach)
+    gap = min(gap_between(a, b, contacts), contacts.reach)
     row = _position(a, b, contacts.pairs)
     if row >= 0:
         watch.gap[row] = gap
@@ -193,39 +89,6 @@ def _follow_motion(motion: Floats, contacts: Contacts) -> None:
 
 
 @compiled
-def is_inside(v: int, unit: int, contacts: Contacts) -> bool:
-    """Whether vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
-    place, inside = contacts.watch.place, False
-    x, y = place[v, 0], place[v, 1]
-    for p in range(contacts.first[unit], contacts.first[unit + 1]):
-        q = contacts.following[p]
-        if (place[p, 1] > y) != (place[q, 1] > y):
-            share = (y - place[p, 1]) / (place[q, 1] - place[p, 1])
-            if x < place[p, 0] + share * (place[q, 0] - place[p, 0]):
-                inside = not inside
-    return inside
-
-
-@compiled
-def _side(p: int, q: int, v: int, place: Floats) -> bool:
-    """Whether vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
-    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
-    return ex * (place[v, 1] - place[p, 1]) > ey * (place[v, 0] - place[p, 0])
-
-
-@compiled
-def _crosses(v: int, unit: int, contacts: Contacts) -> bool:
-    """Whether the edge that starts at ``v`` crosses one of a unit's."""
-    place, w = contacts.watch.place, contacts.following[v]
-    for p in range(contacts.first[unit], contacts.first[unit + 1]):
-        q = contacts.following[p]
-        apart = _side(v, w, p, place) == _side(v, w, q, place)
-        if not apart and _side(p, q, v, place) != _side(p, q, w, place):
-            return True
-    return False
-
-
-@compiled
 def _append(v: int, p: int, q: int, contacts: Contacts) -> None:
     watch = contacts.watch
     if watch.found[0] == len(watch.terms):  # more than units with edges of any length can have
@@ -267,7 +130,7 @@ def _collect(contacts: Contacts) -> None:
                 dy = watch.place[v, 1] - watch.centre[other, 1]
                 if dx * dx + dy * dy >= far * far:
                     continue
-                if is_inside(v, other, contacts) or _crosses(v, other, contacts):
+                if is_inside(v, other, contacts) or crosses(v, other, contacts):
                     watch.found[0], watch.overlap[0], watch.overlap[1] = -1, a, b
                     return
                 _append_near(v, other, one == a, contacts)
@@ -296,6 +159,18 @@ def find(motion: Floats, contacts: Contacts) -> int:
         _follow_motion(motion, contacts)
         _collect(contacts)
     return -1 if watch.found[1] > 0 else watch.found[0]
+
+
+@compiled
+def pairs_in_contact(motion: Floats, contacts: Contacts) -> int:
+    """Number of pairs of units nearer than the activation distance in a state (n_dofs,)."""
+    count, last_a, last_b = 0, -1, -1
+    for k in range(find(motion, contacts)):  # the terms of a pair follow each other
+        v, p, _ = term(k, contacts)
+        a, b = min(contacts.owner[v], contacts.owner[p]), max(contacts.owner[v], contacts.owner[p])
+        if a != last_a or b != last_b:
+            count, last_a, last_b = count + 1, a, b
+    return count
 
 
 @compiled

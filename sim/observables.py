@@ -15,6 +15,7 @@ from sim.energy import LigamentStrain, ligament_strain
 from sim.errors import StrangersMeet
 from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
+from sim.neighbours import pairs_in_contact
 from sim.potential import gradient
 from sim.system import System, system_of
 
@@ -27,7 +28,8 @@ class Observables(NamedTuple):
         reaction: (n_states, n_units, 3) elastic and contact force on the held dofs, N and N mm; NaN
             on free ones.
         void_angle: (n_states,) smallest void angle, rad.
-        contact_pairs: (n_states,) ligaments whose units touch on either side.
+        contact_pairs: (n_states,) pairs of units in contact: with a void closed below the cutoff
+            angle or, by the law of distance, nearer than the activation distance.
         stretch: (n_states,) largest elongation or shortening of a ligament over its length.
         shear, bend: (n_states,) largest shear angle and relative rotation, rad.
     """
@@ -43,18 +45,20 @@ class Observables(NamedTuple):
 
 
 @compiled
-def _visit(states: Floats, system: System, energies: Floats, forces: Floats) -> None:
+def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pairs: Ints) -> None:
     turn = np.empty((states.shape[1] // 3, 4))
     for n in range(len(states)):
         energies[n] = gradient(states[n], system, turn, forces[n])
+        pairs[n] = pairs_in_contact(states[n], system.contacts)
 
 
 def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
     """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
+    near = np.zeros(len(states), dtype=np.int64)
     system = system_of(topology, values)
-    _visit(states, system, energies, forces)
+    _visit(states, system, energies, forces, near)
     try:
         refuse_strangers(system.contacts)
     except StrangersMeet as met:
@@ -69,7 +73,7 @@ def observe(topology: Topology, values: Values, motion: Floats) -> Observables:
         energies[:, 1],
         reaction.reshape(motion.shape),
         voids.min(axis=1, initial=np.pi),
-        (voids < topology.cutoff).sum(axis=1),
+        near if topology.meeting else (voids < topology.cutoff).sum(axis=1),
         *(np.asarray(part) for part in strain),
     )
 

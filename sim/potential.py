@@ -5,13 +5,13 @@ The solvers see the energy and the admissible states through these functions alo
 
 from __future__ import annotations
 
-from sim import kernels
+from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats, Ints
 from sim.clear_step import clear_step
 from sim.compiling import compiled
 from sim.contact_kernels import add_gradient, add_hessian_product, add_mixed, add_tangent
-from sim.kernels import Sensitivity
 from sim.matrix import Matrix
+from sim.network import Sensitivity
 from sim.system import System
 
 
@@ -21,7 +21,8 @@ def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple
 
     The contact energy of a state that is not admissible is infinite.
     """
-    strain, contact = kernels.gradient(motion, system.net, turn, out)
+    strain = ligament_kernels.gradient(motion, system.net, turn, out)
+    contact = void_kernels.add_gradient(motion, system.net, out)
     if len(system.contacts.pairs) > 0:
         contact += add_gradient(motion, system.contacts, out)
     return strain, contact
@@ -30,7 +31,8 @@ def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple
 @compiled
 def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> None:
     """Adds the energy's Hessian among the free dofs to a matrix."""
-    kernels.tangent(motion, system.net, turn, system.free, matrix)
+    ligament_kernels.tangent(motion, system.net, turn, system.free, matrix)
+    void_kernels.add_tangent(motion, system.net, system.free, matrix)
     if len(system.contacts.pairs) > 0:
         add_tangent(motion, system.contacts, system.free, matrix)
 
@@ -40,7 +42,8 @@ def hessian_product(
     motion: Floats, system: System, turn: Floats, direction: Floats, out: Floats
 ) -> None:
     """Fills ``out`` (n_dofs,) with the Hessian times ``direction``, over all dofs."""
-    kernels.hessian_product(motion, system.net, turn, direction, out)
+    ligament_kernels.hessian_product(motion, system.net, turn, direction, out)
+    void_kernels.add_hessian_product(motion, system.net, direction, out)
     if len(system.contacts.pairs) > 0:
         add_hessian_product(motion, system.contacts, direction, out)
 
@@ -50,7 +53,8 @@ def mixed(
     motion: Floats, system: System, turn: Floats, direction: Floats, which: Ints, out: Sensitivity
 ) -> None:
     """Adds d/dp of (``direction`` . dE/dmotion), of the ligaments' own p only for ``which``."""
-    kernels.mixed(motion, system.net, turn, direction, which, out)
+    ligament_kernels.mixed(motion, system.net, turn, direction, which, out)
+    void_kernels.add_mixed(motion, system.net, direction, which, out)
     if len(system.contacts.pairs) > 0:
         add_mixed(motion, system.contacts, turn, direction, out)
 
@@ -58,7 +62,7 @@ def mixed(
 @compiled
 def admissible_step(motion: Floats, system: System, step: Floats) -> float:
     """Largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""
-    largest = kernels.barrier_step(motion, system.net, step)
+    largest = void_kernels.barrier_step(motion, system.net, step)
     if len(system.contacts.pairs) > 0:
         largest = min(largest, clear_step(motion, system.contacts, step))
     return largest

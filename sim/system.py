@@ -8,11 +8,11 @@ import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
-from sim.kernels import Network, Sensitivity
 from sim.matrix import Matrix, Pattern, matrix
 from sim.meeting import contacts_of
 from sim.model import Topology, Values
-from sim.neighbours import Contacts
+from sim.network import Network, Sensitivity
+from sim.outlines import Contacts
 
 
 class System(NamedTuple):

@@ -10,11 +10,12 @@ import pytest
 
 from benchmarks import baseline, scenes
 from sim.evaluation import evaluator, objective, structure
-from sim.kernels import gradient
 from sim.lattice import quads
 from sim.loads import Harmonic, held_dofs
 from sim.plan import concrete_parameters, make_plan, sample_times
+from sim.potential import gradient
 from sim.scene import Scene
+from sim.system import system_of
 
 
 def small() -> Scene:
@@ -52,7 +53,7 @@ def test_the_baseline_has_the_same_forces() -> None:
     values = concrete_parameters(scene, scene.lattice.vertices)
     motion = 0.05 * np.random.default_rng(0).normal(size=scene.topology.n_dofs)
     ours = np.empty_like(motion)
-    gradient(motion, scene.topology.network(values), np.empty((225, 4)), ours)
+    gradient(motion, system_of(scene.topology, values), np.empty((225, 4)), ours)
     made = structure(scene)(jnp.zeros(scene.space.n_variables))
     theirs = baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())

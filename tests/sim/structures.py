@@ -20,6 +20,7 @@ from sim.lattice import Lattice, quads
 from sim.loads import Motion, held_dofs
 from sim.matrix import Matrix
 from sim.model import Material, Parameters, Topology, damping_of_ratio, parameters, topology
+from sim.network import Network
 
 BARRIER, CUTOFF = float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0))
 DENSITY, AXIAL, SHEAR, BENDING, CONTACT = 6.18e-9, 120.0, 1.19, 1.5, 1.5
@@ -33,6 +34,14 @@ MATERIAL = Material(
 )
 """The paper's constants."""
 NONE = np.array([], dtype=np.int64)
+
+
+def some_ligaments(net: Network, which: Ints) -> Network:
+    """A network's ligaments ``which`` alone, without contact."""
+    unit, arm, vector, void, law, contact, _ = net
+    return Network(
+        unit[which], arm[which], vector[which], void[which], law[which], contact[which], NONE
+    )
 
 
 def dense(of: Matrix) -> Floats:

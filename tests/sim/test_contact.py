@@ -27,11 +27,11 @@ from sim.contact import (
     vertices_energy,
 )
 from sim.geometry import shape
-from sim.kernels import Sensitivity
 from sim.lattice import Lattice
 from sim.matrix import clear, matrix, number_free_dofs
 from sim.model import Values, parameters, topology
-from sim.neighbours import Contacts
+from sim.network import Sensitivity
+from sim.outlines import Contacts
 from sim.system import System, system_of
 from tests.sim.structures import BARRIER, CONTACT, CUTOFF, MATERIAL, dense, hand_made
 

@@ -10,9 +10,9 @@ from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
 from sim.explicit import ExplicitSolver
 from sim.implicit import ImplicitSolver
-from sim.kernels import gradient, hessian_product
 from sim.loads import Harmonic, TimeSeries
 from sim.modes import highest_frequency, lowest_frequency
+from sim.potential import gradient, hessian_product
 from sim.splitting import BLANES_MOAN, LEAPFROG, Splitting
 from sim.system import system_of, workspace
 from tests.sim.pulse import DURATION, exact_end, order, pulsed
@@ -84,7 +84,7 @@ def test_energy_is_kept_without_damping(splitting: Splitting) -> None:
     v[:, rig.topology.held] = 0.0
     system = system_of(rig.topology, values)
     work = workspace(system)
-    potential = np.array([sum(gradient(state, system.net, work.turn, work.force)) for state in u])
+    potential = np.array([sum(gradient(state, system, work.turn, work.force)) for state in u])
     kinetic = 0.5 * v**2 @ values.mass.ravel()
     energy = potential + kinetic
     assert kinetic.max() > 0.05 * energy[0]
@@ -161,7 +161,7 @@ def test_eigenfrequencies_are_those_of_the_dense_problem() -> None:
     stiffness = np.empty((n, n))
     for k in range(n):
         column = np.zeros(n)
-        hessian_product(np.zeros(n), system.net, work.turn, np.eye(n)[k], column)
+        hessian_product(np.zeros(n), system, work.turn, np.eye(n)[k], column)
         stiffness[:, k] = column
     free = rig.topology.free_dofs
     root = np.sqrt(system.mass[free])

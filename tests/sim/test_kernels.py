@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from jax import Array
 
-from sim import kernels
+from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats, Ints, Numbers
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.geometry import shape
-from sim.kernels import Network, Sensitivity
 from sim.lattice import Lattice, quads
 from sim.matrix import clear, matrix, number_free_dofs
+from sim.network import Network, Sensitivity
 from tests.sim.structures import BARRIER, CUTOFF, dense, mixed_polygons
 
 EXACT = 1e-12
@@ -126,19 +126,22 @@ def scratch(motion: Floats) -> tuple[Floats, Floats]:
     return np.empty((len(motion) // 3, 4)), np.empty(len(motion))
 
 
+def gradient(motion: Floats, net: Network) -> tuple[float, float, Floats]:
+    """Strain and contact energy, and the gradient of their sum."""
+    turn, force = scratch(motion)
+    strain = ligament_kernels.gradient(motion, net, turn, force)
+    return strain, void_kernels.add_gradient(motion, net, force), force
+
+
 def test_contact_is_active_in_the_random_states(random_case: Case) -> None:
-    turn, force = scratch(random_case.motion)
-    _, contact = kernels.gradient(random_case.motion, random_case.net, turn, force)
-    assert 0 < contact < np.inf
+    assert 0 < gradient(random_case.motion, random_case.net)[1] < np.inf
 
 
 def test_energy_and_gradient(random_case: Case) -> None:
     net, motion = random_case.net, random_case.motion
-    turn, force = scratch(motion)
-    energies = kernels.gradient(motion, net, turn, force)
-    assert sum(energies) == pytest.approx(
-        float(definition(motion, numbers(net), net.unit)), rel=EXACT
-    )
+    strain, contact, force = gradient(motion, net)
+    wanted = float(definition(motion, numbers(net), net.unit))
+    assert strain + contact == pytest.approx(wanted, rel=EXACT)
     assert_equal(force, np.asarray(gradient_of_definition(motion, numbers(net), net.unit)))
 
 
@@ -149,7 +152,8 @@ def test_tangent(random_case: Case, by_fronts: bool) -> None:
     free, pattern = number_free_dofs(lattice.site, net.unit, held, by_fronts)
     made = matrix(pattern)
     clear(made)
-    kernels.tangent(motion, net, scratch(motion)[0], free, made)
+    ligament_kernels.tangent(motion, net, scratch(motion)[0], free, made)
+    void_kernels.add_tangent(motion, net, free, made)
     order = np.argsort(free)[len(held) :]
     wanted = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))
     assert_equal(dense(made), wanted[np.ix_(order, order)])
@@ -158,7 +162,8 @@ def test_tangent(random_case: Case, by_fronts: bool) -> None:
 def test_hessian_product(random_case: Case) -> None:
     net, motion = random_case.net, random_case.motion
     turn, product = scratch(motion)
-    kernels.hessian_product(motion, net, turn, random_case.direction, product)
+    ligament_kernels.hessian_product(motion, net, turn, random_case.direction, product)
+    void_kernels.add_hessian_product(motion, net, random_case.direction, product)
     hessian = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))
     assert_equal(product, hessian @ random_case.direction)
 
@@ -177,7 +182,8 @@ def mixed(of: Case, which: Ints) -> Sensitivity:
     parts = (net.arm, net.vector, net.void, net.law, net.contact[:, 0])
     none = np.zeros((0, 2))
     out = Sensitivity(*(np.zeros(part.shape) for part in (*parts, none, none)))
-    kernels.mixed(of.motion, net, scratch(of.motion)[0], of.direction, which, out)
+    ligament_kernels.mixed(of.motion, net, scratch(of.motion)[0], of.direction, which, out)
+    void_kernels.add_mixed(of.motion, net, of.direction, which, out)
     return out
 
 
@@ -192,23 +198,22 @@ def test_mixed_derivatives_of_some_ligaments_alone(random_case: Case) -> None:
         assert np.count_nonzero(part) <= all_of_it[some].size
 
 
-def test_smallest_void_and_the_step_to_the_barrier(random_case: Case) -> None:
-    net, motion, direction = random_case.net, random_case.motion, random_case.direction
-    room, where = kernels.smallest_void(motion, net)
+def room(motion: Floats, net: Network) -> float:
+    """Smallest distance of a void angle from the barrier, rad."""
     a, b = motion.reshape(-1, 3)[net.unit].swapaxes(0, 1)[..., 2]
-    angles = np.stack([net.void[:, 0] + a - b, net.void[:, 1] - a + b], axis=1)
-    assert room == pytest.approx(angles.min() - BARRIER, abs=1e-14)
-    assert where == angles.min(axis=1).argmin()
+    return float(min((net.void[:, 0] + a - b).min(), (net.void[:, 1] - a + b).min()) - BARRIER)
 
-    multiple = kernels.barrier_step(motion, net, direction)
-    assert abs(kernels.smallest_void(motion + multiple * direction, net)[0]) < 1e-12
-    assert kernels.smallest_void(motion + 0.99 * multiple * direction, net)[0] > 0
+
+def test_the_step_to_the_barrier(random_case: Case) -> None:
+    net, motion, direction = random_case.net, random_case.motion, random_case.direction
+    multiple = void_kernels.barrier_step(motion, net, direction)
+    assert abs(room(motion + multiple * direction, net)) < 1e-12
+    assert room(motion + 0.99 * multiple * direction, net) > 0
     still = np.zeros_like(direction)
-    assert kernels.barrier_step(motion, net, still) == np.inf
+    assert void_kernels.barrier_step(motion, net, still) == np.inf
 
 
 def test_contact_beyond_the_barrier_is_infinite(random_case: Case) -> None:
     net, motion, direction = random_case.net, random_case.motion, random_case.direction
-    beyond = motion + 1.01 * kernels.barrier_step(motion, net, direction) * direction
-    turn, force = scratch(motion)
-    assert kernels.gradient(beyond, net, turn, force)[1] == np.inf
+    beyond = motion + 1.01 * void_kernels.barrier_step(motion, net, direction) * direction
+    assert gradient(beyond, net)[1] == np.inf

@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sim import kernels
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
@@ -14,6 +13,7 @@ from sim.lattice import quads
 from sim.loads import LinearRamp, Motion, TimeSeries
 from sim.matrix import number_free_dofs
 from sim.model import Values
+from sim.potential import gradient
 from sim.statics import StaticSolver
 from sim.system import system_of, workspace
 from tests.sim.structures import BARRIER, CUTOFF, NONE, Rig, mixed_polygons, rotating_squares
@@ -30,7 +30,7 @@ def out_of_balance(rig: Rig, state: Floats) -> Floats:
     """Forces (n_free,) on the free dofs, N and N mm."""
     system = system_of(rig.topology, rig.values)
     work = workspace(system)
-    kernels.gradient(state.ravel(), system.net, work.turn, work.force)
+    gradient(state.ravel(), system, work.turn, work.force)
     return work.force[rig.topology.free_dofs]
 
 
@@ -122,7 +122,7 @@ def test_polygons_of_any_kind() -> None:
     work = workspace(system)
     energies, forces = [], []
     for state in states:
-        energies.append(sum(kernels.gradient(state, system.net, work.turn, work.force)))
+        energies.append(sum(gradient(state, system, work.turn, work.force)))
         forces.append(work.force.copy())
     done = np.sum((np.array(forces)[1:] + forces[:-1]) / 2 * np.diff(states, axis=0))
     assert done == pytest.approx(energies[-1] - energies[0], rel=1e-4)

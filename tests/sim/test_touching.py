@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sim.arrays import Floats
-from sim.clearance import clearance
+from sim.clearance import clearance, close_pairs, displaced
 from sim.dynamics import Solver, solve_case
 from sim.errors import SimulationError
 from sim.explicit import ExplicitSolver
@@ -62,7 +62,15 @@ def assert_clear_in_contact(rig: Rig, states: Floats) -> None:
     found = clearance(rig.lattice, rig.lattice.vertices, states)
     assert found.overlaps.max() == 0
     assert 0.0 < found.gap.min() < DISTANCE
-    assert observe(rig.topology, rig.values, states).contact_energy.max() > 0.0
+    seen = observe(rig.topology, rig.values, states)
+    assert seen.contact_energy.max() > 0.0
+    near = [
+        close_pairs(
+            rig.lattice, displaced(rig.lattice, rig.lattice.vertices, state[None])[0], DISTANCE
+        )
+        for state in states
+    ]
+    assert seen.contact_pairs.tolist() == [len(pairs) for pairs in near]
 
 
 def overlaps(rig: Rig, states: Floats) -> int:

@@ -1,4 +1,4 @@
-"""Compiled element loops: energy, gradient, tangent, and mixed derivatives of a whole network.
+"""Compiled loops over the ligaments: energy, gradient, tangent, and mixed derivatives of a network.
 
 Derived by hand from sim/energy.py and tested against its automatic derivatives. With d the current
 ligament vector, n and t its unit tangent and normal, L its length and gamma its shear angle,
@@ -13,37 +13,14 @@ r_a).
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from sim.arrays import Floats, Ints
 from sim.compiling import compiled
-from sim.matrix import Matrix, add
+from sim.matrix import Matrix
 from sim.multifrontal import entry
-
-
-class Network(NamedTuple):
-    """Arrays of one structure as the kernels take them.
-
-    Attributes:
-        unit: (n_ligaments, 2) units that each ligament joins.
-        arm: (n_ligaments, 2, 2) arm of either end, mm.
-        vector: (n_ligaments, 2) reference ligament vector, mm.
-        void: (n_ligaments, 2) reference void angles, rad.
-        law: (n_ligaments, 3) axial, shear, bending stiffness.
-        contact: (n_ligaments, 3) contact stiffness, barrier and cutoff angle.
-        touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip
-            contact.
-    """
-
-    unit: Ints
-    arm: Floats
-    vector: Floats
-    void: Floats
-    law: Floats
-    contact: Floats
-    touching: Ints
+from sim.network import Network, Sensitivity
 
 
 @compiled
@@ -106,28 +83,8 @@ def _forces(
 
 
 @compiled
-def _contact(
-    angle: float, stiffness: float, barrier: float, cutoff: float
-) -> tuple[float, float, float]:
-    """Energy, slope and curvature of one void; infinite energy beyond the barrier."""
-    if angle >= cutoff:
-        return 0.0, 0.0, 0.0
-    width = cutoff - barrier
-    x = (angle - cutoff) / width
-    if x <= -1.0:
-        return np.inf, 0.0, 0.0
-    rest = 1.0 - x * x
-    scale = 0.5 * stiffness
-    return (
-        scale * width * width * x * x / rest,
-        scale * width * 2.0 * x / (rest * rest),
-        scale * (2.0 + 6.0 * x * x) / (rest * rest * rest),
-    )
-
-
-@compiled
-def gradient(motion: Floats, net: Network, turn: Floats, out: Floats) -> tuple[float, float]:
-    """Fills the energy gradient ``out`` (3 n_units,); returns strain and contact energy, N mm."""
+def gradient(motion: Floats, net: Network, turn: Floats, out: Floats) -> float:
+    """Fills the energy gradient ``out`` (3 n_units,); returns the strain energy, N mm."""
     _trigonometry(motion, turn)
     out[:] = 0.0
     strain_energy = 0.0
@@ -147,37 +104,7 @@ def gradient(motion: Floats, net: Network, turn: Floats, out: Floats) -> tuple[f
         out[b] += gx
         out[b + 1] += gy
         out[b + 2] += wb - gx * pby + gy * pbx
-    contact_energy = 0.0
-    for k in net.touching:
-        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
-        turned = motion[a] - motion[b]
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            energy, slope, _ = _contact(
-                net.void[k, side] + sign * turned,
-                net.contact[k, 0],
-                net.contact[k, 1],
-                net.contact[k, 2],
-            )
-            contact_energy += energy
-            out[a] += sign * slope
-            out[b] -= sign * slope
-    return strain_energy, contact_energy
-
-
-@compiled
-def ligament_energies(motion: Floats, net: Network, turn: Floats, out: Floats) -> None:
-    """Fills the strain energy ``out`` (n_ligaments,) of every ligament, without contact, N mm."""
-    _trigonometry(motion, turn)
-    for k in range(net.unit.shape[0]):
-        a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
-        _, _, _, _, _, _, length, rest, shear = _kinematics(motion, turn, net, k)
-        bend = motion[b + 2] - motion[a + 2]
-        out[k] = 0.5 * (
-            net.law[k, 0] * (length - rest) ** 2
-            + net.law[k, 1] * (rest * shear) ** 2
-            + net.law[k, 2] * bend * bend
-        )
+    return strain_energy
 
 
 @compiled
@@ -250,30 +177,6 @@ def tangent(motion: Floats, net: Network, turn: Floats, free: Ints, matrix: Matr
                 else:
                     at = entry(i, j, owner, first, edge, boundary, panel)
                     values[at] += block[row, column]
-    for k in net.touching:
-        curvature = _contact_curvature(motion, net, k)
-        if curvature > 0.0:
-            i, j = free[3 * net.unit[k, 0] + 2], free[3 * net.unit[k, 1] + 2]
-            add(matrix, i, i, curvature)
-            add(matrix, j, j, curvature)
-            add(matrix, i, j, -curvature)
-
-
-@compiled
-def _contact_curvature(motion: Floats, net: Network, k: int) -> float:
-    """Second derivative of both voids' contact energy in the relative rotation."""
-    turned = motion[3 * net.unit[k, 0] + 2] - motion[3 * net.unit[k, 1] + 2]
-    total = 0.0
-    for side in range(2):
-        sign = 1.0 - 2.0 * side
-        _, _, curvature = _contact(
-            net.void[k, side] + sign * turned,
-            net.contact[k, 0],
-            net.contact[k, 1],
-            net.contact[k, 2],
-        )
-        total += curvature
-    return total
 
 
 @compiled
@@ -307,30 +210,6 @@ def hessian_product(
         out[b + 2] += (
             -fx * pby + fy * pbx + common + bending * (lb - la) - (gx * pbx + gy * pby) * lb
         )
-    for k in net.touching:
-        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
-        moment = _contact_curvature(motion, net, k) * (direction[a] - direction[b])
-        out[a] += moment
-        out[b] -= moment
-
-
-class Sensitivity(NamedTuple):
-    """Derivatives with respect to a network's parameters, shaped as in ``Network``.
-
-    Attributes:
-        arm, vector, void, law: as there.
-        contact: (n_ligaments,) of the contact stiffness alone.
-        corner: (n_vertices, 2) by the arms of all vertices.
-        centroid: (n_units, 2) by the centroids.
-    """
-
-    arm: Floats
-    vector: Floats
-    void: Floats
-    law: Floats
-    contact: Floats
-    corner: Floats
-    centroid: Floats
 
 
 @compiled
@@ -371,42 +250,3 @@ def mixed(
         out.law[k, 0] += (length - rest) * stretching
         out.law[k, 1] += rest * rest * shear * shearing
         out.law[k, 2] += bend * (lb - la)
-
-        turned, turning = motion[a + 2] - motion[b + 2], la - lb
-        for side in range(2):
-            sign = 1.0 - 2.0 * side
-            stiffness = net.contact[k, 0]
-            angle = net.void[k, side] + sign * turned
-            if angle >= net.contact[k, 2]:
-                continue
-            _, slope, curvature = _contact(angle, stiffness, net.contact[k, 1], net.contact[k, 2])
-            out.void[k, side] += sign * curvature * turning
-            out.contact[k] += sign * slope / stiffness * turning
-
-
-@compiled
-def smallest_void(motion: Floats, net: Network) -> tuple[float, int]:
-    """Smallest distance of a void angle from its barrier (rad) and the ligament it belongs to."""
-    smallest, where = np.inf, -1
-    for k in range(net.unit.shape[0]):
-        turned = motion[3 * net.unit[k, 0] + 2] - motion[3 * net.unit[k, 1] + 2]
-        margin = min(net.void[k, 0] + turned, net.void[k, 1] - turned) - net.contact[k, 1]
-        if margin < smallest:
-            smallest, where = margin, k
-    return smallest, where
-
-
-@compiled
-def barrier_step(motion: Floats, net: Network, step: Floats) -> float:
-    """Largest multiple of ``step`` (3 n_units,) before a void reaches its barrier; exact."""
-    largest = np.inf
-    for k in net.touching:
-        a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
-        turned, turning = motion[a] - motion[b], step[a] - step[b]
-        if turning < 0.0:
-            room = net.void[k, 0] + turned - net.contact[k, 1]
-            largest = min(largest, room / -turning)
-        elif turning > 0.0:
-            room = net.void[k, 1] - turned - net.contact[k, 1]
-            largest = min(largest, room / turning)
-    return largest
