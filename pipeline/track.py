@@ -27,7 +27,7 @@ ABSENT = 6
 DESCRIPTION = """\
 Track the units of a specimen through a video.
 
-  python -m pipeline.track RECORDING.yaml --out track.nc
+  python -m pipeline.track RECORDING.yaml --out track.nc [--design NC]
   python -m pipeline.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
 
 The second writes NAME_recording.yaml and NAME_design.nc for a described test video, which the
@@ -40,6 +40,7 @@ def parser() -> argparse.ArgumentParser:
     made = cli.parser("pipeline.track", DESCRIPTION, study=False)
     made.add_argument("words", nargs="+", metavar="[import] YAML", help="what to read")
     made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
+    made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
     made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
     made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="import")
     return made
@@ -54,7 +55,7 @@ def work(args: argparse.Namespace) -> None:
     if args.words[0] == "import" and len(args.words) == 2:
         _import(Path(args.words[1]), args.video, args.out_dir)
     elif len(args.words) == 1 and args.out is not None:
-        _track(Path(args.words[0]), args.out)
+        _track(Path(args.words[0]), args.design, args.out)
     else:
         remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
         raise UserError("one recording and --out are wanted", remedy=remedy)
@@ -78,13 +79,14 @@ def _import(path: Path, video: Path | None, folder: Path) -> None:
     LOG.info("python -m pipeline.track %s --out %s", folder / f"{name}_recording.yaml", "track.nc")
 
 
-def _track(path: Path, out: Path) -> None:
+def _track(path: Path, study: Path | None, out: Path) -> None:
     from pipeline import datasets, provenance
     from pipeline.tracking import recording as recordings
+    from pipeline.tracking.specimen import as_built
 
     asked = recordings.load(path)
-    source, video = path.parent / asked.design, path.parent / asked.video
-    design = datasets.read(source, "design")
+    video, source = _sources(asked, path, study)
+    design = as_built(datasets.read(source, "design"), asked.structure)
     track = followed(asked, design, video, path)
     origin = {
         "recording": asked.model_dump_json(),
@@ -97,6 +99,19 @@ def _track(path: Path, out: Path) -> None:
         "git_commit": provenance.git_commit(),
     }
     datasets.write(dataset(design, track), out, "track", origin)
+
+
+def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:
+    """The files of the video and of the design."""
+    if asked.video is None:
+        remedy = "render it first, with pipeline.virtual_lab, and track the YAML beside the video"
+        raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
+    if asked.design is None and study is None:
+        remedy = "add the path of the specimen's design dataset, or give --design"
+        raise UserError("no design is named", file=path, key="design", remedy=remedy)
+    design = study if asked.design is None else path.parent / asked.design
+    assert design is not None
+    return path.parent / asked.video, design
 
 
 def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:

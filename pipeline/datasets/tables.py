@@ -13,7 +13,9 @@ from typing import Literal
 SCHEMA_VERSION = 1
 
 Type = Literal["float64", "int64", "int8", "str"]
-Kind = Literal["design", "design_method", "response", "sweep", "scatter", "verification", "track"]
+Kind = Literal[
+    "design", "design_method", "response", "sweep", "scatter", "verification", "track", "truth"
+]
 
 
 @dataclass(frozen=True)
@@ -366,6 +368,22 @@ _TRACK: Table = {
     "blur": Variable((), "px", "standard deviation of the camera's blur at edges"),
 }
 
+_SHOWN = (
+    "time",
+    "dof",
+    "vertices",
+    "displacement",
+    "camera_homography",
+    "camera_centre",
+    "camera_radial",
+    "image_size",
+)
+
+_TRUTH: Table = {
+    **{name: _TRACK[name] for name in _SHOWN},
+    "camera_eye": Variable(("xyz",), "mm", "centre of projection, z towards the camera"),
+}
+
 TABLES: Mapping[Kind, Table] = {
     "design": _UNIT | _CASE | _METHOD | _NETWORK | _SHAPE | _per_method(_HISTORY),
     "design_method": _UNIT | _CASE | _NETWORK | _SHAPE | _HISTORY,
@@ -374,8 +392,11 @@ TABLES: Mapping[Kind, Table] = {
     "scatter": _SCATTER,
     "verification": _VERIFICATION,
     "track": _UNIT | _TRACK,
+    "truth": _UNIT | _TRUTH,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
+
+_RECORDED = {"recording": "the recording's YAML, as read", "synthetic": "yes if rendered"}
 
 ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "design": {"shipped_method": "the method whose design this is"},
@@ -384,6 +405,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "sweep": {},
     "scatter": {},
     "verification": {},
-    "track": {"recording": "the recording's YAML, as read", "synthetic": "yes if rendered"},
+    "track": _RECORDED,
+    "truth": _RECORDED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""

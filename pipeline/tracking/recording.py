@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, ValidationError
+import yaml
+from pydantic import Field, ValidationError, model_validator
 
+from pipeline.lab.setup import Virtual
 from pipeline.problem import yamlfile
 from pipeline.problem.loading import told
 from pipeline.problem.quantities import Delay, Duration, Length
-from pipeline.problem.section import Section
+from pipeline.problem.section import Section, exactly_one
 
 
 class Window(Section):
@@ -20,29 +22,58 @@ class Window(Section):
     end: Duration | None = None
 
 
+class LoadCell(Section):
+    """Forces that were logged beside the video, with a clock of their own.
+
+    Attributes:
+        file: a CSV with a heading, as seen from the recording's own file.
+        time: name of the column of times, s.
+        force: name of the column of forces, N.
+        offset: time of the video's first frame on the log's clock, s.
+    """
+
+    file: str = Field(min_length=1)
+    time: str = "time"
+    force: str = "force"
+    offset: float = 0.0
+
+
 class Recording(Section):
     """What was filmed.
 
     Attributes:
         title: one line about it.
-        video: the file, as seen from the recording's own.
-        design: the design dataset of the specimen, likewise.
+        video: the file, as seen from the recording's own, or a folder of pictures.
+        virtual: how it is rendered, in place of a video.
+        design: the design dataset of the specimen, likewise; a study's own need not be named.
+        structure: which of the design's structures it is.
+        case: number of the study's load case that it was under.
         specimen: what the units show; `auto` finds out.
         pixel_size: roughly, in the specimen's plane; without it, the units are looked for in
             several sizes.
         window: of time, since the file's first frame.
         load_axis: what comparisons are drawn over.
+        load_cell: forces logged beside it.
         synthetic: whether the video was rendered, not filmed.
     """
 
     title: str = ""
-    video: str = Field(min_length=1)
-    design: str = Field(min_length=1)
+    video: Annotated[str, Field(min_length=1)] | None = None
+    virtual: Virtual | None = None
+    design: Annotated[str, Field(min_length=1)] | None = None
+    structure: Literal["intact", "altered", "cloaked"] = "cloaked"
+    case: Annotated[int, Field(ge=0, strict=True)] = 0
     specimen: Literal["auto", "dots", "speckle", "bare"] = "auto"
     pixel_size: Length | None = None
     window: Window = Window()
     load_axis: Literal["time", "driven displacement"] = "time"
+    load_cell: LoadCell | None = None
     synthetic: bool = False
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "video", "virtual")
+        return self
 
 
 def load(path: Path) -> Recording:
@@ -56,3 +87,17 @@ def load(path: Path) -> Recording:
         return Recording.model_validate(document.data)
     except ValidationError as error:
         raise told(error, document, document.data, None) from error
+
+
+def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
+    """The YAML of a recording, after lines of comment.
+
+    Args:
+        values: keys and their values, as they stand in the file; those that are None are left out.
+        comments: without their `#`.
+    """
+    given = {key: value for key, value in values.items() if value is not None}
+    lines = [f"# {comment}" for comment in comments]
+    return "\n".join(
+        [*lines, yaml.safe_dump(given, sort_keys=False, allow_unicode=True, width=100)]
+    )

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
+from pipeline.datasets import TABLES
 from pipeline.tracking.arrays import Floats, Ints, Mask
 
 
@@ -61,6 +62,17 @@ class Specimen:
         """Vertices of a unit relative to its centroid, without padding, mm."""
         outline = self.outline[unit]
         return outline[~np.isnan(outline[:, 0])]
+
+
+def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
+    """The design with the vertices of one of its structures: intact, altered or cloaked."""
+    if structure == "cloaked":
+        return design
+    vertices = design["vertices_initial"]
+    if structure == "altered":
+        void = TABLES["design"]["region"].flags["void"]
+        vertices = vertices.where(design["region"] != void)
+    return design.assign(vertices=vertices)
 
 
 def of_design(design: xr.Dataset) -> Specimen:

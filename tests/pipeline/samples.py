@@ -30,12 +30,14 @@ SIZES = {
     "row": 3,
     "column": 3,
     "power": 2,
+    "xyz": 3,
 }
 
 
 _ATTRIBUTES: dict[str, dict[str, str]] = {
     "design": {"shipped_method": "sqp"},
     "track": {"recording": "{}", "synthetic": "no"},
+    "truth": {"recording": "{}", "synthetic": "yes"},
 }
 
 

@@ -1,0 +1,104 @@
+"""A recording of a response, rendered: the frames and what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline import structures
+from pipeline.errors import UserError
+from pipeline.lab import sensor
+from pipeline.lab.faces import marks
+from pipeline.lab.motion import Motion, motion
+from pipeline.lab.scene import Scene
+from pipeline.lab.setup import Virtual
+from pipeline.lab.viewpoint import viewpoint
+from pipeline.tracking.arrays import Image, Ints, Mask
+from pipeline.tracking.specimen import of_design
+
+
+class Filming(NamedTuple):
+    """All that is needed to render.
+
+    Attributes:
+        scene: what is filmed.
+        motion: of the units.
+        response: of the structure that is filmed.
+        present: (units,) which of them are there.
+        asked: the set-up.
+    """
+
+    scene: Scene
+    motion: Motion
+    response: xr.Dataset
+    present: Mask
+    asked: Virtual
+
+    def images(self, tell: Callable[[], None] | None = None) -> Iterator[Image]:
+        """The frames, in sequence; ``tell`` is called after each."""
+        for index, time in enumerate(self.motion.time):
+            yield sensor.frame(self.scene, self.motion.instants[index], time, index, self.asked)
+            if tell is not None:
+                tell()
+
+
+def prepared(
+    response: xr.Dataset, structure: str, case: int, specimen: str, asked: Virtual
+) -> Filming:
+    """Everything for the film of one structure and case of a response.
+
+    Args:
+        response: the dataset.
+        structure: intact, altered or cloaked.
+        case: number of the load case.
+        specimen: dots, speckle or bare (as is "auto").
+        asked: the set-up.
+
+    Raises:
+        UserError: the response lacks structure or case, or the specimen is out of the picture.
+    """
+    one = of_structure(response, structure)
+    units = of_design(one)
+    present = np.isin(one["unit"].values, units.ids)
+    view = viewpoint(asked.camera, (units.centre.min(axis=0) + units.centre.max(axis=0)) / 2)
+    corners = view.camera.project(units.centre)
+    if (corners < 0).any() or (corners > np.array(asked.camera.image) - 1).any():
+        width, height = np.ptp(units.centre, axis=0) + 2 * units.radius.max()
+        raise UserError(
+            f"the specimen of {width:.0f} mm x {height:.0f} mm does not fit into the picture",
+            key="virtual.camera",
+            remedy="give a larger pixel_size, or a larger image",
+        )
+    look = asked.look
+    scene = Scene(
+        units,
+        _ligaments(one, structure, units.ids),
+        marks(units, specimen, look, asked.seed),
+        look,
+        view,
+    )
+    return Filming(scene, motion(one, case, present, asked), one, present, asked)
+
+
+def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
+    """One structure of a response.
+
+    Raises:
+        UserError: the response does not hold it.
+    """
+    held = response["structure"].values.tolist()
+    if structure not in held:
+        remedy = f"give one of: {', '.join(held)}"
+        what = "the response holds no such structure"
+        raise UserError(what, key="structure", value=structure, remedy=remedy)
+    return response.sel(structure=structure)
+
+
+def _ligaments(response: xr.Dataset, structure: str, ids: Ints) -> Ints:
+    """Unit and vertex (ligaments, 2, 2) at the ends of those that are there."""
+    there = structures.present_ligaments(response, structure)
+    unit = np.searchsorted(ids, response["ligament_unit"].values[there])
+    return np.stack([unit, response["ligament_vertex"].values[there]], axis=-1)

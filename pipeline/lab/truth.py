@@ -1,0 +1,38 @@
+"""What a rendered video shows, exactly, as a dataset."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from pipeline.lab.motion import Motion
+from pipeline.lab.viewpoint import Viewpoint
+from pipeline.tracking.arrays import Mask
+
+
+def dataset(response: xr.Dataset, present: Mask, motion: Motion, view: Viewpoint) -> xr.Dataset:
+    """The dataset ``truth``: displacements at mid-exposure, as a track would have them.
+
+    Args:
+        response: of one structure.
+        present: (units,) which are there.
+        motion: what was filmed of them.
+        view: the camera.
+    """
+    displacement = np.full((len(motion.time), len(present), 3), np.nan)
+    displacement[:, present] = motion.pose
+    variables = {
+        "vertices": response["vertices"].transpose("unit", "vertex", "xy"),
+        "displacement": (("time", "unit", "dof"), displacement),
+        "camera_homography": (("row", "column"), view.camera.homography),
+        "camera_centre": (("xy",), view.camera.centre),
+        "camera_radial": (("power",), view.camera.radial),
+        "camera_eye": (("xyz",), view.eye),
+        "image_size": (("xy",), np.array(view.camera.size)),
+    }
+    coordinates = {
+        **{name: response[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), motion.time),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    return xr.Dataset(variables, coordinates).drop_vars("structure", errors="ignore")
