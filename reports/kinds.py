@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.figure import Figure
 
 from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, RampHarmonic
+from reports import content
+from reports.content import Words
 from reports.facts import Fact
 from reports.page import Page
 from reports.study import Study
@@ -23,13 +26,23 @@ class Kind:
         facts: numbers computed from the datasets.
         tables: what the curves show.
         figure: the figure at two-column width.
-        page: the page, from the study, facts, tables, SVG of the figure and names of its files.
+        words: what the page says of itself.
+        animation: data of the page's player.
     """
 
     facts: Callable[[Study], list[Fact]]
     tables: Callable[[Study], list[Table]]
     figure: Callable[[Study], Figure]
-    page: Callable[[Study, Sequence[Fact], Sequence[Table], str, Sequence[str]], Page]
+    words: Callable[[Study], Words]
+    animation: Callable[[Study], Mapping[str, Any]]
+
+    def page(
+        self, study: Study, facts: Sequence[Fact], tables: Sequence[Table], svg: str,
+        figure_files: Sequence[str],
+    ) -> Page:  # fmt: skip
+        """The page of a study, of which everything else has been made."""
+        words, player = self.words(study), self.animation(study)
+        return content.page(study, words, facts, tables, player, svg, figure_files)
 
 
 def of(problem: Problem) -> Kind:
@@ -39,12 +52,14 @@ def of(problem: Problem) -> Kind:
 
 
 def _shielding() -> Kind:
-    from reports.fig2 import content, facts, figure, tables
+    from reports.fig2 import content as about
+    from reports.fig2 import facts, figure, tables
 
-    return Kind(facts.collect, tables.build, figure.build, content.build)
+    return Kind(facts.collect, tables.build, figure.build, about.words, about.animation)
 
 
 def _along_a_path() -> Kind:
-    from reports.path import content, facts, figure, tables
+    from reports.path import content as about
+    from reports.path import facts, figure, tables
 
-    return Kind(facts.collect, tables.build, figure.build, content.build)
+    return Kind(facts.collect, tables.build, figure.build, about.words, about.animation)

@@ -79,18 +79,6 @@ def void_angles(lattice: Lattice, vertices: Numbers) -> Array:
     return unwrap(jnp.stack([one, other], axis=1), VOID_BRANCH)
 
 
-def block_angles(lattice: Lattice, vertices: Numbers) -> Array:
-    """Interior angle (n_vertices,) of each unit at each vertex, on [0, 2 pi), rad."""
-    following = vertices[lattice.next_vertex] - vertices
-    preceding = vertices[lattice.previous_vertex] - vertices
-    return unwrap(angle_between(following, preceding), 0.0)
-
-
-def edge_lengths(lattice: Lattice, vertices: Numbers) -> Array:
-    """Length (n_vertices,) of the edge from each vertex to its counter-clockwise neighbour, mm."""
-    return jnp.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
-
-
 def angle_between(start: Numbers, end: Numbers) -> Array:
     """Signed angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
     cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]

@@ -6,18 +6,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from reports import measures, style
-from reports.content import Words, page
-from reports.facts import Fact
+from reports.content import Words
 from reports.fig2.facts import MONITORED
-from reports.page import Page
 from reports.player import Axis, Clip, Disc, Field, payload, round_up
 from reports.scene import Scene
 from reports.structure import DRIVEN, from_dataset, middle_of_top_edge
 from reports.study import Study
-from reports.tables import Table
 
 _CAPTION = (
     "<b>a</b> Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
@@ -29,20 +25,24 @@ _CAPTION = (
     "<b>e</b> Loss over loading angle and frequency; stars mark the loads designed for."
 )
 
-WORDS = Words(
-    credit=(
-        "After Figure 2 of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”; every "
-        "number here is computed from the datasets."
-    ),
-    figure_title="Shielding dynamic excitations",
-    caption=_CAPTION,
-    headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
-    player_note="The dot marks the unit of panel d.",
-)
+
+def words(_study: Study) -> Words:
+    """What the page says of itself."""
+    return Words(
+        credit=(
+            "After Figure 2 of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”; every "
+            "number here is computed from the datasets."
+        ),
+        figure_title="Shielding dynamic excitations",
+        caption=_CAPTION,
+        headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
+        player_note="The dot marks the unit of panel d.",
+    )
 
 
-def animation(scene: Scene, response: xr.Dataset) -> dict[str, Any]:
+def animation(study: Study) -> dict[str, Any]:
     """The player's data: altered and cloaked structures under every load."""
+    scene, response = study.scene, study.response
     clips = []
     for name in ("altered", "cloaked"):
         part = response.sel(structure=name)
@@ -72,15 +72,3 @@ def _fields(scene: Scene, clips: Sequence[Clip]) -> list[Field]:
         Field("uy", "u_y", "mm", 1.0, "signed", (-rise, rise)),
         Field("theta", "θ", "°", degrees, "signed", (-turn, turn)),
     ]
-
-
-def build(
-    study: Study,
-    facts: Sequence[Fact],
-    tables: Sequence[Table],
-    svg: str,
-    figure_files: Sequence[str],
-) -> Page:
-    """The page of a study, of which everything else has been made."""
-    player = animation(study.scene, study.response)
-    return page(study, WORDS, facts, tables, player, svg, figure_files)

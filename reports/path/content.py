@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from reports import content, style
+from reports import style
 from reports.checks import JUMPED
 from reports.content import Words
-from reports.facts import Fact
-from reports.page import Page
 from reports.path import measures
 from reports.path.course import Course, course, display_name, structures
 from reports.path.structures import shade_of
 from reports.player import Axis, Clip, Field, payload, round_up
 from reports.structure import from_dataset
 from reports.study import Study
-from reports.tables import Table
 
 
 def animation(study: Study) -> dict[str, Any]:
@@ -63,17 +59,6 @@ def fields(study: Study) -> list[Field]:
         Field("theta", "θ", "°", degrees, "signed", (-turn, turn)),
     ]
     return [first, *(other for other in others if other.key != first.key)]
-
-
-def build(
-    study: Study,
-    facts: Sequence[Fact],
-    tables: Sequence[Table],
-    svg: str,
-    figure_files: Sequence[str],
-) -> Page:
-    """The page of a study, of which everything else has been made."""
-    return content.page(study, words(study), facts, tables, animation(study), svg, figure_files)
 
 
 def words(study: Study) -> Words:

@@ -11,7 +11,8 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from reports.fig2 import content, facts
+from reports import kinds
+from reports.fig2 import facts
 from reports.page import render
 from reports.player import Axis, Clip, Field, payload
 from reports.structure import from_dataset
@@ -36,7 +37,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         [Clip("Cloaked", "#6f3fa0", structure, motion)],
         [Field("ux", "u_x", "mm", 1.0, "signed", (-2.0, 2.0))],
     )
-    whole = content.build(study, facts.collect(study), [], "<svg/>", [])
+    whole = kinds.of(study.problem).page(study, facts.collect(study), [], "<svg/>", [])
     path = folder / "index.html"
     path.write_text(render(dataclasses.replace(whole, player=player)), encoding="utf-8")
     return path

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reports import page
-from reports.fig2 import content, facts
+from reports import kinds, page
+from reports.fig2 import facts
 from reports.study import Study
 from reports.tables import Table
 
@@ -114,7 +114,8 @@ def test_words_of_a_problem_are_escaped(quick: Study) -> None:
         quick,
         problem=quick.problem.model_copy(update={"title": "</script><b>&", "doc": "</script><b>"}),
     )
-    html = page.render(content.build(hostile, facts.collect(hostile), [], "<svg/>", []))
+    made = kinds.of(hostile.problem).page(hostile, facts.collect(hostile), [], "<svg/>", [])
+    html = page.render(made)
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html
     assert html.count("</script>") == 2
     data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)

@@ -36,7 +36,7 @@ def static(motion: np.ndarray) -> dict[str, Any]:
 
 
 def test_motion_is_right_within_the_stated_error(study: Study) -> None:
-    data = animation(study.scene, study.response)
+    data = animation(study)
     shift, turn = player.quantisation_error(data)
     assert shift < 1e-4
     assert turn < 1e-5
@@ -52,7 +52,7 @@ def test_motion_is_right_within_the_stated_error(study: Study) -> None:
 
 
 def test_axis_keeps_both_ends(study: Study) -> None:
-    data = animation(study.scene, study.response)
+    data = animation(study)
     values = decoded(data["axis"]["values"], "<f4")
     assert values[0] == 0.0
     assert values[-1] == np.float32(2.0)
@@ -92,7 +92,7 @@ def test_a_static_study_needs_no_time() -> None:
 
 
 def test_polygons_are_whole(study: Study) -> None:
-    shape = animation(study.scene, study.response)["structures"][1]
+    shape = animation(study)["structures"][1]
     centroid = decoded(shape["centroid"], "<f4").reshape(-1, 2)
     owner = decoded(shape["owner"], "<i4")
     corners = decoded(shape["arm"], "<f4").reshape(-1, 2) + centroid[owner]

@@ -10,7 +10,7 @@ from shapely import Polygon
 from shapely.affinity import rotate
 
 from sim.arrays import Floats
-from sim.geometry import block_angles, edge_lengths, inertia, shape, void_angles
+from sim.geometry import inertia, shape, void_angles
 from sim.lattice import Lattice
 from tests.sim.structures import mixed_polygons, rotating_squares
 
@@ -96,26 +96,3 @@ def test_void_angles_are_unwrapped_from_minus_45_to_315_degrees(turn: float) -> 
     np.testing.assert_allclose(np.mod(found - wanted + 180, 360), 180, atol=1e-6)
     if abs(angle) < 135:
         np.testing.assert_allclose(found, wanted, atol=1e-6)
-
-
-def test_block_angles_add_up_in_every_polygon() -> None:
-    lattice = mixed_polygons()
-    angles = np.asarray(block_angles(lattice, perturbed(lattice)))
-    corners = np.bincount(lattice.unit)
-    np.testing.assert_allclose(np.bincount(lattice.unit, angles), np.pi * (corners - 2), rtol=1e-12)
-
-
-def test_a_reentrant_corner_is_wider_than_a_straight_one() -> None:
-    lattice = rotating_squares(2)
-    vertices = lattice.vertices.copy()
-    vertices[0] = lattice.site[0] - [1.0, 0.0]
-    angles = np.asarray(block_angles(lattice, vertices))
-    assert angles[0] > np.pi
-    assert (angles[1:] < np.pi).all()
-
-
-def test_edge_lengths() -> None:
-    lattice = mixed_polygons()
-    lengths = np.asarray(edge_lengths(lattice, lattice.vertices))
-    np.testing.assert_allclose(lengths[:6], 6.0)
-    np.testing.assert_allclose(lengths[-5:], 10 * np.sin(np.pi / 5))
