@@ -1,12 +1,5 @@
 """The problem file: typed, with units, checked. `load` is the way in."""
 
-from pipeline.problem.checks import (
-    cloak_units,
-    inclusion_units,
-    interest_units,
-    source_units,
-    void_units,
-)
 from pipeline.problem.identity import (
     Stage,
     canonical_json,
@@ -17,6 +10,13 @@ from pipeline.problem.identity import (
 from pipeline.problem.loading import load, preset_names
 from pipeline.problem.model import Problem
 from pipeline.problem.outputs import Output, outputs
+from pipeline.problem.roles import (
+    cloak_units,
+    inclusion_units,
+    interest_units,
+    source_units,
+    void_units,
+)
 from pipeline.problem.selection import selected_units, units_within
 
 __all__ = [

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.problem.plane import Outline
+
 if TYPE_CHECKING:
     from svgelements import Path as SvgPath
-
-Outline = tuple[tuple[float, float], ...]
 
 DARK, LIGHT = 77, 178
 """Grey levels (of 255) below which a pixel is dark, and above which it is light."""

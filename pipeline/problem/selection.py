@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pipeline.problem.lattices import Lattice, Quads
-from pipeline.problem.regions import HAIR, Region, inside
+from pipeline.problem.plane import inside
+from pipeline.problem.regions import HAIR, Region
 from pipeline.problem.section import Section
 
 Index = Annotated[int, Field(ge=0, strict=True)]

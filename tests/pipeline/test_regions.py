@@ -19,7 +19,7 @@ from pipeline.problem import (
     load,
     void_units,
 )
-from pipeline.problem.regions import Outline, extents
+from pipeline.problem.plane import Outline, extents
 from tests.pipeline.static import MIMIC, write
 
 SHAPES = Path(__file__).parents[2] / "experiments/shapes"
@@ -215,7 +215,7 @@ def test_a_bad_formula_is_told(tmp_path: Path, x: str, what: str) -> None:
 
 
 def test_points_on_the_rim_are_inside() -> None:
-    from pipeline.problem.regions import inside
+    from pipeline.problem.plane import inside
 
     square = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
     points = [(1.0, 0.0), (0.0, 0.0), (2.0, 1.0), (1.0, 1.0), (2.1, 1.0), (1.0, math.nan)]

@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from pipeline.problem.lattices import Quads
 from pipeline.problem.quantities import SIM_UNITS
-from pipeline.problem.regions import Disc, Region, Ring
+from pipeline.problem.regions import Region
 from pipeline.problem.selection import (
     ListedUnits,
     NamedUnits,
     selected_units,
     units_within,
 )
+from pipeline.problem.shapes import Disc, Ring
 
 
 def lattice(columns: int, rows: int, spacing: float = 15.0) -> Quads:

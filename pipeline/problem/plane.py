@@ -1,0 +1,62 @@
+"""Closed outlines in the plane: what lies within them; how they are scaled, turned and moved."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+Point = tuple[float, float]
+Outline = tuple[Point, ...]
+
+
+def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
+    """Which points lie within an odd number of closed outlines, or within `hair` of one."""
+    import numpy as np
+
+    px, py = np.array(points, dtype=float).reshape(-1, 2).T[..., None]
+    odd, near = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
+    for outline in outlines:
+        start = np.array(outline)
+        (x1, y1), (x2, y2) = start.T, np.roll(start, -1, axis=0).T
+        dx, dy = x2 - x1, y2 - y1
+        along = ((px - x1) * dx + (py - y1) * dy) / np.maximum(dx * dx + dy * dy, 1e-300)
+        share = np.clip(along, 0.0, 1.0)
+        near |= (np.hypot(px - x1 - share * dx, py - y1 - share * dy) <= hair).any(axis=1)
+        crossed = (y1 > py) != (y2 > py)
+        ahead = px < x1 + (py - y1) * dx / np.where(dy == 0.0, 1.0, dy)
+        odd ^= np.count_nonzero(crossed & ahead, axis=1) % 2 == 1
+    found: list[bool] = (odd | near).tolist()
+    return found
+
+
+def placed(
+    outline: Outline, size: tuple[float, float], origin: Point, centre: Point, orientation: float
+) -> Outline:
+    """An outline whose box is scaled to `size`, with `origin` at `centre`, turned about it."""
+    scale_x, scale_y = (wanted / has for wanted, has in zip(size, extents(outline), strict=True))
+    moved = tuple(
+        (centre[0] + scale_x * (x - origin[0]), centre[1] + scale_y * (y - origin[1]))
+        for x, y in outline
+    )
+    return turned(moved, orientation, centre)
+
+
+def turned(outline: Outline, angle: float, centre: Point) -> Outline:
+    """An outline turned by `angle` (rad) about `centre`."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    arms = ((x - centre[0], y - centre[1]) for x, y in outline)
+    return tuple(
+        (centre[0] + cosine * x - sine * y, centre[1] + sine * x + cosine * y) for x, y in arms
+    )
+
+
+def extents(outline: Outline) -> tuple[float, float]:
+    """Width and height of an outline's box."""
+    width, height = (max(axis) - min(axis) for axis in zip(*outline, strict=True))
+    return width, height
+
+
+def box_middle(outline: Outline) -> Point:
+    """The middle of an outline's box."""
+    (x1, x2), (y1, y2) = ((min(axis), max(axis)) for axis in zip(*outline, strict=True))
+    return (x1 + x2) / 2, (y1 + y2) / 2
