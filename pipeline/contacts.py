@@ -9,12 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from pipeline.measuring import Structure
+    from pipeline.problem import Problem
     from sim.contact_laws import Judgement
 
 LOG = logging.getLogger(__name__)
 
 LAWS = ("angle", "geometric")
+DIFFERENCE = 0.1
+"""Relative difference of the losses under the two laws at which a design depends on the law."""
 _DIMS = ("structure", "contact_law", "case")
 _MEASURES = {
     "loss_by_contact": "loss",
@@ -44,6 +49,19 @@ def by_contact(structures: dict[str, Structure], distance: float) -> dict[str, t
         )
 
     return {name: (_DIMS, gather(field)) for name, field in _MEASURES.items()}
+
+
+def cloak_losses(response: xr.Dataset) -> tuple[float, float]:
+    """Losses of a response's cloak by the angle law and with contact on distance; NaN if none."""
+    losses = response["loss_by_contact"].sel(structure="cloaked").mean("case")
+    angle, distance = (float(losses.sel(contact_law=law)) for law in LAWS)
+    return angle, distance
+
+
+def geometric(asked: Problem) -> Problem:
+    """The problem with contact on the distance of units."""
+    contact = asked.contact.model_copy(update={"law": "geometric"})
+    return asked.model_copy(update={"contact": contact})
 
 
 def _part(judgement: Judgement | None, field: str, n_cases: int) -> NDArray[np.float64]:

@@ -73,9 +73,18 @@ def _check_symmetry(scene: Scene, source: Path) -> None:
 
 
 def optimise(
-    asked: Problem, scene: Scene, plan: Plan, method: str, source: Path, results: Path
+    asked: Problem,
+    scene: Scene,
+    plan: Plan,
+    method: str,
+    source: Path,
+    results: Path,
+    start: Floats | None = None,
 ) -> Result:
-    """Runs the optimiser with a journal in ``results`` and a progress bar."""
+    """Runs the optimiser with a journal in ``results`` and a progress bar.
+
+    It starts from the initial lattice, or from the design vector ``start`` (n_variables,).
+    """
     import numpy as np
 
     from pipeline.scenes import limits_of
@@ -113,7 +122,7 @@ def optimise(
                     method,  # type: ignore[arg-type]
                     journal.wrap(evaluator(scene, plan, paths)),
                     constraints,
-                    np.zeros(scene.space.n_variables),
+                    np.zeros(scene.space.n_variables) if start is None else start,
                     options=_options(asked, method),
                     callback=show,
                 )

@@ -65,7 +65,7 @@ def scene_of(
         weights=np.asarray(weights),
         duration=problem.horizon_time,
         frequency=problem.frequency,
-        static=isinstance(problem.drive, LinearRamp | TanhRamp),
+        static=problem.static,
         cloak=_units(()),
         region=interest,
         objective=problem.objective.kind,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import cli, failures, problem
+from pipeline import cli, contacts, failures, problem
 from pipeline.measuring import Floats, Measured, Structure, Times, measure
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def parser() -> argparse.ArgumentParser:
     made = cli.parser("pipeline.simulate", "Simulate the structures of a design.")
     made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--geometric", action="store_true", help="with contact on distance")
     made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
     return made
 
@@ -46,6 +47,7 @@ def work(args: argparse.Namespace) -> None:
     from pipeline.scenes import scene_of
 
     asked = problem.load(args.problem, args.preset)
+    asked = contacts.geometric(asked) if args.geometric else asked
     design = datasets.read(args.design, "design")
     scene = scene_of(asked, args.problem.parent)
     structures = structures_of(scene, design)

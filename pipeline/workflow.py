@@ -246,7 +246,7 @@ def shown_options(wildcards: Wildcards) -> str:
     """Command-line options that name these datasets."""
     names = outputs(problem_of(study_of(wildcards)))
     files = zip(names, shown(wildcards), strict=True)
-    return " ".join(f"--{name} {file}" for name, file in files)
+    return " ".join(f"--{name.replace('_', '-')} {file}" for name, file in files)
 
 
 def section(stage: Stage) -> Callable[[Wildcards], str]:

@@ -18,7 +18,13 @@ if TYPE_CHECKING:
     from reports.study import Study
 
 REQUIRED: tuple[Output, ...] = ("design", "response")
-OPTIONAL: tuple[Output, ...] = ("sweep", "scatter", "verification")
+OPTIONAL: tuple[Output, ...] = (
+    "sweep",
+    "scatter",
+    "verification",
+    "geometric_design",
+    "geometric_response",
+)
 
 
 def publish(study: Study, folder: Path) -> list[Path]:
@@ -56,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = cli.parser("reports.build", str(__doc__))
     for name in (*REQUIRED, *OPTIONAL):
         parser.add_argument(
-            f"--{name}",
+            f"--{name.replace('_', '-')}",
             type=Path,
             required=name in REQUIRED,
             metavar="NC",

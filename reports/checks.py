@@ -119,32 +119,6 @@ def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -
     return stretch + slenderness / 2 * (bend + 6 * shear)
 
 
-def contact_facts(response: xr.Dataset) -> Iterator[Fact]:
-    """Loss, overlaps and gap of every structure under either law of contact, where both were run.
-
-    The law of the run comes from its own loss; the others' are told against it.
-    """
-    losses = response.get("loss_by_contact")
-    if losses is None:
-        return
-    unit = losses.attrs["units"]
-    for name in (str(name) for name in response["structure"].values if name != "intact"):
-        ours = float(response["loss"].sel(structure=name).mean("case"))
-        for law in (str(law) for law in response["contact_law"].values):
-            part = response.sel(structure=name, contact_law=law)
-            loss = float(part["loss_by_contact"].mean("case"))
-            label = f"Loss, {name}, contact by the {law} law"
-            if np.isnan(loss):
-                yield Fact(f"contact_{law}_{name}", label, loss, unit, "—", note="no result")
-                continue
-            note = (
-                f"{percent(loss / ours - 1)} against the run; "
-                f"{int(part['overlaps_by_contact'].max())} overlapping pairs, smallest gap "
-                f"{worded(float(part['gap_by_contact'].min()), 'mm', 2)}, by geometry"
-            )
-            yield number(f"contact_{law}_{name}", label, loss, unit, digits=3, note=note)
-
-
 def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
     """Losses of the design with finer load steps and under another contact law."""
     if verification is None:
@@ -160,8 +134,8 @@ def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
             continue
         note = (
             f"{percent(loss / float(as_run['loss']) - 1)} against the run; units at equal loads "
-            f"within {worded(float(found['departure']), 'mm', 2)}; {int(found['overlaps'])} "
-            f"overlapping pairs, {int(found['contact_pairs'])} in contact at full load"
+            f"within {worded(float(found['departure']), 'mm', 2)}; "
+            f"{int(found['contact_pairs'])} pairs in contact at full load"
         )
         yield number(f"check_{key}", f"Loss, cloaked, {name}", loss, unit, digits=3, note=note)
 

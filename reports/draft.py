@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from pipeline.problem import Problem
-from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp
+from pipeline.problem.drives import Harmonic, RampHarmonic
 from reports.style import ALTERED
 
 
@@ -25,7 +25,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
     drive, sweep, robustness = problem.drive, problem.sweep, problem.robustness
     directions = drive.directions if isinstance(drive, Harmonic | RampHarmonic) else ()
     sqp = problem.optimiser.methods.sqp
-    static = isinstance(drive, LinearRamp | TanhRamp)
+    static = problem.static
     return {
         "units": problem.lattice.n_units,
         "load angles": len(directions),

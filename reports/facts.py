@@ -91,7 +91,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def percent(value: float) -> str:
     """Fraction of one as per cent to a tenth."""
-    return f"{100 * value:.1f} %".replace("-", "−")
+    return f"{100 * value:.1f} %".replace("-0.0 ", "0.0 ").replace("-", "−")
 
 
 def write_json(facts: Sequence[Fact], path: Path) -> None:

@@ -24,7 +24,7 @@ from reports.style import GREY, INTACT, PALE
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-SURROUNDINGS, CLOAK, SOURCE = 0, 1, 2
+SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
 FREE, CLAMPED, DRIVEN = 0, 1, 2
 
 

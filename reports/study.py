@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
-from pipeline import datasets, problem, provenance
+from pipeline import contacts, datasets, problem, provenance
+from pipeline.datasets.tables import Kind
 from pipeline.errors import UserError
 from pipeline.problem import Output, Problem, Stage
 from reports import draft, scene
@@ -21,7 +23,36 @@ STAGES: dict[Output, Stage] = {
     "sweep": "sweep",
     "scatter": "scatter",
     "verification": "verify",
+    "geometric_design": "geometric",
+    "geometric_response": "simulate",
 }
+KINDS: dict[Output, Kind] = {
+    "design": "design",
+    "response": "response",
+    "sweep": "sweep",
+    "scatter": "scatter",
+    "verification": "verification",
+    "geometric_design": "design",
+    "geometric_response": "response",
+}
+
+
+@dataclass(frozen=True)
+class Again:
+    """The design for contact on distance, and what the structures do with that contact."""
+
+    design: xr.Dataset
+    response: xr.Dataset
+
+    @property
+    def evaluations(self) -> int:
+        """Number of evaluations of the second optimisation."""
+        return int(np.isfinite(self.design["loss"]).sum())
+
+    @property
+    def changed(self) -> bool:
+        """Whether there was a second optimisation."""
+        return self.design.sizes["evaluation"] > 1
 
 
 @dataclass(frozen=True)
@@ -71,6 +102,13 @@ class Study:
         """The design under finer load steps and another contact law, of a study on load steps."""
         return self.datasets.get("verification")
 
+    @property
+    def again(self) -> Again | None:
+        """The design reconsidered with contact on distance, of a static study by the angle law."""
+        if "geometric_design" not in self.datasets:
+            return None
+        return Again(self.datasets["geometric_design"], self.datasets["geometric_response"])
+
 
 def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
     """The study of a problem file (with a preset) and its datasets.
@@ -87,9 +125,9 @@ def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
             file=path,
             remedy=f"give it as --{missing[0]}",
         )
-    read = {kind: datasets.read(files[kind], kind) for kind in wanted}
-    for kind, data in read.items():
-        _check_problem(chosen, kind, data, files[kind])
+    read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
+    for name, data in read.items():
+        _check_problem(chosen, name, data, files[name])
     return Study(
         name=path.resolve().parent.name,
         problem=chosen,
@@ -99,8 +137,9 @@ def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
     )
 
 
-def _check_problem(chosen: Problem, kind: Output, data: xr.Dataset, path: Path) -> None:
-    wanted = problem.section_hash(chosen, STAGES[kind])
+def _check_problem(chosen: Problem, name: Output, data: xr.Dataset, path: Path) -> None:
+    posed = contacts.geometric(chosen) if name == "geometric_response" else chosen
+    wanted = problem.section_hash(posed, STAGES[name])
     if (found := data.attrs.get("problem_hash")) != wanted:
         raise UserError(
             "the dataset was made from another problem (or another preset)",

@@ -9,7 +9,9 @@ from typing import Any, Literal
 from pipeline.problem.model import Problem
 from pipeline.problem.quantities import SIM_UNITS
 
-Stage = Literal["design", "simulate", "sweep", "scatter", "verify", "fabricate", "report"]
+Stage = Literal[
+    "design", "simulate", "sweep", "scatter", "verify", "geometric", "fabricate", "report"
+]
 
 _WORDS = ("title", "doc", "report")
 _UNUSED: dict[Stage, tuple[str, ...]] = {
@@ -18,6 +20,7 @@ _UNUSED: dict[Stage, tuple[str, ...]] = {
     "sweep": (*_WORDS, "response", "robustness", "fabrication"),
     "scatter": (*_WORDS, "response", "sweep", "fabrication"),
     "verify": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
+    "geometric": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
     "fabricate": ("doc", "report", "solver", "response", "sweep", "robustness"),
     "report": (),
 }
@@ -34,6 +37,8 @@ def canonical_json(problem: Problem, stage: Stage = "report", method: str | None
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
     for name in _UNUSED[stage]:
         data.pop(name, None)
+    if stage not in ("geometric", "report"):
+        data["optimiser"].pop("geometric")
     if method is not None:
         methods = data["optimiser"]["methods"]
         data["optimiser"]["methods"] = {method: methods[method]}

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.drives import Drive, Harmonic, RampHarmonic
+from pipeline.problem.drives import Drive, Harmonic, LinearRamp, RampHarmonic, TanhRamp
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.lattices import Lattice
 from pipeline.problem.quantities import (
@@ -168,9 +168,14 @@ class Methods(Section):
 
 
 class Optimiser(Section):
-    """How to look for the design; lengths are shifts of vertices."""
+    """How to look for the design; lengths are shifts of vertices.
+
+    `geometric` is the budget with which a design by the angle law of contact is optimised again
+    with contact on distance, where its loss depends on the law.
+    """
 
     methods: Methods
+    geometric: Method = Method(evaluations=60)
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
     trust_radius: Length = 0.25
     trust_radius_max: Length = 1.0
@@ -239,6 +244,11 @@ class Problem(Section):
     robustness: Robustness | None = None
     report: Report = Report()
     fabrication: Fabrication = Fabrication()
+
+    @property
+    def static(self) -> bool:
+        """Whether the load grows so slowly that inertia plays no part."""
+        return isinstance(self.drive, LinearRamp | TanhRamp)
 
     @property
     def frequency(self) -> float | None:

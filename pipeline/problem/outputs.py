@@ -6,16 +6,27 @@ from typing import Literal
 
 from pipeline.problem.model import Problem
 
-Output = Literal["design", "response", "sweep", "scatter", "verification"]
+Output = Literal[
+    "design",
+    "response",
+    "sweep",
+    "scatter",
+    "verification",
+    "geometric_design",
+    "geometric_response",
+]
 
 
 def outputs(problem: Problem) -> tuple[Output, ...]:
     """The datasets of a problem that its report shows: those of the sections that it has."""
+    by_angle = problem.static and problem.contact.law == "angle"
     asked: dict[Output, bool] = {
         "design": True,
         "response": True,
         "sweep": problem.sweep is not None,
         "scatter": problem.robustness is not None,
         "verification": problem.horizon.steps is not None,
+        "geometric_design": by_angle,
+        "geometric_response": by_angle,
     }
     return tuple(name for name, wanted in asked.items() if wanted)

@@ -36,3 +36,25 @@ rule select:
     shell:
         "python -m pipeline.select {params.study} --designs {input.designs}"
         " --out {output} --log {log}"
+
+
+# A design by the angle law of contact, under contact on distance: kept, or optimised again.
+rule reconsider:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+        response="results/{name}{preset}/response.nc",
+    output:
+        "results/{name}{preset}/geometric_design.nc",
+    log:
+        "results/{name}{preset}/logs/geometric_design.log",
+    threads: 1
+    params:
+        study=options,
+        problem=section("geometric"),
+        source=source_hash("pipeline.reconsider"),
+    message:
+        "Reconsidering {wildcards.name}{wildcards.preset} with contact on distance"
+    shell:
+        "python -m pipeline.reconsider {params.study} --design {input.design}"
+        " --response {input.response} --out {output} --log {log}"

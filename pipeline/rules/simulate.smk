@@ -1,18 +1,19 @@
 rule simulate:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        design="results/{name}{preset}/design.nc",
+        design="results/{name}{preset}/{law}design.nc",
     output:
-        "results/{name}{preset}/response.nc",
+        "results/{name}{preset}/{law}response.nc",
     log:
-        "results/{name}{preset}/logs/simulate.log",
+        "results/{name}{preset}/logs/{law}simulate.log",
     threads: 1
     params:
         study=options,
+        law=lambda wildcards: "--geometric" if wildcards.law else "",
         problem=section("simulate"),
         source=source_hash("pipeline.simulate"),
     message:
         "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.simulate {params.study} --design {input.design}"
+        "python -m pipeline.simulate {params.study} {params.law} --design {input.design}"
         " --out {output} --log {log}"

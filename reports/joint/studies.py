@@ -6,7 +6,6 @@ from pathlib import Path
 
 from pipeline import problem
 from pipeline.errors import UserError
-from pipeline.problem.drives import LinearRamp, TanhRamp
 from pipeline.problem.joint import Joint
 from reports import study
 from reports.study import Study
@@ -25,7 +24,7 @@ def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[
         wanted = problem.outputs(problem.load(path, preset))
         found.append(study.load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}))
     for each in found:
-        if not isinstance(each.problem.drive, LinearRamp | TanhRamp):
+        if not each.problem.static:
             raise UserError(
                 f"{each.name} is not driven by a ramp",
                 file=figure,

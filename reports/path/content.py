@@ -16,6 +16,8 @@ from reports.player import Axis, Clip, Field, payload, round_up
 from reports.structure import from_dataset
 from reports.study import Study
 
+_SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
+
 
 def animation(study: Study) -> dict[str, Any]:
     """The player's data: every structure along the path."""
@@ -86,6 +88,7 @@ def caption(study: Study) -> str:
     parts = [
         "<b>a</b> The structures at rest: dark units are clamped, orange ones driven along the "
         "arrows, purple ones redesigned"
+        + (", grey ones stiffened" if problem.inclusion is not None else "")
         + (", green ones of interest." if problem.objective.region != "surroundings" else "."),
         "<b>b</b> Loss against evaluation; rejected evaluations are dots, infeasible ones pale, "
         "the circle is the best feasible design.",
@@ -93,7 +96,9 @@ def caption(study: Study) -> str:
         f"{shade_of(problem, study.response).field.label}.",
         f"<b>d</b> {measures.measure_of(problem).label}"
         + ("; the bands hold 90 % of the imperfect cloaks" if study.scatter is not None else "")
-        + ("; crosses mark jumps to another branch." if _jumps(study) else "."),
+        + ("; crosses mark jumps to another branch" if _jumps(study) else "")
+        + (_SECOND if study.again is not None and study.again.changed else "")
+        + ".",
     ]
     letters = iter("efg")
     if course(problem, study.response).static and problem.objective.target != "rest":

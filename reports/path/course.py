@@ -9,7 +9,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
-from pipeline.problem.drives import LinearRamp, TanhRamp
 from pipeline.problem.lattices import Kagome, Lattice, Quads
 
 Array = NDArray[np.float64]
@@ -50,7 +49,7 @@ class Course:
 
 def course(problem: Problem, response: xr.Dataset) -> Course:
     """The path of a response."""
-    static = isinstance(problem.drive, LinearRamp | TanhRamp)
+    static = problem.static
     values = driven_displacement(response) if static else response["time"].values
     paper = problem.report.paper
     return Course(

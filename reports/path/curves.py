@@ -14,9 +14,9 @@ from pipeline.problem import Problem
 from reports import style
 from reports.checks import JUMPED
 from reports.path import scatter
-from reports.path.course import Course, display_name, structures
+from reports.path.course import Course, course, display_name, structures
 from reports.path.measures import Measure
-from reports.study import Study
+from reports.study import Again, Study
 
 Array = NDArray[np.float64]
 
@@ -72,12 +72,22 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
     values = measure.of(response)
     structure_curves(axes, problem, course, values, names)
     _jumps(axes, course, over_cases(problem, values), response)
+    if study.again is not None and study.again.changed:
+        _second(axes, study, measure, study.again)
     if problem.objective.target == "rest":
         axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
         _bands(axes, study, course, measure, study.scatter)
     axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
     axes.legend(loc="upper left", handlelength=1.2)
+
+
+def _second(axes: Axes, study: Study, measure: Measure, again: Again) -> None:
+    """The design for contact on distance."""
+    way = course(study.problem, again.response)
+    values = over_cases(study.problem, measure.of(again.response)).sel(structure="cloaked")
+    label = "Cloaked, no overlap"
+    axes.plot(way.values, values, color=style.CLOAKED, lw=1.0, ls=(0, (3.0, 1.5)), label=label)
 
 
 def _jumps(axes: Axes, course: Course, mean: xr.DataArray, response: xr.Dataset) -> None:

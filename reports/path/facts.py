@@ -13,7 +13,7 @@ from pipeline.problem import Problem
 from pipeline.problem.regions import Region
 from reports import checks
 from reports.facts import Fact, grouped, number, share
-from reports.path import measures, scatter
+from reports.path import contact, measures, scatter
 from reports.path.course import Course, course, display_name, lattice_size, structures
 from reports.path.curves import over_cases
 from reports.structure import from_dataset
@@ -32,7 +32,7 @@ def collect(study: Study) -> list[Fact]:
         *grouped("Optimisation", checks.history_facts(study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
         *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
-        *grouped("Contact", checks.contact_facts(study.response)),
+        *grouped("Contact", contact.contact_facts(study)),
         *grouped("Load steps", checks.variant_facts(study.verification)),
         *grouped("Imperfect copies", robustness_facts(study)),
     ]

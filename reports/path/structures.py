@@ -20,12 +20,21 @@ from pipeline.problem.regions import Region
 from reports import style
 from reports.path.course import Course, display_name, structures
 from reports.player import Field, round_up
-from reports.structure import CLAMPED, CLOAK, DRIVEN, Structure, draw, draw_clamps, from_dataset
+from reports.structure import (
+    CLAMPED,
+    CLOAK,
+    DRIVEN,
+    INCLUSION,
+    Structure,
+    draw,
+    draw_clamps,
+    from_dataset,
+)
 
 Array = NDArray[np.float64]
 
 CLOAK_TINT, UNIT_TINT, CLAMP_TINT, DRIVE_TINT = "#c9b3e0", "#d9dce0", "#4a4d52", "#f2c48d"
-INTEREST_TINT = "#b7dcb2"
+INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
 
 
 @dataclass(frozen=True)
@@ -90,6 +99,8 @@ def _tints(structure: Structure, interest: NDArray[np.bool_], name: str) -> Iter
             yield DRIVE_TINT
         elif region == CLOAK and name == "cloaked":
             yield CLOAK_TINT
+        elif region == INCLUSION and name != "intact":
+            yield RIGID_TINT
         else:
             yield INTEREST_TINT if looked_at else UNIT_TINT
 

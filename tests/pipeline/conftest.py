@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline import design, select
 from pipeline.errors import UserError
 from pipeline.problem import load
+from tests.pipeline.static import HOLE, write
 
 FIG2 = Path(__file__).parents[2] / "experiments/fig2/problem.yaml"
 
@@ -15,6 +17,17 @@ FIG2 = Path(__file__).parents[2] / "experiments/fig2/problem.yaml"
 def fig2() -> Path:
     """The problem file of Figure 2."""
     return FIG2
+
+
+@pytest.fixture(scope="session")
+def hole(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Options that name a small problem with a void; its design is beside it."""
+    folder = tmp_path_factory.mktemp("hole")
+    options = ["--problem", str(write(folder, HOLE, size=5, amplitude=3.0)), "--quiet", "--out"]
+    made = str(folder / "design_sqp.nc")
+    assert design.main([*options, made, "--method", "sqp"]) == 0
+    assert select.main([*options, str(folder / "design.nc"), "--designs", made]) == 0
+    return options
 
 
 Refusal = Callable[..., UserError]

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+GEOMETRIC = 3
+"""Evaluations of a second optimisation, with contact on distance."""
+
 _TEXT = """
 lattice:
   kind: quads
@@ -29,7 +32,7 @@ drive:
   duration: 1 s
 horizon: {{ duration: 1 s, steps: 4 }}
 constraints: {{ edge_length: 3 mm, block_angle: 30 deg, void_angle: 0 deg }}
-optimiser: {{ methods: {{ sqp: {{ evaluations: 4 }} }} }}
+optimiser: {{ methods: {{ sqp: {{ evaluations: 4 }} }}, geometric: {{ evaluations: {again} }} }}
 response: {{ samples: 9 }}
 {more}
 """
@@ -60,5 +63,6 @@ HOLE = "void: { disc: { radius: 7 mm } }\ncloak: { disc: { radius: 22 mm } }\n" 
 def write(folder: Path, more: str, size: int = 15, amplitude: float = 15.0) -> Path:
     """Writes a static problem of `size` x `size` units into `folder`."""
     path = folder / "problem.yaml"
-    path.write_text(_TEXT.format(size=size, amplitude=amplitude, more=more), encoding="utf-8")
+    text = _TEXT.format(size=size, amplitude=amplitude, again=GEOMETRIC, more=more)
+    path.write_text(text, encoding="utf-8")
     return path

@@ -8,37 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import datasets, design, select, simulate
+from pipeline import datasets, design, simulate
 from pipeline.structures import present_ligaments
 from sim.arrays import Floats
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.model import Values
 from sim.statics import Record, StaticSolver
-from tests.pipeline.static import HOLE, write
 
 CLOSED = 12  # the unit that the void removes
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    """Options that name a problem; its design is beside it."""
-    folder = tmp_path_factory.mktemp("study")
-    options = ["--problem", str(write(folder, HOLE, size=5, amplitude=3.0)), "--quiet", "--out"]
-    made = str(folder / "design_sqp.nc")
-    assert design.main([*options, made, "--method", "sqp"]) == 0
-    assert select.main([*options, str(folder / "design.nc"), "--designs", made]) == 0
-    return options
+def simulated(hole: list[str], out: Path) -> int:
+    shipped = str(Path(hole[1]).with_name("design.nc"))
+    return simulate.main([*hole, str(out), "--design", shipped])
 
 
-def simulated(study: list[str], out: Path) -> int:
-    shipped = str(Path(study[1]).with_name("design.nc"))
-    return simulate.main([*study, str(out), "--design", shipped])
-
-
-def test_from_problem_to_response(study: list[str], tmp_path: Path) -> None:
-    assert simulated(study, tmp_path / "r.nc") == 0
-    chosen, response = Path(study[1]).with_name("design.nc"), tmp_path / "r.nc"
+def test_from_problem_to_response(hole: list[str], tmp_path: Path) -> None:
+    assert simulated(hole, tmp_path / "r.nc") == 0
+    chosen, response = Path(hole[1]).with_name("design.nc"), tmp_path / "r.nc"
     shipped, moved = datasets.read(chosen, "design"), datasets.read(response, "response")
     void = shipped["region"].values == 3
     assert np.flatnonzero(void).tolist() == [CLOSED]
@@ -82,14 +70,14 @@ def stopping(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
 
 
 def test_a_path_that_ends_early_is_kept_so_far(
-    study: list[str],
+    hole: list[str],
     tmp_path: Path,
     stopping: Callable[[float], None],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     response, partial = tmp_path / "r.nc", tmp_path / "r_partial.nc"
     stopping(0.8)
-    assert simulated(study, response) == 2
+    assert simulated(hole, response) == 2
     told = capsys.readouterr().err
     assert "the altered structure cannot be simulated beyond a driven displacement of 2.25" in told
     assert "(75% of the load), look at unit [3, 2]: no equilibrium found" in told
@@ -102,14 +90,14 @@ def test_a_path_that_ends_early_is_kept_so_far(
 
 
 def test_nothing_is_kept_of_a_path_that_ends_at_once(
-    study: list[str],
+    hole: list[str],
     tmp_path: Path,
     stopping: Callable[[float], None],
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     stopping(0.1)
-    assert simulated(study, tmp_path / "r.nc") == 2
+    assert simulated(hole, tmp_path / "r.nc") == 2
     assert "look at unit [3, 2]" in capsys.readouterr().err
-    assert design.main([*study, str(tmp_path / "d.nc"), "--method", "sqp"]) == 2
+    assert design.main([*hole, str(tmp_path / "d.nc"), "--method", "sqp"]) == 2
     assert "the initial structure cannot be simulated" in capsys.readouterr().err
     assert not list(tmp_path.glob("*.nc"))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline import datasets, problem, provenance
+from pipeline import contacts, datasets, problem, provenance
 from pipeline.copies import noises
 from pipeline.datasets import TABLES
 from pipeline.problem import Output, Problem
@@ -47,14 +47,17 @@ def written(folder: Path, more: str) -> Study:
         "response": response(chosen, path),
         "scatter": scatter(chosen),
         "verification": verification(chosen),
+        "geometric_design": design(chosen, path),
+        "geometric_response": response(chosen, path),
     }
     files: dict[Output, Path] = {}
     for kind in problem.outputs(chosen):
         files[kind] = folder / f"{kind}.nc"
         stage = study.STAGES[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
-        about = provenance.attributes(chosen, stage, plan=plan)
-        datasets.write(made[kind], files[kind], kind, about)
+        posed = contacts.geometric(chosen) if kind == "geometric_response" else chosen
+        about = provenance.attributes(posed, stage, plan=plan)
+        datasets.write(made[kind], files[kind], study.KINDS[kind], about)
     return study.load(path, None, files)
 
 

@@ -159,8 +159,30 @@ def test_losses_under_either_law_of_contact(shield: Study) -> None:
         gap_by_contact=(dims, np.full((2, 2, 1), 0.02)),
     )
     found = values(dataclasses.replace(shield, datasets=shield.datasets | {"response": both}))
-    assert found["contact_geometric_cloaked"].note.startswith("20.0 % against the run; 0 overl")
-    assert found["contact_angle_cloaked"].note.startswith("0.0 % against the run; 8 overlapping")
+    note = found["contact_geometric_cloaked"].note
+    assert note.startswith("20.0 % against the angle law; none overlap")
+    assert found["contact_angle_cloaked"].note.startswith("8 pairs of units overlap")
+
+
+def test_the_second_design_is_told_of_and_drawn(shield: Study) -> None:
+    assert values(shield)["second_design"].ours == "optimised again, 6 evaluations"
+    assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
+    assert values(shield)["second_overlaps"].value == 1
+    measure = made(shield).axes[-3]
+    assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
+    assert "dashed" in content.caption(shield)
+
+
+def test_a_kept_design_is_not_drawn_twice(shield: Study) -> None:
+    whole = shield.datasets["geometric_design"].assign(best_evaluation=("method", [0]))
+    alone = whole.isel(evaluation=slice(1))
+    kept = dataclasses.replace(shield, datasets=shield.datasets | {"geometric_design": alone})
+    assert values(kept)["second_design"].ours.startswith("the same")
+    assert "contact_angle_second" not in values(kept)
+    assert "dashed purple" not in content.caption(kept)
+    assert not any(
+        line.get_label() == "Cloaked, no overlap" for axes in made(kept).axes for line in axes.lines
+    )
 
 
 def test_a_jump_is_marked_and_counted(shield: Study) -> None:

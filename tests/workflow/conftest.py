@@ -21,6 +21,7 @@ STAGES = (
     "pipeline/sweep",
     "pipeline/scatter",
     "pipeline/verify",
+    "pipeline/reconsider",
     "reports/build",
     "reports/joint/build",
 )

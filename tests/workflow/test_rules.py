@@ -38,7 +38,8 @@ def test_map_has_no_part_without_a_frequency(sandbox: Sandbox) -> None:
 def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig6@quick")
     assert planned["joint_report"] == 1
-    assert planned["simulate"] == 2
+    assert planned["simulate"] == 4  # by the angle law, then with contact on distance
+    assert planned["reconsider"] == 2
     assert "report" not in planned
 
 
