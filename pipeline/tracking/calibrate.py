@@ -17,6 +17,8 @@ from pipeline.tracking.template import Grid, outlines, plane_of
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
 """Standard deviations that are tried, px."""
 _ROUNDS = 3
+_SOME = 40
+"""Units, about, that the blur is found on."""
 _EDGE_SIGMA = 0.02
 """How well the outlines of a unit place it, px: tells which are outliers, no more."""
 
@@ -53,13 +55,15 @@ def calibrate(image: Image, specimen: Specimen, sighting: Sighting) -> Calibrati
     gain = float(high - low) * (1 if sighting.bright else -1)
     plane = plane_of(camera)
 
+    some = grid.of(np.arange(0, specimen.count, -(-specimen.count // _SOME)))
+
     def misfit(blur: float) -> float:
-        fitter = Fitter(camera, outlines(specimen, grid, blur * pixel, pixel), plane)
+        fitter = Fitter(camera, outlines(some, blur * pixel, pixel), plane)
         fits = fitter.fit(image, *fitter.start(gain))
         return float(np.nanmedian(fits.noise / np.abs(fits.photometry[:, 0])))
 
     blur = _lowest(misfit, BLURS) * pixel
-    templates = outlines(specimen, grid, blur, pixel)
+    templates = outlines(grid, blur, pixel)
     residual = np.full((specimen.count, 2), np.nan)
     for _ in range(_ROUNDS):
         fitter = Fitter(camera, templates)

@@ -6,13 +6,12 @@ import numpy as np
 
 from pipeline.tracking import patch
 from pipeline.tracking.arrays import Floats, Image, Mask, Singles
+from pipeline.tracking.blocks import SIZE, Scene, room
 from pipeline.tracking.camera import Camera
-from pipeline.tracking.patch import Fits, Templates
+from pipeline.tracking.patch import Fits, Start, Templates
 from pipeline.tracking.template import plane_of
 
 FULL_STEPS = 8
-_FLOOR = 0.04
-"""Smallest scale of the robust weights, in contrasts of the unit."""
 
 
 class Fitter:
@@ -28,7 +27,6 @@ class Fitter:
         self.camera, self.templates = camera, templates
         self.plane = plane_of(camera) if plane is None else plane
         self.full = np.zeros(len(templates.centre))
-        self._grid = np.array([templates.half, templates.step])
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
         """Pose and photometry to start from: at rest, all with the same gain."""
@@ -42,6 +40,7 @@ class Fitter:
         photometry: Floats,
         chosen: Mask | None = None,
         tight: Floats | None = None,
+        noise: Floats | None = None,
     ) -> Fits:
         """Poses of the chosen units, NaN for the others and for those that cannot be fitted.
 
@@ -52,33 +51,34 @@ class Fitter:
             chosen: (units,) which to fit; by default all.
             tight: (units,) scale of the residuals, where photometry and pose are nearly known and
                 part of the unit may be hidden.
+            noise: (units,) residuals to expect, over the gain, where the pose is nearly known.
         """
-        templates = self.templates
-        place = templates.centre + pose[:, :2]
-        middle, jacobian = self.camera.project(place), self.camera.jacobian(place)
-        px = np.sqrt(np.abs(_determinant(jacobian)))
-        out = np.full((len(pose), patch.WIDTH), np.nan)
-        wanted = np.isfinite(middle[:, 0]) & np.isfinite(px)
-        patch.fit(
-            image,
-            self.plane,
-            templates.coefs,
-            templates.weight,
-            self._grid,
-            templates.centre,
-            templates.contrast,
-            self.full,
+        units, place = len(pose), self.templates.centre + pose[:, :2]
+        jacobian = self.camera.jacobian(place)
+        scale = np.sqrt(np.abs(_determinant(jacobian)))
+        start = Start(
             np.concatenate([pose, photometry], axis=1),
-            middle,
-            templates.reach * px * 1.03 + 1,
-            px,
-            wanted if chosen is None else wanted & chosen,
-            FULL_STEPS,
-            _FLOOR,
-            np.zeros(len(pose)) if tight is None else tight,
-            out,
+            self.camera.project(place),
+            self.templates.reach * scale * 1.03 + 1,
+            scale,
+            self.full,
+            np.zeros(units) if noise is None else noise,
+            np.zeros(units) if tight is None else tight,
         )
+        wanted = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
+        wanted = wanted if chosen is None else wanted & chosen
+        out = np.full((units, patch.WIDTH), np.nan)
+        if wanted.any():
+            across = int(2 * start.radius[wanted].max()) // SIZE + 3
+            scene = Scene(self._padded(image), self.plane)
+            patch.fit(scene, self.templates, start, wanted, FULL_STEPS, room(across**2), out)
         return patch.unpack(out)
+
+    def _padded(self, image: Image) -> Singles:
+        """The image on whole blocks."""
+        out = np.zeros(self.plane.shape[:2], np.float32)
+        out[: image.shape[0], : image.shape[1]] = image
+        return out
 
 
 def _determinant(matrices: Floats) -> Floats:

@@ -93,7 +93,7 @@ def follow(
 
 def fitter(image: Image, specimen: Specimen, calibration: Calibration) -> Fitter:
     """Templates as a first frame shows the units, at rest."""
-    learner = Learner(specimen, calibration.grid, calibration.blur, calibration.pixel)
+    learner = Learner(calibration.grid, calibration.blur, calibration.pixel)
     rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
     learner.add(image, calibration.camera, rest, photometry, np.ones(specimen.count))
     return Fitter(calibration.camera, learner.templates())

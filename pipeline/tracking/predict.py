@@ -11,12 +11,6 @@ from pipeline.tracking.rigid import rigid_motion
 _NEAREST = 6
 
 
-def onward(pose: Floats, before: Floats) -> Floats:
-    """Poses (units, 3) at constant velocity; a unit without a past stays where it is."""
-    ahead = 2 * pose - before
-    return np.where(np.isfinite(ahead), ahead, pose)
-
-
 class Neighbourhood:
     """Predicts units from those about them that were found.
 
@@ -89,7 +83,7 @@ class Neighbourhood:
         """
         out = np.zeros(len(found), dtype=bool)
         places = np.nonzero(good)[0]
-        if len(places) < 8:
+        if len(places) < 9:
             return out
         now = self._centre + found[:, :2]
         tree = cKDTree(self._centre[places])

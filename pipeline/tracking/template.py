@@ -6,10 +6,13 @@ then takes its place, whatever it is: dots, speckle, or the bare edge.
 
 from __future__ import annotations
 
+from copy import copy
+
 import cv2
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Image, Singles
+from pipeline.tracking.arrays import Floats, Image, Ints, Singles
+from pipeline.tracking.blocks import SIZE
 from pipeline.tracking.camera import Camera
 from pipeline.tracking.patch import Templates
 from pipeline.tracking.specimen import Specimen
@@ -18,6 +21,9 @@ from pipeline.tracking.spline import coefficients, sample
 NODES_PER_PIXEL = 1.6
 _REACH = 2.5
 """The blurred edge is used so many standard deviations of the blur to the outside, and a pixel."""
+
+
+_FAR = 1e6
 
 
 class Grid:
@@ -29,6 +35,7 @@ class Grid:
         x, y: (nodes, nodes) places relative to the centroid, mm.
         inside: (units, nodes, nodes) signed distance to the outline, positive inside, mm.
         joint: (units, nodes, nodes) distance to the nearest vertex that bears a ligament, mm.
+        centre: (units, 2) the centroids at rest, mm.
     """
 
     def __init__(self, specimen: Specimen, px_per_mm: float, reach: float) -> None:
@@ -45,6 +52,14 @@ class Grid:
             self.inside[unit] = self._signed_distance(polygon)
             ends = polygon[specimen.joined[unit, : len(polygon)]]
             self.joint[unit] = self._distance(ends)
+        self.centre = specimen.centre
+
+    def of(self, units: Ints) -> Grid:
+        """The same for some of the units."""
+        made = copy(self)
+        made.inside, made.joint = self.inside[units], self.joint[units]
+        made.centre = self.centre[units]
+        return made
 
     def _distance(self, points: Floats) -> Floats:
         far = np.full(self.x.shape, np.inf)
@@ -71,33 +86,20 @@ def _smooth(value: Floats, low: float, high: float) -> Floats:
     return share * share * (3 - 2 * share)
 
 
-def _templates(
-    specimen: Specimen, grid: Grid, brightness: Floats, weight: Floats, pixel: float
-) -> Templates:
-    """Splines through the brightness; nodes without weight get the mean, so that none ring."""
-    del pixel
+def _templates(grid: Grid, brightness: Singles, weight: Singles) -> Templates:
+    """Templates with the contrast that each has within its weight."""
     total = weight.sum(axis=(1, 2))
     mean = (brightness * weight).sum(axis=(1, 2)) / total
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
-    coefs = np.stack([coefficients(face) for face in brightness])
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max() for mask in weight])
-    return Templates(
-        coefs,
-        weight.astype(np.float32),
-        grid.half,
-        grid.step,
-        specimen.centre,
-        np.sqrt(square),
-        reach,
-    )
+    return Templates(brightness, weight, grid.half, grid.step, grid.centre, np.sqrt(square), reach)
 
 
-def outlines(specimen: Specimen, grid: Grid, blur: float, pixel: float) -> Templates:
+def outlines(grid: Grid, blur: float, pixel: float) -> Templates:
     """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
 
     Args:
-        specimen: the units.
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
@@ -109,27 +111,26 @@ def outlines(specimen: Specimen, grid: Grid, blur: float, pixel: float) -> Templ
     weight = _smooth(grid.inside, -outside - pixel, -outside)
     weight *= 1 - _smooth(grid.inside, outside, outside + pixel)
     weight *= _smooth(grid.joint, outside, outside + 2 * pixel)
-    return _templates(specimen, grid, faces.astype(np.float64), weight, pixel)
+    return _templates(grid, faces.astype(np.float32), weight.astype(np.float32))
 
 
 class Learner:
     """Averages what frames show of the units, each seen from the unit's own frame.
 
     Args:
-        specimen: the units.
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
     """
 
-    def __init__(self, specimen: Specimen, grid: Grid, blur: float, pixel: float) -> None:
-        self._specimen, self._grid, self._pixel = specimen, grid, pixel
+    def __init__(self, grid: Grid, blur: float, pixel: float) -> None:
+        self._grid = grid
         outside = _REACH * blur + 0.5 * pixel
         weight = _smooth(grid.inside, -outside - pixel, -outside)
         beyond = _smooth(-grid.inside, -0.5 * blur, 0.5 * blur)
         self._weight = weight * (1 - beyond * (1 - _smooth(grid.joint, 3 * pixel, 4 * pixel)))
         self._wanted = [
-            np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(specimen.count)
+            np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))
         ]
         self._sum = np.zeros(grid.inside.shape)
         self._count = np.zeros(grid.inside.shape)
@@ -152,7 +153,7 @@ class Learner:
             rows, columns = self._wanted[unit]
             x, y = grid.x[rows, columns], grid.y[rows, columns]
             cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
-            place = self._specimen.centre[unit] + pose[unit, :2]
+            place = grid.centre[unit] + pose[unit, :2]
             points = place + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
             seen = camera.project(points)
             value = np.empty(len(x))
@@ -167,18 +168,21 @@ class Learner:
         """The mean of what was added."""
         seen = self._count > 0
         face = np.divide(self._sum, self._count, out=np.zeros_like(self._sum), where=seen)
-        weight = np.where(seen, self._weight, 0)
+        weight = np.where(seen, self._weight, np.float32(0))
         level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
         face = np.where(seen, face, level[:, None, None])
-        return _templates(self._specimen, self._grid, face, weight, self._pixel)
+        return _templates(self._grid, face.astype(np.float32), weight)
 
 
 def plane_of(camera: Camera) -> Singles:
-    """Place (rows, columns, 2) in the specimen's plane of every pixel, mm."""
+    """Place (rows, columns, 2) in the specimen's plane of every pixel, mm.
+
+    Rows and columns are filled up to whole blocks, with places far from everything.
+    """
     columns, rows = camera.size
     u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
-    out = np.empty((rows, columns, 2), np.float32)
+    out = np.full((-(-rows // SIZE) * SIZE, -(-columns // SIZE) * SIZE, 2), _FAR, np.float32)
     for row in range(0, rows, 64):  # a few rows at a time: the inverse needs several copies
-        strip = slice(row, row + 64)
-        out[strip] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
+        strip = slice(row, min(row + 64, rows))
+        out[strip, :columns] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
     return out

@@ -64,10 +64,12 @@ class Tracker:
         self._gain = np.empty(0)
         self._limit = np.empty(0)
         self._noise = np.empty(0)
+        self._usual = np.zeros(specimen.count)
 
     def step(self, image: Image) -> Found:
         """Finds the units in the next frame."""
-        found = self._fitter.fit(image, self._pose + self._velocity, self._photometry)
+        ahead = self._pose + self._velocity
+        found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
         fits = Fits(*(values.copy() for values in found))
         first = not len(self._gain)
         if first:
@@ -192,6 +194,9 @@ class Tracker:
         self._photometry = np.where(
             good[:, None], fits.photometry, self._photometry * self._brighter(fits, good)
         )
+        relative = fits.noise / np.abs(fits.photometry[:, 0])
+        if not first:
+            self._usual = np.where(good, relative, self._usual)
         self._pose = pose
 
 
