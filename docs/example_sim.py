@@ -2,13 +2,14 @@
 
 import numpy as np
 
-from sim.constraints import Constraints, Limits
+from sim.constraints import Constraints
 from sim.evaluation import evaluator
 from sim.lattice import quads
 from sim.loads import Harmonic, held_dofs
 from sim.model import Material, damping_of_ratio
 from sim.optimise import SqpOptions, minimise
 from sim.plan import make_plan
+from sim.requirements import Limits
 from sim.scene import Scene
 
 lattice = quads(7, 7, spacing=15.0, ligament_length=2.25, bias_angle=np.deg2rad(20.0))  # mm

@@ -159,8 +159,8 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     from pipeline.scenes import lattice_of, limits_of
     from pipeline.structures import network_variables, spread, unit_coordinates
     from sim.clearance import overlapping_pairs, smallest_gap
-    from sim.constraints import KIND_NAMES, margins
     from sim.geometry import shape
+    from sim.requirements import KIND_NAMES, margins
 
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)

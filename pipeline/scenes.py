@@ -14,10 +14,10 @@ from pipeline.errors import UserError
 from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp, TimeSeries
 from sim import loads
-from sim.constraints import Limits
 from sim.contact import activation_distance
 from sim.lattice import Lattice
 from sim.model import Material
+from sim.requirements import Limits
 from sim.scene import Scene
 
 DOFS = ("ux", "uy", "theta")

@@ -8,20 +8,12 @@ from hypothesis import strategies as st
 
 from sim.arrays import Floats
 from sim.clearance import overlapping_pairs, polygons, smallest_gap
-from sim.constraints import (
-    KIND_NAMES,
-    Constraints,
-    Limits,
-    describe,
-    edge_length,
-    margins,
-    separation,
-    void_angle,
-)
+from sim.constraints import Constraints
 from sim.design import DesignSpace, Symmetry, design_space
 from sim.geometry import void_angles
 from sim.lattice import Lattice, quads
 from sim.optimise import SqpOptions, minimise
+from sim.requirements import KIND_NAMES, Limits, edge_length, margins, separation, void_angle
 
 LIMITS = Limits(edge_length=5.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=0.2)
 
@@ -123,7 +115,7 @@ def test_the_worst_unit_is_named(lattice: Lattice) -> None:
     worst = margins(lattice, vertices, Limits(edge_length=5.0))["edge_length"]
     assert worst.units == (unit,)
     assert worst.value == pytest.approx(np.hypot(0.5, 0.5) - 5.0)
-    assert "unit (3, 2)" in describe({"edge_length": worst})
+    assert "unit (3, 2)" in worst.where
 
 
 @pytest.mark.parametrize("degrees", [-40.0, -1.0, 0.0, 90.0, 179.0, 181.0, 269.0, 271.0, 300.0])
