@@ -32,10 +32,11 @@ def work(args: argparse.Namespace) -> None:
     from pipeline import datasets
     from pipeline.fabrication import assembly, bom, manifest, package, units
     from pipeline.fabrication.checks.package import STEPS, check_package
+    from pipeline.fabrication.network import network
 
     asked = problem.load(args.problem, args.preset)
     design = datasets.read(args.design, "design")
-    net = units.network(design, args.structure)
+    net = network(design, args.structure)
     study = args.problem.resolve().parent.name + (f"@{args.preset}" if args.preset else "")
     total = 2 * len(net.numbers) + 2 + STEPS
     with cli.progress(total, f"fabrication, {args.structure}") as bar, _aside(args.out_dir) as room:

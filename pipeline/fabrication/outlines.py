@@ -9,8 +9,8 @@ import shapely
 from shapely import LineString, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from pipeline.fabrication.candidates import side_truncations
 from pipeline.fabrication.parts import Floats, Slot
-from pipeline.fabrication.slots import side_truncations
 from pipeline.problem.fabrication import Fabrication
 
 GRID = 1e-5  # mm; coordinates are rounded to it
@@ -93,11 +93,12 @@ def _channel(slot: Slot) -> Polygon:
 
 def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
     """Where the walls beside the slot are thinner than the tips."""
-    cuts = side_truncations(body, slot, wanted)
-    half, width = slot.width / 2, slot.width / 2 + wanted.slots.tip + GRID
-    for length, (right, left) in zip(cuts, ((-width, -half), (half, width)), strict=True):
+    right, left = side_truncations(body, slot, wanted)
+    side = slot.width / 2 + wanted.slots.tip + GRID
+    # From the middle of the slot: rectangles that only touch may leave a hairline between them.
+    for length, across in ((right, (-side, 0.0)), (left, (0.0, side))):
         if length > GRID:
-            yield _rectangle(slot, -_BACK * slot.width, length, right, left)
+            yield _rectangle(slot, -_BACK * slot.width, length, *across)
 
 
 def _largest(shape: BaseGeometry) -> Polygon:

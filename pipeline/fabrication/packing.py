@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
+
+from pipeline.errors import UserError
 
 _HAIR = 1e-9  # mm
 
@@ -92,3 +94,65 @@ def pack(
         spots[part] = Spot(part, shelf.sheet, margin + shelf.x, margin + shelf.y)
         shelf.x += width + gap
     return [spot for spot in spots if spot is not None]
+
+
+class Sized(Protocol):
+    """Anything that is laid down flat."""
+
+    @property
+    def id(self) -> str:
+        """Its name."""
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of its box, mm."""
+
+
+P = TypeVar("P", bound=Sized)
+
+
+class Ground(NamedTuple):
+    """What parts are laid on.
+
+    Attributes:
+        name: sheet or bed; also that of the parameter.
+        section: of the parameters of fabrication.
+        size: width and height, mm.
+        margin: free rim.
+        gap: least distance of two parts.
+    """
+
+    name: str
+    section: str
+    size: tuple[float, float]
+    margin: float
+    gap: float
+
+
+def spread(
+    parts: Sequence[P], ground: Ground, file: str
+) -> Iterator[tuple[tuple[P, float, float], ...]]:
+    """The parts on as many sheets or plates as it takes, each with its lower left corner.
+
+    Raises:
+        UserError: a part is larger than a sheet; names it, `file` and the parameter.
+    """
+    try:
+        spots = pack([part.size for part in parts], ground.size, ground.margin, ground.gap)
+    except TooLargeError as error:
+        raise _too_large(parts[error.part], ground, file) from error
+    for number in range(max((spot.sheet for spot in spots), default=-1) + 1):
+        yield tuple((parts[spot.part], spot.x, spot.y) for spot in spots if spot.sheet == number)
+
+
+def _too_large(part: Sized, ground: Ground, file: str) -> UserError:
+    width, height = part.size
+    room = [side - 2 * ground.margin for side in ground.size]
+    return UserError(
+        f"part {part.id} of {width:.1f} x {height:.1f} mm does not fit on a {ground.name} with"
+        f" {room[0]:g} x {room[1]:g} mm inside its margin",
+        file=file,
+        key=f"fabrication.{ground.section}.{ground.name}",
+        value=[f"{side:g} mm" for side in ground.size],
+        remedy=f"give the size of a larger {ground.name}, or a smaller margin",
+    )

@@ -9,7 +9,7 @@ import shapely
 from shapely import Polygon
 
 from pipeline.errors import UserError
-from pipeline.fabrication.packing import TooLargeError, pack
+from pipeline.fabrication.packing import Ground, spread
 from pipeline.fabrication.parts import Circle, Part
 from pipeline.problem.fabrication import Laser
 
@@ -51,18 +51,13 @@ def sheets(kind: str, parts: Sequence[Part], wanted: Laser, file: str) -> Iterat
     Raises:
         UserError: a part is larger than a sheet, or too fine for the kerf.
     """
+    ground = Ground("sheet", "laser", wanted.sheet, wanted.margin, wanted.gap)
     for kerf in dict.fromkeys((0.0, wanted.kerf)):
         drawn = [compensated(part, kerf, file) for part in parts]
-        try:
-            spots = pack([part.size for part in drawn], wanted.sheet, wanted.margin, wanted.gap)
-        except TooLargeError as error:
-            raise _too_large(drawn[error.part], wanted, file) from error
         variant = f"kerf{kerf:.2f}" if kerf else "nominal"
-        for number in range(max(spot.sheet for spot in spots) + 1):
-            placed = tuple(
-                drawn[spot.part].moved(spot.x, spot.y) for spot in spots if spot.sheet == number
-            )
-            yield Sheet(f"{kind}_sheet{number + 1}_{variant}", wanted.sheet, kerf, placed)
+        for number, placed in enumerate(spread(drawn, ground, file), 1):
+            moved = tuple(part.moved(x, y) for part, x, y in placed)
+            yield Sheet(f"{kind}_sheet{number}_{variant}", wanted.sheet, kerf, moved)
 
 
 def compensated(part: Part, kerf: float, file: str) -> Part:
@@ -82,16 +77,3 @@ def compensated(part: Part, kerf: float, file: str) -> Part:
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)
     return replace(part, outline=outline, holes=holes)
-
-
-def _too_large(part: Part, wanted: Laser, file: str) -> UserError:
-    width, height = part.size
-    room = [side - 2 * wanted.margin for side in wanted.sheet]
-    return UserError(
-        f"part {part.id} of {width:.1f} x {height:.1f} mm does not fit on a sheet with"
-        f" {room[0]:g} x {room[1]:g} mm inside its margin",
-        file=file,
-        key="fabrication.laser.sheet",
-        value=[f"{side:g} mm" for side in wanted.sheet],
-        remedy="give a larger sheet, or a smaller margin",
-    )

@@ -24,6 +24,8 @@ TOLERANCE = 5e-3
 """Lengths found on a closed outline are right to this, mm."""
 
 _CLOSING = 1.0  # radius of the disc in slot widths
+_DEEP = 1.6  # slot widths from the inner end, where the width is measured
+_HAIRLINE = 0.01  # mm, half of the width
 _FAR, _BACK, _HAIR = 50.0, 0.01, 2e-4  # mm
 
 
@@ -87,7 +89,17 @@ def _owner(shape: Polygon, corners: Floats) -> int:
 
 
 def _ends(shape: Polygon, vertex: Floats) -> tuple[tuple[Floats, Floats], float]:
-    """The short sides of a slot, inner one first, and its width."""
+    """The short sides of a slot, inner one first, and its width at the inner end.
+
+    Where the mouth is cut back unevenly it is wider, and so is the rectangle around all of it.
+    """
+    (inner, mouth), width = _short_sides(shape, vertex)
+    kept = shape.intersection(LineString(inner).buffer(_DEEP * width))
+    (inner, _), width = _short_sides(kept, vertex)
+    return (inner, mouth), width
+
+
+def _short_sides(shape: Geometry, vertex: Floats) -> tuple[tuple[Floats, Floats], float]:
     box = np.asarray(shapely.minimum_rotated_rectangle(shape).exterior.coords)[:4]
     sides = np.linalg.norm(np.roll(box, -1, axis=0) - box, axis=1)
     first = int(np.argmin(sides[:2]))
@@ -146,6 +158,7 @@ def check(shape: Shape, asked: Fabrication) -> Iterator[Fault]:
         what = "a slot cuts through it" if not made.is_empty else "it is empty"
         yield _fault(shape, what, "slots.depth_max", "lower it", made)
         return
+    yield from _hairlines(shape, made)
     found = slots(shape.design, made, asked.slot_width)
     yield from _true_to_design(shape, closed(made, asked.slot_width), asked)
     at, wanted = sorted(slot.vertex for slot in found), sorted(shape.ligaments)
@@ -155,6 +168,15 @@ def check(shape: Shape, asked: Fabrication) -> Iterator[Fault]:
     for slot in found:
         yield from _of_slot(shape, slot, asked)
     yield from _apart(shape, found, asked)
+
+
+def _hairlines(shape: Shape, made: Polygon) -> Iterator[Fault]:
+    """No walls that are thinner than any tool, however short."""
+    inner = made.buffer(-_HAIRLINE, join_style="mitre", mitre_limit=100.0)
+    thin = made.difference(inner.buffer(1.1 * _HAIRLINE, join_style="mitre", mitre_limit=100.0))
+    if thin.length > _HAIRLINE:
+        what = "a hairline sticks out of it, or nearly cuts it in two"
+        yield _fault(shape, what, "slots.tip", "report a bug", thin)
 
 
 def _listed(vertices: Sequence[int]) -> str:

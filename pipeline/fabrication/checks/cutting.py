@@ -7,14 +7,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from shapely import Polygon
 
-from pipeline.fabrication.checks import corners, curves, drawings, sheets
-from pipeline.fabrication.checks.alignment import aligned
-from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks import curves, drawings, sheets
 from pipeline.fabrication.checks.curves import REFERENCE
 from pipeline.fabrication.checks.drawings import Curve, Drawing
 from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.placed import Shapes, check_outline
 from pipeline.fabrication.checks.wanted import Wanted
 from pipeline.problem.fabrication import Fabrication
 
@@ -22,14 +20,21 @@ _BUG = "run the same command again; if it stays, the exporter has a bug"
 NOMINAL = "nominal"
 
 
-def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of all drawings in a package's folder."""
+def check(folder: Path, wanted: Wanted, placed: Shapes, asked: Fabrication) -> Iterator[Fault]:
+    """Faults of all drawings in a package's folder.
+
+    Args:
+        folder: that is checked.
+        wanted: the units that have to be there.
+        placed: outlines of the units in the assembled specimen.
+        asked: the parameters of fabrication.
+    """
     paths = sorted(path for path in folder.glob("*.dxf") if not path.stem.endswith("_r12"))
     variants: dict[tuple[str, str], list[Drawing]] = {}
     for path in paths:
         kind, _, variant = path.stem.split("_")
         variants.setdefault((kind, variant), []).append(drawings.read(path))
-    yield from _units(folder, variants.get(("units", NOMINAL), []), wanted, asked)
+    yield from _units(folder, variants.get(("units", NOMINAL), []), wanted, placed)
     for drawing in (drawing for found in variants.values() for drawing in found):
         yield from _sheet(drawing, asked)
         yield from _formats(drawing, folder, asked)
@@ -100,22 +105,13 @@ def _kerfs(
             yield Fault("the drawings", what, "laser.kerf", _BUG, nominal[0].file)
 
 
-def _units(
-    folder: Path, units: list[Drawing], wanted: Wanted, asked: Fabrication
-) -> Iterator[Fault]:
+def _units(folder: Path, units: list[Drawing], wanted: Wanted, placed: Shapes) -> Iterator[Fault]:
     """Each unit once, none that is not there, each true to its design."""
     found = [(part, shape, d.file) for d in units for part, shape in sheets.outlines(d)]
     yield from every_unit(Counter(part for part, _, _ in found), wanted, folder)
     for label, shape, file in found:
         if label in wanted.polygons:
-            yield from corners.check(of_unit(label, file, shape, wanted), asked)
-
-
-def of_unit(label: str, file: Path, shape: Polygon, wanted: Wanted) -> Shape:
-    """A unit's outline in a file, moved back to its place in the design."""
-    design = wanted.polygons[label]
-    made = aligned(design, shape) if isinstance(shape, Polygon) and not shape.is_empty else shape
-    return Shape(label, file, design, made, wanted.slots[label])
+            yield from check_outline(label, file, shape, placed)
 
 
 def every_unit(found: Mapping[str, int], wanted: Wanted, where: Path) -> Iterator[Fault]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.fabrication.checks import cutting, papers, printing
+from pipeline.fabrication.checks import cutting, papers, placed, printing, solids
 from pipeline.fabrication.checks.faults import Fault, stop
 from pipeline.fabrication.checks.wanted import of_design
 from pipeline.problem.fabrication import Fabrication
@@ -38,10 +38,13 @@ def check_package(
         UserError: the first fault, with its unit, the parameter to change and a picture.
     """
     wanted = of_design(design, structure)
+    assembled = solids.read_stl(folder / "print/assembled.stl")
+    found = placed.shapes(assembled, wanted, asked)
     faults: list[Fault] = []
     steps: Iterable[Iterator[Fault]] = (
-        printing.check(folder / "print", wanted, asked),
-        cutting.check(folder / "laser", wanted, asked),
+        printing.check(folder / "print", wanted, found, asked),
+        placed.check_assembled(assembled, found, wanted, asked),
+        cutting.check(folder / "laser", wanted, found, asked),
         printing.check_fixtures(folder / "fixture", asked),
         papers.check(folder, wanted),
     )
@@ -51,5 +54,5 @@ def check_package(
     stop([replace(fault, file=fault.file.relative_to(folder)) for fault in faults], pictures)
 
 
-STEPS = 4
+STEPS = 5
 """How often `check_package` tells of progress."""

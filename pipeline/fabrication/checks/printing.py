@@ -1,4 +1,4 @@
-"""Checks the folder print/ as a whole: each unit as a file and on one plate, and all assembled."""
+"""Checks the folders print/ and fixture/: each part as a file of its own and on one plate."""
 
 from __future__ import annotations
 
@@ -7,13 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import shapely
-from shapely import Geometry, Polygon, STRtree
 
-from pipeline.fabrication.checks import corners, plates, solids
-from pipeline.fabrication.checks.cutting import every_unit, of_unit
+from pipeline.fabrication.checks import plates, solids
+from pipeline.fabrication.checks.cutting import every_unit
 from pipeline.fabrication.checks.faults import Fault
-from pipeline.fabrication.checks.sheets import closest
+from pipeline.fabrication.checks.placed import Shapes, check_outline
 from pipeline.fabrication.checks.solids import Solid, fault
 from pipeline.fabrication.checks.wanted import Wanted
 from pipeline.problem.fabrication import Fabrication
@@ -22,19 +20,25 @@ _ALIKE = 1e-3
 """Relative difference of volume that two files of one part may have."""
 
 
-def check(folder: Path, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of all meshes in a package's folder."""
+def check(folder: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
+    """Faults of all meshes of parts in a package's folder.
+
+    Args:
+        folder: that is checked.
+        wanted: the units that have to be there.
+        found: outlines of the units in the assembled specimen.
+        asked: the parameters of fabrication.
+    """
     units = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("units/*.stl"))}
     yield from every_unit(Counter(units.keys()), wanted, folder / "units")
     for label, solid in units.items():
         faults = list(solids.check(solid))
         yield from faults
         if not faults and label in wanted.polygons:
-            yield from _unit(label, solid, wanted, asked)
+            yield from _unit(label, solid, found, asked)
     yield from _plates(folder, units, wanted, asked)
     for path in sorted(folder.glob("coupon_*.3mf")):
         yield from plates.check_plate(solids.read_3mf(path), asked.print)
-    yield from _assembled(solids.read_stl(folder / "assembled.stl"), wanted, asked)
 
 
 def check_fixtures(folder: Path, asked: Fabrication) -> Iterator[Fault]:
@@ -62,7 +66,7 @@ def levels(asked: Fabrication) -> list[float]:
     return sorted({0.0, first, asked.labels.depth, top, top + raised})
 
 
-def _unit(label: str, solid: Solid, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
+def _unit(label: str, solid: Solid, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
     """Height, volume and outline of one unit."""
     high = solid.extent[1][2]
     tall = max(levels(asked))
@@ -70,7 +74,7 @@ def _unit(label: str, solid: Solid, wanted: Wanted, asked: Fabrication) -> Itera
         yield fault(solid, f"it is {high:.3f} mm high instead of {tall:g} mm", "thickness")
     yield from solids.volume(solid, levels(asked))
     middle = solid.section(asked.thickness / 2)
-    yield from corners.check(of_unit(label, solid.file, middle, wanted), asked)
+    yield from check_outline(label, solid.file, middle, found)
 
 
 def _plates(
@@ -101,40 +105,3 @@ def _same(one: Solid, other: Solid) -> bool:
         np.allclose(first, second, rtol=0, atol=2 * solids.TOLERANCE)
         and abs(volumes[0] - volumes[1]) < _ALIKE * volumes[1]
     )
-
-
-def _assembled(solid: Solid, wanted: Wanted, asked: Fabrication) -> Iterator[Fault]:
-    """All units in their places: as many, each over its design, and apart."""
-    faults = list(solids.check(solid, bodies=len(wanted.polygons)))
-    yield from faults
-    if faults:
-        return
-    sections = shapely.get_parts(solid.section(asked.thickness / 2))
-    labels, designs = list(wanted.polygons), list(wanted.polygons.values())
-    owners = _owners(sections, designs)
-    for label, owner in zip(labels, owners, strict=True):
-        if owner is None:
-            yield fault(solid, f"unit {label} is not in its place")
-    for first, second, gap in closest(sections, asked.minimum_gap - solids.TOLERANCE):
-        pair = [_label(sections[k], designs, labels) for k in (first, second)]
-        what = f"{gap:.3f} mm from unit {pair[1]}, less than {asked.minimum_gap:g} mm"
-        remedy = "lower it, or design with a larger gap (constraints.gap)"
-        shown = (sections[first], sections[second])
-        spot = shapely.shortest_line(*shown)
-        yield Fault(f"unit {pair[0]}", what, "minimum_gap", remedy, solid.file, shown, spot)
-
-
-def _owners(sections: np.ndarray, designs: list[Polygon]) -> list[Geometry | None]:
-    """The one section that lies on each design, None where there is none."""
-    tree = STRtree(sections)
-    found: list[Geometry | None] = []
-    for design in designs:
-        near = [sections[k] for k in tree.query(design, predicate="intersects")]
-        over = [s for s in near if s.intersection(design).area > 0.5 * s.area]
-        found.append(over[0] if len(over) == 1 else None)
-    return found
-
-
-def _label(section: Geometry, designs: list[Polygon], labels: list[str]) -> str:
-    shares = shapely.area(shapely.intersection(section, np.array(designs)))
-    return labels[int(np.argmax(shares))]

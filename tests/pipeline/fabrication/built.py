@@ -9,6 +9,7 @@ import xarray as xr
 
 from pipeline import problem
 from pipeline.fabrication import assembly, bom, manifest, package, units
+from pipeline.fabrication.network import network
 from pipeline.fabrication.parts import Specimen
 from pipeline.problem import Problem
 from tests.pipeline.fabrication import handmade
@@ -47,7 +48,7 @@ def _flags(values: np.ndarray, meanings: str) -> tuple[str, np.ndarray, dict[str
 
 def specimen(asked: Problem) -> Specimen:
     """The six squares as the exporters cut them."""
-    net = units.network(design(), "cloaked")
+    net = network(design(), "cloaked")
     return units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
 
 

@@ -7,9 +7,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
 
+from pipeline.fabrication.candidates import Corner, side_truncations
 from pipeline.fabrication.outlines import cut, filleted, lugs, room_to_grow
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.slots import Corner, NoRoomError, place, side_truncations
+from pipeline.fabrication.slots import NoRoomError, place
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.quantities import SIM_UNITS
 

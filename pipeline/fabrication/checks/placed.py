@@ -1,0 +1,79 @@
+"""The units as they stand in the file of the assembled specimen, against the design there.
+
+Nothing has to be moved to compare them. What other files hold of a unit lies elsewhere and is
+compared with its outline here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely import Geometry, STRtree
+
+from pipeline.fabrication.checks import corners
+from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.sheets import closest
+from pipeline.fabrication.checks.solids import BUG, TOLERANCE, Solid, check, fault
+from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.problem.fabrication import Fabrication
+
+Shapes = Mapping[str, Geometry]
+"""Outlines by label, where they stand in the specimen."""
+
+
+def shapes(solid: Solid, wanted: Wanted, asked: Fabrication) -> dict[str, Geometry]:
+    """The outlines of the units in an assembled specimen; those that are in their places."""
+    sections = shapely.get_parts(solid.section(asked.thickness / 2))
+    tree = STRtree(sections)
+    found = {}
+    for label, design in wanted.polygons.items():
+        near = [sections[k] for k in tree.query(design, predicate="intersects")]
+        over = [s for s in near if s.intersection(design).area > 0.5 * s.area]
+        if len(over) == 1:
+            found[label] = over[0]
+    return found
+
+
+def check_assembled(
+    solid: Solid, found: Shapes, wanted: Wanted, asked: Fabrication
+) -> Iterator[Fault]:
+    """Faults of the assembled specimen: all units in their places, true to the design, apart."""
+    faults = list(check(solid, bodies=len(wanted.polygons)))
+    yield from faults
+    if faults:
+        return
+    for label, design in wanted.polygons.items():
+        if label not in found:
+            yield fault(solid, f"unit {label} is not in its place")
+            continue
+        shape = Shape(label, solid.file, design, found[label], wanted.slots[label])
+        yield from corners.check(shape, asked)
+    yield from _gaps(solid, found, asked)
+
+
+def _gaps(solid: Solid, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
+    labels, outlines = list(found), np.array(list(found.values()))
+    for first, second, gap in closest(outlines, asked.minimum_gap - TOLERANCE):
+        what = f"{gap:.3f} mm from unit {labels[second]}, less than {asked.minimum_gap:g} mm"
+        remedy = "lower it, or design with a larger gap (constraints.gap)"
+        shown = (outlines[first], outlines[second])
+        spot = shapely.shortest_line(*shown)
+        yield Fault(f"unit {labels[first]}", what, "minimum_gap", remedy, solid.file, shown, spot)
+
+
+def check_outline(label: str, file: Path, shape: Geometry, found: Shapes) -> Iterator[Fault]:
+    """Faults of a unit in a file of its own: its outline is that in the specimen, moved."""
+    if label not in found:
+        return
+    there = found[label]
+    shift = np.subtract(there.bounds[:2], shape.bounds[:2])
+    moved = shapely.transform(shape, lambda points: points + shift)
+    near = 2 * TOLERANCE
+    if not (moved.buffer(near).covers(there) and there.buffer(near).covers(moved)):
+        what = "it has another outline than in the assembled specimen"
+        shown = (there, moved)
+        yield Fault(f"unit {label}", what, "print", BUG, file, shown, moved.boundary)

@@ -1,0 +1,47 @@
+"""Slender units of optimised designs, each of which once stopped an export."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely import Polygon
+
+from pipeline.fabrication.candidates import Corner
+from pipeline.fabrication.checks import corners
+from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.network import Network
+from pipeline.fabrication.parts import Unit
+from pipeline.fabrication.units import unit
+from pipeline.problem.fabrication import Fabrication
+
+FILE = Path(__file__).parents[2] / "data/slender_units.json"
+SLENDER = json.loads(FILE.read_text(encoding="utf-8"))
+NAMES = [f"{found['study']} {found['label']}" for found in SLENDER]
+ASKED = Fabrication()
+
+
+def made(found: dict[str, Any]) -> Unit:
+    """The unit beside its neighbours, some of which have grown."""
+    net = Network(
+        (0,), {0: Polygon(found["corners"])}, {0: found["label"]}, {0: (0, 0)}, (), (), ()
+    )
+    slotted = [
+        Corner(vertex, number, np.array(along))
+        for number, (vertex, *along) in enumerate(found["slots"])
+    ]
+    neighbours = [Polygon(ring) for ring in found["neighbours"]]
+    return unit(net, 0, slotted, neighbours, ASKED, FILE)[0]
+
+
+@pytest.mark.parametrize("found", SLENDER, ids=NAMES)
+def test_a_slender_unit_is_made_without_a_fault(found: dict[str, Any]) -> None:
+    one = made(found)
+    vertices = [vertex for vertex, *_ in found["slots"]]
+    shape = Shape(one.label, FILE, one.design, one.outline, vertices)
+    assert [fault.what for fault in corners.check(shape, ASKED)] == []
+    gaps = [one.outline.distance(Polygon(ring)) for ring in found["neighbours"]]
+    assert min(gaps, default=1.0) >= ASKED.minimum_gap - 1e-4
