@@ -5,6 +5,7 @@ import sys
 
 from snakemake.utils import min_version
 
+from pipeline.filmed import recording_pages, tracked
 from pipeline.sources import source_hash
 from pipeline.workflow import check_problems, check_room, chunks, copies, designs
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
@@ -32,6 +33,12 @@ for target, built in targets().items():
         input:
             package_pages(built),
 
+    rule:
+        name:
+            f"{target}_recordings"
+        input:
+            recording_pages(built),
+
 
 include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
@@ -39,4 +46,5 @@ include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/fabrication.smk"
+include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/report.smk"

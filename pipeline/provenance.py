@@ -47,6 +47,31 @@ def attributes(
     }
 
 
+def recorded(recording: str, parents: Mapping[str, Path], *, synthetic: bool) -> dict[str, str]:
+    """The provenance of what is made of a recording.
+
+    Args:
+        recording: its YAML as JSON.
+        parents: files that were read, by role; the hash of a folder is that of its files.
+        synthetic: whether it was rendered.
+    """
+    return {
+        "recording": recording,
+        "synthetic": "yes" if synthetic else "no",
+        "parents": _json({name: _path_hash(path) for name, path in parents.items()}),
+        "packages": _json(dict(package_versions())),
+        "git_commit": git_commit(),
+    }
+
+
+def _path_hash(path: Path) -> str:
+    if not path.is_dir():
+        return file_hash(path)
+    files = (each for each in sorted(path.iterdir()) if each.is_file())
+    digests = "".join(f"{each.name} {file_hash(each)}\n" for each in files)
+    return hashlib.sha256(digests.encode()).hexdigest()
+
+
 def file_hash(path: Path) -> str:
     """SHA-256 of a file's bytes, in hex."""
     with path.open("rb") as file:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import shlex
+import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,13 +25,13 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-ABSENT = 6
 DESCRIPTION = """\
 Track the units of a specimen through a video.
 
   python -m pipeline.track RECORDING.yaml --out track.nc [--design NC]
   python -m pipeline.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
 
+The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
 The second writes NAME_recording.yaml and NAME_design.nc for a described test video, which the
 first then tracks.
 """
@@ -41,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("words", nargs="+", metavar="[import] YAML", help="what to read")
     made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
     made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
+    made.add_argument("--no-report", action="store_true", help="neither overlay nor quality page")
     made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
     made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="import")
     return made
@@ -55,7 +58,7 @@ def work(args: argparse.Namespace) -> None:
     if args.words[0] == "import" and len(args.words) == 2:
         _import(Path(args.words[1]), args.video, args.out_dir)
     elif len(args.words) == 1 and args.out is not None:
-        _track(Path(args.words[0]), args.design, args.out)
+        _track(Path(args.words[0]), args)
     else:
         remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
         raise UserError("one recording and --out are wanted", remedy=remedy)
@@ -79,26 +82,37 @@ def _import(path: Path, video: Path | None, folder: Path) -> None:
     LOG.info("python -m pipeline.track %s --out %s", folder / f"{name}_recording.yaml", "track.nc")
 
 
-def _track(path: Path, study: Path | None, out: Path) -> None:
+def _track(path: Path, args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
+    from pipeline.tracking import loadcell, table
     from pipeline.tracking import recording as recordings
+    from pipeline.tracking.dataset import dataset
     from pipeline.tracking.specimen import as_built
 
     asked = recordings.load(path)
-    video, source = _sources(asked, path, study)
+    video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
     track = followed(asked, design, video, path)
-    origin = {
-        "recording": asked.model_dump_json(),
-        "synthetic": "yes" if asked.synthetic else "no",
-        "parents": json.dumps(
-            {"design": provenance.file_hash(source), "video": provenance.file_hash(video)},
-            sort_keys=True,
-        ),
-        "packages": json.dumps(dict(provenance.package_versions()), sort_keys=True),
-        "git_commit": provenance.git_commit(),
-    }
-    datasets.write(dataset(design, track), out, "track", origin)
+    parents, force = {"design": source, "video": video}, None
+    if (cell := asked.load_cell) is not None:
+        parents["load_cell"] = path.parent / cell.file
+        force = loadcell.forces(parents["load_cell"], cell, asked.window.start + track.time)
+    made = dataset(design, track, force)
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    datasets.write(made, args.out, "track", origin)
+    table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    if not args.no_report:
+        _report(args.out, video)
+
+
+def _report(track: Path, video: Path) -> None:
+    """Runs the stage that draws overlay and quality."""
+    folder = track.with_name(f"{track.stem}_report")
+    words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
+    command = [sys.executable, "-m", "reports.tracking.build", *words]
+    if subprocess.run(command, check=False).returncode:
+        remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
+        raise UserError("the report could not be made", file=folder, remedy=remedy)
 
 
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:
@@ -145,44 +159,6 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         np.count_nonzero(track.timing),
     )
     return track
-
-
-def dataset(design: xr.Dataset, track: Track) -> xr.Dataset:
-    """The dataset ``track``: units as in the design, those that are absent without motion."""
-    import xarray as xr
-
-    units = design.sizes["unit"]
-    present = np.isfinite(design["vertices"].values[:, 0, 0])
-    camera, pixel = track.calibration.camera, track.calibration.pixel
-    motion = ("time", "unit", "dof")
-
-    def spread(values: np.ndarray, fill: float) -> np.ndarray:
-        out = np.full((values.shape[0], units, *values.shape[2:]), fill, values.dtype)
-        out[:, present] = values
-        return out
-
-    residual = np.full((units, 2), np.nan)
-    residual[present] = track.calibration.residual
-    variables = {
-        "vertices": design["vertices"],
-        "displacement": (motion, spread(track.displacement, np.nan)),
-        "sigma": (motion, spread(track.sigma, np.nan)),
-        "quality": (("time", "unit"), spread(track.quality, ABSENT)),
-        "timing": (("time",), track.timing.astype(np.int8)),
-        "frame": (("time",), track.frame),
-        "camera_homography": (("row", "column"), camera.homography),
-        "camera_centre": (("xy",), camera.centre),
-        "camera_radial": (("power",), camera.radial),
-        "camera_residual": (("unit", "xy"), residual),
-        "image_size": (("xy",), np.array(camera.size)),
-        "blur": ((), track.calibration.blur / pixel),
-    }
-    coordinates = {
-        **{name: design[name] for name in ("unit", "i", "j", "xy")},
-        "time": (("time",), track.time),
-        "dof": (("dof",), ["ux", "uy", "theta"]),
-    }
-    return xr.Dataset(variables, coordinates)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import os
 import sys
@@ -155,15 +154,8 @@ def _write_truth(film: Filming, asked: Recording, parents: tuple[Path, Path], ou
     from pipeline import datasets, provenance
     from pipeline.lab import truth
 
-    names = ("response", "design")
-    hashes = {name: provenance.file_hash(path) for name, path in zip(names, parents, strict=True)}
-    origin = {
-        "recording": asked.model_dump_json(),
-        "synthetic": "yes",
-        "parents": json.dumps(hashes, sort_keys=True),
-        "packages": json.dumps(dict(provenance.package_versions()), sort_keys=True),
-        "git_commit": provenance.git_commit(),
-    }
+    held = {"response": parents[0], "design": parents[1]}
+    origin = provenance.recorded(asked.model_dump_json(), held, synthetic=True)
     made = truth.dataset(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, out, "truth", origin)
 

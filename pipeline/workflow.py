@@ -20,6 +20,7 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
+from pipeline.filmed import RECORDINGS
 from pipeline.problem import (
     Problem,
     Stage,
@@ -151,7 +152,7 @@ def asked_for(words: Collection[str]) -> list[Study]:
     by_target = {target: study for study in studies() for target in study.targets}
     names = {study.name for study in by_target.values()}
     together = joints()
-    words = [word.removesuffix(FABRICATION) for word in words]
+    words = [word.removesuffix(FABRICATION).removesuffix(RECORDINGS) for word in words]
     found = [study for word in words for study in together.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])

@@ -354,6 +354,9 @@ _TRACK: Table = {
         flags={"steady": 0, "duplicate": 1, "dropped": 2},
     ),
     "frame": Variable(("time",), "1", "number of the frame in the file, from zero", "int64"),
+    "load_force": Variable(
+        ("time",), "N", "force of the load cell, where there was one", gaps=True
+    ),
     "camera_homography": Variable(
         ("row", "column"), "px, mm", "homography from the specimen's plane to undistorted pixels"
     ),

@@ -5,6 +5,7 @@ wildcard_constraints:
     name=r"\w+",
     preset=r"(@\w+)?",
     method=r"\w+",
+    recording=r"\w+",
     chunk=r"\d+",
     law=r"(geometric_)?",
     structure="intact|altered|cloaked",

@@ -26,8 +26,12 @@ def render(files: Path, asked: Path, out: Path) -> int:
 
 
 def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> None:
+    """With a load cell, and with all that comes beside the track."""
     out = tmp_path / "run.mp4"
     assert render(files, recording(tmp_path), out) == 0
+    (tmp_path / "load.csv").write_text("s,N\n5,0\n6,10\n", encoding="utf-8")
+    with out.with_suffix(".yaml").open("a", encoding="utf-8") as file:
+        file.write("load_cell: {file: load.csv, time: s, force: N, offset: 5}\n")
     assert track.main([str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")]) == 0
     made = datasets.read(tmp_path / "track.nc", "track")
     truth = datasets.read(tmp_path / "run_truth.nc", "truth")
@@ -35,6 +39,12 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
     np.testing.assert_allclose(made["time"], truth["time"], atol=1e-4)
     error = (made["displacement"] - truth["displacement"]).values
     assert np.sqrt(np.mean(error[..., :2] ** 2)) / 0.365 < 0.06
+    np.testing.assert_allclose(made["load_force"], 10 * made["time"], atol=1e-3)
+    lines = (tmp_path / "track.csv").read_text(encoding="utf-8").splitlines()
+    assert "SYNTHETIC" in lines[0]
+    assert len(lines) == 2 + made["quality"].size
+    assert "SYNTHETIC" in (tmp_path / "track_report/index.html").read_text(encoding="utf-8")
+    assert (tmp_path / "track_report/overlay.mp4").exists()
     with av.open(str(out)) as video:
         assert "SYNTHETIC" in video.metadata["comment"]
         assert float(video.streams.video[0].average_rate or 0) == 20.0

@@ -33,7 +33,7 @@ def changed(recording: Path, old: str, new: str) -> None:
 
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out)]) == 0
+    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
     design = datasets.read(recording.with_name("f_silhouette_design.nc"), "design")
     assert made["displacement"].dims == ("time", "unit", "dof")

@@ -1,0 +1,58 @@
+# A recording that was filmed is tracked from its own folder; one that is virtual is rendered first.
+rule render:
+    input:
+        recording="experiments/{name}/recordings/{recording}.yaml",
+        design="results/{name}{preset}/design.nc",
+        response="results/{name}{preset}/response.nc",
+    output:
+        video="results/{name}{preset}/recordings/{recording}.mp4",
+        recording="results/{name}{preset}/recordings/{recording}.yaml",
+        truth="results/{name}{preset}/recordings/{recording}_truth.nc",
+    log:
+        "results/{name}{preset}/logs/render_{recording}.log",
+    threads: 1
+    params:
+        source=source_hash("pipeline.virtual_lab"),
+    message:
+        "Rendering {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
+    shell:
+        "python -m pipeline.virtual_lab render {input.recording} --design {input.design}"
+        " --response {input.response} --out {output.video} --log {log}"
+
+
+rule track:
+    input:
+        unpack(tracked),
+    output:
+        track="results/{name}{preset}/recordings/{recording}/track.nc",
+        table="results/{name}{preset}/recordings/{recording}/track.csv",
+    log:
+        "results/{name}{preset}/logs/track_{recording}.log",
+    threads: 1
+    params:
+        source=source_hash("pipeline.track"),
+    message:
+        "Tracking {wildcards.recording} of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline.track {input.recording} --design {input.design}"
+        " --out {output.track} --no-report --log {log}"
+
+
+rule track_report:
+    input:
+        unpack(tracked),
+        track="results/{name}{preset}/recordings/{recording}/track.nc",
+    output:
+        page="results/{name}{preset}/recordings/{recording}/index.html",
+        overlay="results/{name}{preset}/recordings/{recording}/overlay.mp4",
+    log:
+        "results/{name}{preset}/logs/track_report_{recording}.log",
+    threads: 1
+    params:
+        folder=subpath(output.page, parent=True),
+        source=source_hash("reports.tracking.build"),
+    message:
+        "Drawing overlay and quality of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m reports.tracking.build --track {input.track} --video {input.video}"
+        " --out-dir {params.folder} --log {log}"

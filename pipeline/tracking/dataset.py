@@ -1,0 +1,65 @@
+"""A track as a dataset with the names and shapes of a response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from pipeline.datasets import TABLES
+from pipeline.tracking.arrays import Floats
+from pipeline.tracking.follow import Track
+
+_MOTION = ("time", "unit", "dof")
+
+
+def dataset(design: xr.Dataset, track: Track, force: Floats | None = None) -> xr.Dataset:
+    """The dataset ``track``: units as in the design, those that are absent without motion.
+
+    Args:
+        design: as built.
+        track: of the units that are present.
+        force: (frames,) of the load cell, N.
+    """
+    present = np.isfinite(design["vertices"].values[:, 0, 0])
+    camera, pixel = track.calibration.camera, track.calibration.pixel
+    residual = np.full((design.sizes["unit"], 2), np.nan)
+    residual[present] = track.calibration.residual
+    variables = {
+        "displacement": (_MOTION, spread(track.displacement, present, np.nan)),
+        "sigma": (_MOTION, spread(track.sigma, present, np.nan)),
+        "quality": (_MOTION[:2], spread(track.quality, present, absent())),
+        "timing": (("time",), track.timing.astype(np.int8)),
+        "frame": (("time",), track.frame),
+        "load_force": (("time",), np.full(len(track.time), np.nan) if force is None else force),
+        "camera_homography": (("row", "column"), camera.homography),
+        "camera_centre": (("xy",), camera.centre),
+        "camera_radial": (("power",), camera.radial),
+        "camera_residual": (("unit", "xy"), residual),
+        "image_size": (("xy",), np.array(camera.size)),
+        "blur": ((), track.calibration.blur / pixel),
+    }
+    return labelled(design, track.time, variables)
+
+
+def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
+    """Variables of a track with the labels of the design's units."""
+    coordinates = {
+        **{name: design[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), time),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    return xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
+
+
+def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
+    """Values (frames, present units, ...) over all units."""
+    out = np.full((values.shape[0], len(present), *values.shape[2:]), fill, values.dtype)
+    out[:, present] = values
+    return out
+
+
+def absent() -> int:
+    """The quality of a unit that the structure does not have."""
+    return TABLES["track"]["quality"].flags["absent"]

@@ -1,0 +1,1 @@
+"""What a track looks like on its video, and how good it is."""

@@ -1,0 +1,67 @@
+"""Draws a track: an overlay on its video, and one page on how good the recording is."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline import cli, datasets
+from pipeline.lab.encode import encode
+from pipeline.lab.setup import Codec
+from pipeline.tracking.arrays import Image
+from pipeline.tracking.recording import Recording
+from pipeline.tracking.video import Frame, frames
+from pipeline.whole import whole
+from reports.tracking import measures, overlay
+
+
+def _work(args: argparse.Namespace) -> None:
+    track = datasets.read(args.track, "track")
+    asked = Recording.model_validate_json(track.attrs["recording"], context={"sim_units": True})
+    with cli.progress(track.sizes["time"], "overlay") as bar:
+        kept: list[Image] = []
+        chosen = measures.sampled(track)
+
+        def shown() -> Iterator[Frame]:
+            for frame in _of_track(args.video, asked, track):
+                if frame.index in chosen:
+                    kept.append(frame.image)
+                bar.update()
+                yield frame
+
+        painted = overlay.painter(track, args.colour)
+        labels = {"title": asked.title or args.video.stem, "comment": painted.note}
+        rate = 1 / float(np.median(np.diff(track["time"].values)))
+        codec = Codec(crf=20)
+        encode(args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels)
+    found = measures.measured(track, kept, measures.stream_of(args.video))
+    from reports.tracking import page
+
+    with whole(args.out_dir / "index.html") as aside:
+        aside.write_text(page.render(track, asked, found), encoding="utf-8", newline="\n")
+
+
+def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Frame]:
+    """The frames of the video that the track has."""
+    wanted = set(track["frame"].values.tolist())
+    end = np.inf if asked.window.end is None else asked.window.end
+    return (each for each in frames(video, asked.window.start, end) if each.index in wanted)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Draw overlay and page; returns the exit code."""
+    parser = cli.parser("reports.tracking.build", str(__doc__), study=False)
+    parser.add_argument("--track", type=Path, required=True, metavar="NC", help="the track")
+    parser.add_argument("--video", type=Path, required=True, metavar="FILE", help="its video")
+    parser.add_argument("--colour", choices=overlay.SHOWN, default="displacement", help="of units")
+    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for both")
+    return cli.run(_work, parser, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

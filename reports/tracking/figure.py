@@ -1,0 +1,112 @@
+"""The figure of a quality report: residuals and uncertainty over the specimen, and over time."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from pipeline.tracking.specimen import Specimen
+from reports import style
+from reports.tracking.measures import Measures
+from reports.tracking.overlay import of_track
+
+_REASONS = {
+    "out_of_frame": style.GREY,
+    "hidden": style.INTACT,
+    "glare": "#e8c547",
+    "poor_fit": style.ALTERED,
+    "strayed": "#b03060",
+}
+_SIZE, _TOP = 50.0, 9.0
+
+
+def figure(track: xr.Dataset, found: Measures) -> Figure:
+    """Maps above, courses below."""
+    drawn = style.page(132.0)
+    specimen = of_track(track)
+    there = np.isin(track["unit"].values, specimen.ids)
+    residual = track["camera_residual"].values[there]
+    sigma = track["sigma"].transpose("time", "unit", "dof").values[:, there]
+    scale = np.array([1 / found.pixel, 1 / found.pixel, 180 / np.pi])
+    typical = np.nanmedian(sigma * scale, axis=0)
+    maps = [
+        ("a", "First frame less design, px", np.hypot(*residual.T)),
+        ("b", "Uncertainty of the place, px", np.hypot(*typical[:, :2].T) / np.sqrt(2)),
+        ("c", "Uncertainty of the rotation, deg", typical[:, 2]),
+    ]
+    for place, (letter, title, values) in enumerate(maps):
+        left = 2.0 + 60.0 * place
+        style.letter(drawn, left, 1.0, letter, title)
+        axes = style.place(drawn, left, _TOP, _SIZE, _SIZE)
+        shown = _map(axes, specimen, values)
+        bar = style.place(drawn, left + _SIZE - 3.0, _TOP + 12.0, 1.8, _SIZE - 24.0)
+        drawn.colorbar(shown, cax=bar)
+    _arrows(drawn.axes[0], specimen, residual)
+    _courses(drawn, track, found, sigma * scale)
+    return drawn
+
+
+def _map(axes: Axes, specimen: Specimen, values: np.ndarray) -> PolyCollection:
+    outlines = [specimen.centre[k] + specimen.polygon(k) for k in range(specimen.count)]
+    most = float(np.nanpercentile(values, 98)) if np.isfinite(values).any() else 1.0
+    shown = PolyCollection(outlines, edgecolors=style.INTACT, linewidths=0.15)
+    shown.set(array=values, cmap=style.MAGNITUDE, norm=Normalize(0, max(most, 1e-9)))
+    axes.add_collection(shown)
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    spare = 0.18 * (high[0] - low[0])  # room for the colour bar
+    axes.set(xlim=(low[0], high[0] + spare), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_axis_off()
+    return shown
+
+
+def _arrows(axes: Axes, specimen: Specimen, residual: np.ndarray) -> None:
+    """Directions of the residuals; pixels count downwards."""
+    x, y = specimen.centre.T
+    longest = max(float(np.nanpercentile(np.hypot(*residual.T), 98)), 1e-9)
+    reach = longest / np.sqrt(np.median(specimen.area))
+    axes.quiver(
+        x,
+        y,
+        residual[:, 0],
+        -residual[:, 1],
+        angles="xy",
+        scale_units="xy",
+        scale=reach,
+        width=0.005,
+        color=style.ALTERED,
+    )
+
+
+def _courses(drawn: Figure, track: xr.Dataset, found: Measures, sigma: np.ndarray) -> None:
+    time = track["time"].values
+    style.letter(drawn, 2.0, 66.0, "d", "Units that are lost, by reason")
+    axes = style.place(drawn, 14.0, 73.0, 70.0, 47.0)
+    for name, share in zip(found.reasons, found.lost.T, strict=True):
+        if share.any():
+            label = name.replace("_", " ")
+            axes.plot(time, 100 * share, color=_REASONS[name], label=label, drawstyle="steps-mid")
+    if found.lost.any():
+        axes.legend(loc="best")
+    else:
+        axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
+    axes.set(xlabel="time, s", ylabel="of the units, %", ylim=(0, None))
+    style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
+    axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)
+    place = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2)
+    with np.errstate(all="ignore"):
+        low, middle, high = np.nanpercentile(place, [5, 50, 95], axis=1)
+    axes.fill_between(time, low, high, color=style.PALE, linewidth=0)
+    axes.plot(time, middle, color=style.INTACT)
+    if np.isfinite(found.floor[0]):
+        floor = float(np.hypot(*found.floor[:2]) / np.sqrt(2))
+        axes.plot([time[0], time[found.resting - 1]], [floor, floor], color=style.ALTERED)
+        axes.annotate("scatter at rest", (time[found.resting - 1], floor), color=style.ALTERED)
+    for flag, colour in ((1, style.ALTERED), (2, style.CLOAKED)):
+        for moment in time[track["timing"].values == flag]:
+            axes.axvline(moment, color=colour, linewidth=0.5)
+    axes.set(xlabel="time, s", ylabel="px", ylim=(0, None))

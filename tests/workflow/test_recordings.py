@@ -1,0 +1,34 @@
+"""Recordings of a study: a video and its YAML are all that it takes."""
+
+from tests.workflow.conftest import Sandbox
+
+TRACKED = {"track": 1, "track_report": 1, "fig2_recordings": 1}
+ONLY_DESIGN = {"design": 2, "select": 1}
+
+
+def only(sandbox: Sandbox, text: str) -> None:
+    """Leaves one recording, of a video beside it."""
+    folder = sandbox.root / "experiments/fig2/recordings"
+    for path in folder.iterdir():
+        path.unlink()
+    (folder / "run1.yaml").write_text(text, encoding="utf-8")
+    (folder / "run1.mp4").write_bytes(b"video")
+
+
+def test_virtual_recordings_are_rendered_and_tracked(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig2_recordings")
+    count = len(list((sandbox.root / "experiments/fig2/recordings").glob("*.yaml")))
+    assert planned["render"] == planned["track"] == planned["track_report"] == count > 0
+    assert planned["simulate"] == 1
+
+
+def test_a_video_that_is_dropped_in_is_tracked(sandbox: Sandbox) -> None:
+    only(sandbox, "video: run1.mp4\nload_cell: {file: load.csv}\n")
+    (sandbox.root / "experiments/fig2/recordings/load.csv").write_text("time,force\n")
+    assert sandbox.planned("fig2_recordings") == TRACKED | ONLY_DESIGN
+
+
+def test_a_recording_may_bring_its_own_design(sandbox: Sandbox) -> None:
+    only(sandbox, "video: run1.mp4\ndesign: own.nc\n")
+    (sandbox.root / "experiments/fig2/recordings/own.nc").write_bytes(b"design")
+    assert sandbox.planned("fig2_recordings") == TRACKED
