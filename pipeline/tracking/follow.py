@@ -78,15 +78,16 @@ def follow(
             tell()
     motion = np.array(poses)
     motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
-    sigma = uncertainty.calibrated(motion, np.array(sigmas, float), specimen.centre)
-    time = np.array(times) - times[0]
+    time, told = np.array(times) - times[0], np.array(sigmas, float)
+    faults = timing.faults(time, motion, told)
+    sigma = uncertainty.calibrated(motion, told, specimen.centre, faults == timing.STEADY)
     return Track(
         time,
         np.array(numbers),
         motion,
         np.where(np.isfinite(motion), sigma, np.nan),
         np.array(qualities),
-        timing.faults(motion, sigma),
+        faults,
         calibration,
     )
 

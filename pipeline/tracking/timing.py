@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Ints
+from pipeline.tracking.arrays import Floats, Ints, Mask
 
 STEADY, DUPLICATE, DROPPED = range(3)
 """Timing of a frame: as the file says; shows the instant before again; a frame is missing."""
@@ -14,51 +14,80 @@ _ALIKE = 0.7
 _VISIBLE = 6.0
 """Steps must be so many standard uncertainties long before anything can be told from them."""
 _STILL = 0.25
-_TWICE = (1.6, 2.6)
-_BETTER = 0.6
+_WINDOW = 4
+_DEGREE = 3
+_GAPS = (0, 1, 2)
+"""Numbers of frames that may be missing, none first."""
+_BETTER = 0.2
+"""A gap must make the squared residuals of smooth motion so much smaller."""
 
 
-def faults(motion: Floats, sigma: Floats) -> Ints:
+def faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
     """The timing (frames,) of every frame.
 
-    A frame that repeats the one before has no step where those about it have one; a frame after a
-    gap has one of twice the length. Where the specimen is at rest or turns round, none is flagged.
+    A frame that repeats the one before has no step where those about it have one. After a gap the
+    motion goes on smoothly, but only if the frames from there on are later than they say. Where the
+    specimen is at rest or jolts, nothing is flagged.
 
     Args:
+        time: (frames,) s, as the file says.
         motion: (frames, units, 3) poses, NaN where missing.
         sigma: (frames, units, 3) standard uncertainties.
     """
-    steps = np.diff(motion[..., :2], axis=0)
+    place = motion[..., :2]
     noise = np.sqrt(np.nanmedian(sigma[..., :2] ** 2, axis=(1, 2)))
     out = np.full(len(motion), STEADY)
-    for step in range(2, len(steps) - 2):
-        before = steps[max(0, step - _BESIDE) : step]
-        after = steps[step + 1 : step + 1 + _BESIDE]
-        out[step + 1] = _judged(steps[step], before, after, float(noise[step : step + 2].max()))
+    out[_repeated(place, noise)] = DUPLICATE
+    out[_late(time, place, noise, out == DUPLICATE)] = DROPPED
     return out
 
 
-def _judged(step: Floats, before: Floats, after: Floats, noise: float) -> int:
+def _repeated(place: Floats, noise: Floats) -> Mask:
+    steps = np.diff(place, axis=0)
+    out = np.zeros(len(place), dtype=bool)
+    for step in range(2, len(steps) - 2):
+        before, after = steps[max(0, step - _BESIDE) : step], steps[step + 1 : step + 1 + _BESIDE]
+        out[step + 1] = _stands(steps[step], before, after, float(noise[step : step + 2].max()))
+    return out
+
+
+def _stands(step: Floats, before: Floats, after: Floats, noise: float) -> bool:
+    """Whether a step is none, although those before and after are alike and can be seen."""
     about = np.concatenate([before, after])
     known = np.isfinite(step).all(axis=-1) & np.isfinite(about).all(axis=(0, 2))
     if not known.any():
-        return STEADY
+        return False
     usual = np.median(about[:, known], axis=0)
     length = np.sqrt(np.mean(usual**2))
-    if length < _VISIBLE * noise or not all(
-        _alike(np.median(side[:, known], axis=0), usual) for side in (before, after)
-    ):
-        return STEADY
-    this = step[known]
-    ratio = float((this * usual).sum() / (usual**2).sum())
-    if abs(ratio) < _STILL and np.sqrt(np.mean(this**2)) < _STILL * length:
-        return DUPLICATE
-    once, twice = (np.linalg.norm(this - share * usual) for share in (1, 2))
-    if _TWICE[0] < ratio < _TWICE[1] and twice < _BETTER * once:
-        return DROPPED
-    return STEADY
+    sides = [np.median(side[:, known], axis=0) - usual for side in (before, after)]
+    apart = max(np.sqrt(np.mean(side**2)) for side in sides)
+    this = np.sqrt(np.mean(step[known] ** 2))
+    return bool(length > _VISIBLE * noise and apart < _ALIKE * length and this < _STILL * length)
 
 
-def _alike(steps: Floats, usual: Floats) -> bool:
-    """Whether the steps on one side differ little from those on both."""
-    return bool(np.linalg.norm(steps - usual) < _ALIKE * np.linalg.norm(usual))
+def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
+    """Frames that come later than they say, by a frame or two."""
+    out = np.zeros(len(place), dtype=bool)
+    shown = np.nonzero(~repeated)[0]
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    count = np.arange(len(time)) - np.cumsum(repeated)
+    extra = np.maximum(np.round(np.diff(time, prepend=time[0]) / interval) - 1, 0)
+    clock = count + np.cumsum(extra)
+    for middle in range(_WINDOW, len(shown) - _WINDOW + 1):
+        window = shown[middle - _WINDOW : middle + _WINDOW]
+        near = place[window].reshape(len(window), -1)
+        near = near[:, np.isfinite(near).all(axis=0)]
+        after = np.arange(len(window)) >= _WINDOW
+        rough = (
+            [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
+        )
+        if rough and np.sqrt(rough[0]) > _VISIBLE * noise[shown[middle]]:
+            out[shown[middle]] = min(rough[1:]) < _BETTER * rough[0]
+    return out
+
+
+def _roughness(clock: Floats, motion: Floats) -> float:
+    """Mean square of what motions (frames, n) are off polynomials in time."""
+    basis = np.linalg.qr(np.vander((clock - clock.mean()) / np.ptp(clock), _DEGREE + 1))[0]
+    rest = motion - basis @ (basis.T @ motion)
+    return float(np.mean(rest**2))
