@@ -49,12 +49,10 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
     for name, margin in margins:
         label = f"{_MARGINS.get(str(name), str(name))}: margin to the bound"
-        length = str(name) in {"edge_length", "gap"}
-        value = float(margin) if length else float(np.degrees(margin))
+        length, left = str(name) in {"edge_length", "gap"}, settled(float(margin))
+        value = left if length else float(np.degrees(left))
         note = "smallest of the design at rest; 0 is active, negative violated"
-        yield number(
-            f"margin_{name}", label, settled(value), "mm" if length else "deg", digits=3, note=note
-        )
+        yield number(f"margin_{name}", label, value, "mm" if length else "deg", digits=3, note=note)
     rest, gap = "at rest, by geometry", float(design["smallest_gap"])
     yield number("gap", "Smallest gap between units", gap, "mm", digits=3, note=rest)
     yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)

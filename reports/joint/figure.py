@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from reports import draft, style
 from reports.path import curves, measures
 from reports.path.course import Course, course, display_name, structures
-from reports.path.structures import Shade, colour_bar, shade_of, snapshot
+from reports.path.snapshots import colour_bar, snapshot
+from reports.path.structures import Shade, shade_of
 from reports.study import Study
 
 PER_BAND = 2

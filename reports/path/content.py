@@ -93,7 +93,7 @@ def caption(study: Study) -> str:
         "<b>b</b> Loss against evaluation; rejected evaluations are dots, infeasible ones pale, "
         "the circle is the best feasible design.",
         "<b>c</b> Snapshots at true size, coloured by "
-        f"{shade_of(problem, study.response).field.label}.",
+        f"{shade_of(problem, study.response).field.label.replace('u_y', 'u<sub>y</sub>')}.",
         f"<b>d</b> {measures.measure_of(problem).label}"
         + ("; the bands hold 90 % of the imperfect cloaks" if study.scatter is not None else "")
         + ("; crosses mark jumps to another branch" if _jumps(study) else "")

@@ -14,6 +14,8 @@ from pipeline.problem.lattices import Kagome, Lattice, Quads
 Array = NDArray[np.float64]
 
 ORDER = ("intact", "altered", "cloaked")
+SECOND = "Cloaked, no overlap"
+"""What a figure calls the design for contact on distance."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pipeline.problem import Problem
 from reports import style
 from reports.checks import JUMPED
 from reports.path import scatter
-from reports.path.course import Course, course, display_name, structures
+from reports.path.course import SECOND, Course, course, display_name, structures
 from reports.path.measures import Measure
 from reports.study import Again, Study
 
@@ -86,8 +86,8 @@ def _second(axes: Axes, study: Study, measure: Measure, again: Again) -> None:
     """The design for contact on distance."""
     way = course(study.problem, again.response)
     values = over_cases(study.problem, measure.of(again.response)).sel(structure="cloaked")
-    label = "Cloaked, no overlap"
-    axes.plot(way.values, values, color=style.CLOAKED, lw=1.0, ls=(0, (3.0, 1.5)), label=label)
+    dashes = (0, (3.0, 1.5))
+    axes.plot(way.values, values, color=style.CLOAKED, lw=1.0, ls=dashes, label=SECOND)
 
 
 def _jumps(axes: Axes, course: Course, mean: xr.DataArray, response: xr.Dataset) -> None:

@@ -11,11 +11,12 @@ from reports import draft, style
 from reports.history import loss_history
 from reports.path import curves, measures
 from reports.path.course import Course, course, display_name, lattice_size, structures
-from reports.path.structures import rest_panel, snapshots
+from reports.path.snapshots import Grid, snapshots
+from reports.path.structures import rest_panel
 from reports.study import Study
 
-SNAPSHOT, TALLEST_SNAPSHOTS = 40.0, 116.0
-"""Side of a snapshot where there is room, and height that all rows may take, mm."""
+TALLEST_SNAPSHOTS = 116.0
+"""Height that all snapshots may take, mm."""
 
 Panel = tuple[str, Callable[[Axes], None]]
 
@@ -24,15 +25,15 @@ def build(study: Study) -> Figure:
     """The whole figure."""
     path = course(study.problem, study.response)
     names = structures(study.response)
-    height = min(SNAPSHOT * len(names), TALLEST_SNAPSHOTS)
+    grid = Grid.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
-    low = top + 8.5 + height + 2.0
+    low = top + 8.5 + grid.lines * grid.side + 2.0
     figure = style.page(low + 48.0)
     _at_rest(figure, study, names)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
     loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, loss_label(study))
     style.letter(figure, 0.0, top, "c", "Response, true to scale")
-    snapshots(figure, study.problem, study.response, path, (top + 8.5, height))
+    snapshots(figure, study, grid, top + 8.5)
     _curves(figure, _panels(study, path), low)
     if study.draft:
         draft.mark(figure)

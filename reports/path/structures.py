@@ -8,17 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.regions import Region
 from reports import style
-from reports.path.course import Course, display_name, structures
 from reports.player import Field, round_up
 from reports.structure import (
     CLAMPED,
@@ -127,58 +123,3 @@ def _load_arrows(axes: Axes, structure: Structure, direction: float) -> None:
             clip_on=False,
         )
         axes.add_patch(arrow)
-
-
-def snapshots(
-    figure: Figure, problem: Problem, response: xr.Dataset, course: Course,
-    place: tuple[float, float],
-) -> None:  # fmt: skip
-    """A row a structure, a column a load, in `place`: mm from the top, and height."""
-    top, height = place
-    names, shade = structures(response), shade_of(problem, response)
-    label, bar, gap = 6.0, 14.0, 1.2
-    count = len(course.shown)
-    side = min((style.TWO_COLUMNS - label - bar) / count, height / len(names))
-    left = label + (style.TWO_COLUMNS - label - bar - count * side) / 2
-    for k, name in enumerate(names):
-        y = top + k * side
-        style.write(
-            figure, left - 1.5, y + side / 2, display_name(problem, name), rotation=90,
-            ha="right", va="center", color=style.STRUCTURE_COLOURS[name], fontsize=style.TEXT,
-        )  # fmt: skip
-        for m, sample in enumerate(course.shown):
-            axes = style.place(figure, left + m * side, y, side - gap, side - gap)
-            snapshot(axes, problem, response.sel(structure=name), sample, shade)
-            if k == 0:
-                axes.set_title(
-                    f"{course.symbol} = {course.at(sample)}", fontsize=style.TEXT, pad=1.0
-                )
-    colour_bar(figure, shade, (left + count * side + 1.5, top, len(names) * side - gap))
-
-
-def snapshot(
-    axes: Axes, problem: Problem, part: xr.Dataset, sample: int, shade: Shade, case: int = 0
-) -> None:
-    """One structure at one sample of its path, true to scale."""
-    structure = from_dataset(part, problem.lattice.spacing)
-    frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
-    draw(
-        axes,
-        structure,
-        frame,
-        values=shade.values(np.nan_to_num(frame)),
-        colour_map=shade.colours,
-        norm=shade.norm,
-    )
-
-
-def colour_bar(figure: Figure, shade: Shade, place: tuple[float, float, float]) -> None:
-    """The bar of the snapshots, in `place`: mm from the left and the top, and height."""
-    left, top, height = place
-    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
-    figure.colorbar(ScalarMappable(shade.norm, shade.colours), cax=bar).set_label(
-        shade.label, labelpad=1.5
-    )
-    bar.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
-    bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
-    bar.tick_params(length=1.5)
