@@ -147,8 +147,11 @@ def _regions(problem: Problem) -> Findings:
     if isinstance(problem.objective.region, Region):
         yield from _region_fits(problem, problem.objective.region, ("objective", "region"))
     if not interest_units(problem):
-        key = ("cloak",) if problem.objective.region == "surroundings" else ("objective", "region")
-        yield Finding("no unit lies in the region of interest", key, "leave units outside it")
+        what = "no unit lies in the region of interest"
+        if problem.objective.region == "surroundings":
+            yield Finding(what, ("cloak",), "leave units outside it")
+        else:
+            yield Finding(what, ("objective", "region"), "enlarge it, or move its centre")
 
 
 def _void(problem: Problem) -> Findings:

@@ -77,6 +77,9 @@ def _grey(content: bytes) -> NDArray[np.uint8]:
     """
     import cv2
 
+    cv2.utils.logging.setLogLevel(
+        cv2.utils.logging.LOG_LEVEL_SILENT
+    )  # the error below tells it all
     pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None or pixels.dtype != np.uint8:
         raise ImageError("not a readable image", "give a PNG or JPG of 8 bits, or an SVG")
