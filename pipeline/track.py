@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import os
 import shlex
 import subprocess
 import sys
@@ -29,23 +30,26 @@ DESCRIPTION = """\
 Track the units of a specimen through a video.
 
   python -m pipeline.track RECORDING.yaml --out track.nc [--design NC]
+  python -m pipeline.track init VIDEO --design NC [--pixel-size MM] [--out-dir FOLDER]
   python -m pipeline.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
 
 The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
-The second writes NAME_recording.yaml and NAME_design.nc for a described test video, which the
-first then tracks.
+The second proposes a recording YAML, draws the units that it found on the first frame, and says
+what it could not tell. The third writes NAME_recording.yaml and NAME_design.nc for a described test
+video, which the first then tracks.
 """
 
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
     made = cli.parser("pipeline.track", DESCRIPTION, study=False)
-    made.add_argument("words", nargs="+", metavar="[import] YAML", help="what to read")
+    made.add_argument("words", nargs="+", metavar="[COMMAND] FILE", help="what to read")
     made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
     made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
     made.add_argument("--no-report", action="store_true", help="neither overlay nor quality page")
     made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
-    made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="import")
+    made.add_argument("--pixel-size", type=float, metavar="MM", help="init: roughly")
+    made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="of the files")
     return made
 
 
@@ -55,13 +59,53 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a fault of the files, or a video that does not show the design.
     """
-    if args.words[0] == "import" and len(args.words) == 2:
+    command = args.words[0] if len(args.words) == 2 else ""
+    if command == "import":
         _import(Path(args.words[1]), args.video, args.out_dir)
+    elif command == "init" and args.design is not None:
+        _init(Path(args.words[1]), args)
     elif len(args.words) == 1 and args.out is not None:
         _track(Path(args.words[0]), args)
     else:
         remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
         raise UserError("one recording and --out are wanted", remedy=remedy)
+
+
+def _init(video: Path, args: argparse.Namespace) -> None:
+    import cv2
+
+    from pipeline import datasets
+    from pipeline.tracking import proposal, recording
+    from pipeline.tracking.video import frames
+    from pipeline.whole import whole
+
+    design = datasets.read(args.design, "design")
+    first = next(frames(video), None)
+    if first is None:
+        raise UserError("the video has no frames", file=video, remedy="give another file")
+    scale = None if args.pixel_size is None else 1 / args.pixel_size
+    found = proposal.propose(first.image, design, scale)
+    out, drawn = (args.out_dir / f"{video.stem}{end}" for end in (".yaml", "_units.png"))
+    if out.exists():
+        raise UserError("there is a recording already", file=out, remedy="remove it, or --out-dir")
+    values = {
+        "title": video.stem,
+        "video": os.path.relpath(video.resolve(), out.resolve().parent),
+        "design": os.path.relpath(args.design.resolve(), out.resolve().parent),
+        "structure": found.structure,
+        "specimen": found.kind,
+        "pixel_size": f"{found.pixel_size:.4g} mm",
+        "window": {"start": "0 s"},
+    }
+    with whole(drawn) as aside:
+        aside.write_bytes(cv2.imencode(".png", proposal.picture(first.image, found))[1].tobytes())
+    with whole(out) as aside:
+        comments = ("What the first frame did not tell:", *found.doubts)
+        aside.write_text(recording.text(values, comments), encoding="utf-8")
+    seen = f"{len(found.sighting.unit)} of {found.specimen.count} units, {found.kind}"
+    LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
+    for doubt in found.doubts:
+        LOG.info("not told: %s", doubt)
 
 
 def _import(path: Path, video: Path | None, folder: Path) -> None:

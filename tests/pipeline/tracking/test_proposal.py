@@ -1,0 +1,74 @@
+"""The first look at a video, by `pipeline.track init`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline import datasets, track
+from pipeline.errors import UserError
+from pipeline.tracking import importing, proposal, recording
+from pipeline.tracking.video import frames
+from tests.pipeline.tracking.conftest import CLIPS
+
+
+def first(name: str) -> np.ndarray:
+    return next(frames(importing.video_of(CLIPS / f"{name}.yaml"))).image
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("b_harmonic", "dots"), ("e_speckle", "speckle"), ("f_silhouette", "bare")],
+)
+def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
+    described = importing.description(CLIPS / f"{name}.yaml")
+    found = proposal.propose(first(name), importing.design(described))
+    assert found.kind == kind
+    assert len(found.sighting.unit) > 0.98 * found.specimen.count
+    assert found.pixel_size == pytest.approx(1 / described["approx_px_per_mm"], rel=0.01)
+    assert any("case" in doubt for doubt in found.doubts)
+
+
+def test_a_mirrored_video_is_refused() -> None:
+    design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
+    with pytest.raises(UserError, match="mirror images"):
+        proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
+
+
+def test_a_proposal_is_a_recording_and_a_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(tmp_path)
+    assert track.main(["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]) == 0
+    words = ["init", str(CLIPS / "f_silhouette.mp4"), "--out-dir", folder]
+    words += ["--design", str(tmp_path / "f_silhouette_design.nc")]
+    assert track.main(words) == 0
+    assert "not told: case" in capsys.readouterr().err
+    made = recording.load(tmp_path / "f_silhouette.yaml")
+    assert (tmp_path / str(made.video)).resolve() == (CLIPS / "f_silhouette.mp4").resolve()
+    datasets.read(tmp_path / str(made.design), "design")
+    drawn = cv2.imread(str(tmp_path / "f_silhouette_units.png"))
+    assert drawn is not None
+    assert drawn.shape == (1536, 1536, 3)
+    assert track.main(words) == 2
+    assert "there is a recording already" in capsys.readouterr().err
+
+
+def test_a_turned_video_is_refused() -> None:
+    """The top row is left out of the picture, so that up and down can be told apart."""
+    design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
+    image = first("f_silhouette")
+    found = proposal.propose(image, design, 2.74)
+    height = found.specimen.centre[:, 1]
+    row = np.flatnonzero(height > height.max() - 1)
+    seen = found.sighting.camera.project(found.specimen.centre[row])
+    below = np.ascontiguousarray(image[int(seen[:, 1].max()) + 22 :])
+    gone = np.isin(design["unit"].values, found.specimen.ids[row])
+    names = ("vertices", "vertices_initial")
+    cut = design.assign({name: design[name].where(~gone[:, None, None]) for name in names})
+    assert len(proposal.propose(below, cut, 2.74).sighting.unit) == 210
+    with pytest.raises(UserError, match="not upright"):
+        proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74)
