@@ -1,4 +1,4 @@
-"""What holds a specimen: clamps, grips, the adapter of a driven unit, and the assembly jig."""
+"""What holds a specimen under test: clamps, grips, the adapter of a driven unit."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from shapely import Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.flat import cuts
-from pipeline.fabrication.lettering import extent, text, turned
 from pipeline.fabrication.parts import Circle, Specimen, Unit
-from pipeline.fabrication.solids import Layer, Solid, discs, flat, pen
+from pipeline.fabrication.solids import Layer, Solid, discs, flat
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.fabrication import Fixture as Asked
 
@@ -25,15 +24,12 @@ _HEAD = 4.5  # mm, radius of a bolt's head with its washer
 _LID = 3.0  # mm, thickness of lids
 _PRESS = 0.2  # mm by which posts are lower than the units, so that the lid presses
 _LUG = 2.5  # mm, thickness of the adapter's fingers
-_JIG_RIM, _JIG_BASE, _JIG_WALL = 6.0, 2.4, 4.0  # mm
+_FOOT = 1.5  # mm by which the adapter's back is above the units
 _THIN = 0.4  # mm, half of the thinnest wall that a jig keeps
-_PEN = 0.5  # mm
-_MERGED = 0.02  # mm by which strokes grow: two that touch in a point would leave an open mesh
-_LETTER = 4.0  # mm
 
 
 def fixtures(specimen: Specimen, wanted: Fabrication, spacing: float) -> Iterator[Solid]:
-    """All fixtures of a specimen, each as it lies on the printer's bed.
+    """Clamps, grips and adapters of a specimen, each as it lies on the printer's bed.
 
     Args:
         specimen: what is held.
@@ -43,7 +39,6 @@ def fixtures(specimen: Specimen, wanted: Fabrication, spacing: float) -> Iterato
     for kind, labels in (("CLAMP", specimen.clamped), ("DRIVE", specimen.driven)):
         for group in groups([specimen.by_label[label] for label in labels]):
             yield from _holder(kind, group, specimen, wanted, spacing)
-    yield from jig(specimen, wanted, spacing)
 
 
 def groups(units: Sequence[Unit]) -> list[list[Unit]]:
@@ -174,8 +169,8 @@ def _clamp(
     mine = shapely.union_all([unit.outline for unit in held])
     kept = footprint.difference(shapely.union_all(free).buffer(_APART)).difference(discs(holes))
     base = _main(kept)
-    jaws = base.difference(mine.buffer(asked.clearance)).difference(_shims(specimen))
-    jaws = jaws.buffer(-_THIN).buffer(_THIN, join_style="mitre").intersection(base)
+    jaws = base.difference(mine.buffer(asked.clearance)).difference(corridors(specimen))
+    jaws = printable(jaws).intersection(base)
     top = asked.base + wanted.thickness - _PRESS
     yield Solid(name, (Layer(base, 0.0, asked.base), Layer(flat(jaws), asked.base, top)))
     yield Solid(f"{name}-LID", (Layer(base, 0.0, _LID),))
@@ -189,7 +184,7 @@ def _main(shape: BaseGeometry) -> Polygon:
     )
 
 
-def _shims(specimen: Specimen) -> BaseGeometry:
+def corridors(specimen: Specimen) -> BaseGeometry:
     """The corridors that shims need to be slid in from the top."""
     ends: dict[int, list[np.ndarray]] = {}
     for unit in specimen.units:
@@ -202,68 +197,37 @@ def _shims(specimen: Specimen) -> BaseGeometry:
 def adapter(unit: Unit, specimen: Specimen, wanted: Fabrication) -> Solid:
     """A cap with fingers that grips a unit from the top, with a bolt hole over its centroid.
 
-    It is printed on its back: seen as it lies on the bed, it is mirrored.
+    It is printed on its back: seen as it lies on the bed, it is mirrored. The back may be wider
+    than the unit, so a foot keeps it above the neighbours. Where they leave no room for fingers,
+    the foot is glued on.
     """
     asked = wanted.fixture
     others = [other.outline for other in specimen.units if other.label != unit.label]
+    taken = shapely.union_all(others).buffer(_APART / 2)
     snug = unit.outline.convex_hull.buffer(asked.clearance, join_style="mitre")
     ring = snug.buffer(_LUG, join_style="mitre").difference(snug)
-    taken = shapely.union_all(others).buffer(_APART / 2)
-    ring = ring.difference(taken).difference(_shims(specimen))
-    fingers = ring.buffer(-_THIN).buffer(_THIN, join_style="mitre").intersection(ring)
-    cap = snug.union(fingers).convex_hull.difference(taken)
-    hole = discs((Circle((unit.design.centroid.x, unit.design.centroid.y), asked.hole),))
-    back = _mirrored(_main(cap.difference(hole)))
-    tips = _mirrored(fingers.intersection(cap))
-    reach = asked.base + min(asked.pocket, wanted.thickness)
-    layers = (Layer(flat(back), 0.0, asked.base), Layer(flat(tips), asked.base, reach))
-    return Solid(f"DRIVE-{unit.label}", layers)
+    fingers = printable(ring.difference(taken).difference(corridors(specimen)))
+    foot = flat(printable(snug.union(fingers).convex_hull.difference(taken)))
+    bolt = Circle((unit.design.centroid.x, unit.design.centroid.y), asked.hole)
+    boss = shapely.Point(bolt.centre).buffer(_HEAD + 1.0)
+    back = foot.union(boss).convex_hull.difference(discs((bolt,)))
+    pierced = foot.difference(discs((bolt,)))
+    foot = pierced if shapely.get_num_geometries(pierced) == 1 else foot
+    reach = min(asked.pocket, wanted.thickness)
+    shapes = ((back, asked.base), (foot, _FOOT), (fingers.intersection(foot), reach))
+    layers, low = [], 0.0
+    for shape, high in shapes:
+        if not shape.is_empty:
+            layers.append(Layer(flat(_mirrored(shape)), low, low + high))
+            low += high
+    return Solid(f"DRIVE-{unit.label}", tuple(layers))
+
+
+def printable(shape: BaseGeometry) -> BaseGeometry:
+    """A shape without the parts that are too thin to print."""
+    thick = shape.buffer(-_THIN).buffer(_THIN, join_style="mitre")
+    return thick.intersection(shape)
 
 
 def _mirrored(shape: BaseGeometry) -> BaseGeometry:
     return affinity.scale(shape, xfact=-1.0, origin=(0.0, 0.0))
-
-
-def jig(specimen: Specimen, wanted: Fabrication, spacing: float) -> Iterator[Solid]:
-    """Plates with a pocket for each unit at its place, its id on the floor of the pocket."""
-    outlines = [unit.outline for unit in specimen.units]
-    x0, y0, x1, y1 = (float(value) for value in shapely.total_bounds(outlines))
-    pockets = shapely.union_all(
-        shapely.buffer(outlines, wanted.fixture.clearance, join_style="mitre", mitre_limit=2.0)
-    )
-    taken = pockets.union(_shims(specimen))
-    room = [side - 2 * wanted.print.margin for side in wanted.print.bed]
-    columns = cuts(x0 - _JIG_RIM, x1 + _JIG_RIM, spacing, room[0])
-    rows = cuts(y0 - _JIG_RIM, y1 + _JIG_RIM, spacing, room[1])
-    written = pen(
-        tuple(stroke for unit in specimen.units for stroke in unit.lettering + unit.mark), _PEN
-    )
-    number = 0
-    for low, high in pairwise(rows):
-        for left, right in pairwise(columns):
-            number += 1
-            yield _plate(number, box(left, low, right, high), taken, written, wanted)
-
-
-def _plate(
-    number: int, tile: Polygon, taken: BaseGeometry, written: BaseGeometry, wanted: Fabrication
-) -> Solid:
-    walls = tile.difference(taken)
-    walls = walls.buffer(-_THIN).buffer(_THIN, join_style="mitre").intersection(walls)
-    walls = shapely.set_precision(walls, 1e-3)
-    name = f"JIG{number}"
-    width, height = extent(name, _LETTER)
-    left, low, _, _ = tile.bounds
-    title = turned(text(name, _LETTER), 0.0, (left + width / 2 + 1.5, low + height / 2 + 1.0))
-    sunk = shapely.union_all([written, pen(title, _PEN)]).intersection(tile.buffer(-0.5))
-    letters = shapely.set_precision(sunk.difference(walls.buffer(2 * _MERGED)), 1e-3)
-    floor = tile.difference(letters.buffer(_MERGED, join_style="mitre"))
-    deep = _JIG_BASE - wanted.labels.depth
-    return Solid(
-        name,
-        (
-            Layer(tile, 0.0, deep),
-            Layer(flat(floor), deep, _JIG_BASE),
-            Layer(flat(walls), _JIG_BASE, _JIG_BASE + _JIG_WALL),
-        ),
-    )

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon, box
 
-from pipeline.fabrication.lettering import extent, text, turned
+from pipeline.fabrication.font import extent, text, turned
 from pipeline.fabrication.parts import Circle, Floats, Part, Specimen, Strokes
 from pipeline.problem.fabrication import Fabrication
 

@@ -1,4 +1,4 @@
-"""A stroke font for ids, and where the id of a unit and its arrow go."""
+"""Where the id of a unit and its arrow go."""
 
 from __future__ import annotations
 
@@ -9,60 +9,18 @@ import numpy as np
 import shapely
 from shapely import LineString, Polygon, affinity
 
+from pipeline.fabrication.boxes import box_at, room_for, spots
+from pipeline.fabrication.font import ADVANCE, STACK, extent, on_grid, text, turned
 from pipeline.fabrication.parts import Floats, Strokes
 from pipeline.problem.fabrication import Labels
 
-_GLYPHS = {
-    "0": "01 05 16 36 45 41 30 10 01,12 34",
-    "1": "14 26 20,10 30",
-    "2": "05 16 36 45 44 00 40",
-    "3": "06 46 23 33 42 41 30 10 01",
-    "4": "30 36 02 42",
-    "5": "46 06 03 33 42 41 30 10 01",
-    "6": "45 36 16 05 01 10 30 41 42 33 13 02",
-    "7": "06 46 10",
-    "8": "13 04 05 16 36 45 44 33 13 02 01 10 30 41 42 33",
-    "9": "01 10 30 41 45 36 16 05 04 13 33 44",
-    "A": "00 04 26 44 40,02 42",
-    "B": "00 06 36 45 44 33 03,33 42 41 30 00",
-    "C": "45 36 16 05 01 10 30 41",
-    "D": "00 06 26 44 42 20 00",
-    "E": "46 06 00 40,03 33",
-    "F": "46 06 00,03 33",
-    "G": "45 36 16 05 01 10 30 41 43 23",
-    "H": "00 06,40 46,03 43",
-    "I": "10 30,16 36,20 26",
-    "J": "01 10 30 41 46",
-    "K": "00 06,46 02,13 40",
-    "L": "06 00 40",
-    "M": "00 06 23 46 40",
-    "N": "00 06 40 46",
-    "O": "01 05 16 36 45 41 30 10 01",
-    "P": "00 06 36 45 44 33 03",
-    "Q": "01 05 16 36 45 41 30 10 01,22 40",
-    "R": "00 06 36 45 44 33 03,23 40",
-    "S": "45 36 16 05 04 13 33 42 41 30 10 01",
-    "T": "06 46,26 20",
-    "U": "06 01 10 30 41 46",
-    "V": "06 20 46",
-    "W": "06 10 23 30 46",
-    "X": "00 46,06 40",
-    "Y": "06 23 46,23 20",
-    "Z": "06 46 00 40",
-    "a": "34 30,32 23 13 02 01 10 20 31",
-    "b": "06 00,02 13 23 32 31 20 10 01",
-    ".": "20 21",
-    "-": "13 33",
-}
-"""Polylines of points (x, y) on a grid of 4 by 6; the zero is crossed."""
-
-_WIDTH = 0.45  # of a letter over its height
-_ADVANCE = 0.7  # from letter to letter
-_STACK = 1.3  # from line to line, where letters stand below each other
 LEAST_HEIGHT = 2.0  # mm
 _MARGINS = (0.4, 0.05)  # mm, wanted and least, to the rim of the part
 _OVERHANGS = (0.25, 0.5, 0.75)  # mm, as the last resort
-_STEP = 0.35  # mm
+_FINE_STEP = 0.2  # mm
+_ANGLES = np.deg2rad(np.arange(-90.0, 90.0, 10.0))  # tried where there is little room
+_ASIDE = 0.7  # mm that letters may be off the line of the first one
+_HAIR = 1e-6  # mm
 _LEAST_ARROW = 0.8  # mm
 _SPECK = 0.1  # mm; shorter pieces of a clipped stroke are left out
 _RING = 0.3  # mm, radius
@@ -76,48 +34,13 @@ class Placed(NamedTuple):
         strokes: as read from the top.
         mirrored: the same, to be read from below, seen from the top.
         box: their bounding box, turned with them.
+        kept: share of the strokes that lies on the part.
     """
 
     strokes: Strokes
     mirrored: Strokes
-    box: Polygon
-
-
-def text(words: str, height: float, *, stacked: bool = False) -> Strokes:
-    """Strokes of a line of text, or of letters below each other, centred at the origin.
-
-    Raises:
-        KeyError: there is no such letter.
-    """
-    step = np.array([0.0, -_STACK] if stacked else [_ADVANCE, 0.0])
-    scale = np.array([_WIDTH / 4, 1 / 6])
-    strokes = [
-        (_points(line) * scale + index * step) * height
-        for index, letter in enumerate(words)
-        for line in _GLYPHS[letter].split(",")
-    ]
-    full = step * (len(words) - 1) * height
-    middle = (np.array([_WIDTH, 1.0]) * height + full) / 2
-    return tuple(stroke - middle for stroke in strokes)
-
-
-def _points(line: str) -> Floats:
-    return np.array([[float(digit) for digit in point] for point in line.split()])
-
-
-def extent(words: str, height: float, *, stacked: bool = False) -> tuple[float, float]:
-    """Width and height of a text."""
-    more = len(words) - 1
-    if stacked:
-        return _WIDTH * height, (1 + more * _STACK) * height
-    return (_WIDTH + more * _ADVANCE) * height, height
-
-
-def turned(strokes: Strokes, angle: float, centre: tuple[float, float]) -> Strokes:
-    """Strokes turned about the origin, then moved."""
-    cosine, sine = np.cos(angle), np.sin(angle)
-    turn = np.array([[cosine, sine], [-sine, cosine]])
-    return tuple(stroke @ turn + np.array(centre) for stroke in strokes)
+    box: shapely.Geometry
+    kept: float
 
 
 def fitted(words: str, outline: Polygon, body: Polygon, wanted: Labels) -> Placed | None:
@@ -135,24 +58,119 @@ def fitted(words: str, outline: Polygon, body: Polygon, wanted: Labels) -> Place
     Returns:
         None if it has no room even so.
     """
-    for place in (outline, body, *(body.buffer(over) for over in _OVERHANGS)):
-        for height, stacked, margin, angle in _attempts(place, wanted.height):
-            width, tall = extent(words, height, stacked=stacked)
-            pen = min(wanted.stroke, 0.15 * height)
-            box = (width + pen + 2 * margin, tall + pen + 2 * margin)
-            centre = _room_for(box, angle, place)
-            if centre is not None:
-                plain = text(words, height, stacked=stacked)
-                mirrored = tuple(stroke * [-1.0, 1.0] for stroke in plain)
-                return Placed(
-                    _clipped(turned(plain, angle, centre), outline),
-                    _clipped(turned(mirrored, angle, centre), outline),
-                    _box(box, angle, centre),
-                )
+    whole = next(_placements(words, outline, outline, wanted), None)
+    if whole is not None:
+        return whole
+    for place in (body, *(body.buffer(over) for over in _OVERHANGS)):
+        cut = list(_placements(words, place, outline, wanted))
+        if cut:
+            return max(cut, key=lambda placed: round(placed.kept, 2))
     return None
 
 
-def mark(outline: Polygon, body: Polygon, taken: Polygon, wanted: Labels) -> Strokes:
+def _placements(words: str, place: Polygon, outline: Polygon, wanted: Labels) -> Iterator[Placed]:
+    """An id as it fits into a place, from the best to the last resort."""
+    for height, stacked, margin, angle in _attempts(place, wanted.height):
+        box = _framed(extent(words, height, stacked=stacked), height, margin, wanted)
+        centre = room_for(box, angle, place)
+        if centre is not None:
+            plain = text(words, height, stacked=stacked)
+            mirrored = tuple(stroke * [-1.0, 1.0] for stroke in plain)
+            top, bottom = turned(plain, angle, centre), turned(mirrored, angle, centre)
+            yield _placed(top, bottom, box_at(box, angle, centre), outline)
+    apart = _letter_by_letter(words, place, outline, wanted)
+    if apart is not None:
+        yield apart
+
+
+def _framed(
+    size: tuple[float, float], height: float, margin: float, wanted: Labels
+) -> tuple[float, float]:
+    """Size of letters with the width of their strokes and a margin."""
+    more = min(wanted.stroke, 0.15 * height) + 2 * margin
+    return size[0] + more, size[1] + more
+
+
+def _placed(top: Strokes, bottom: Strokes, box: shapely.Geometry, outline: Polygon) -> Placed:
+    strokes = _clipped(top, outline)
+    kept = _length(strokes) / _length(top)
+    return Placed(strokes, _clipped(bottom, outline), box, kept)
+
+
+def _length(strokes: Strokes) -> float:
+    return sum(LineString(stroke).length for stroke in strokes)
+
+
+def _letter_by_letter(
+    words: str, place: Polygon, outline: Polygon, wanted: Labels
+) -> Placed | None:
+    """Smallest letters on a line or below each other, each where slots leave room for it."""
+    size = extent(words[0], LEAST_HEIGHT)
+    box = _framed(size, LEAST_HEIGHT, _MARGINS[-1], wanted)
+    for angle in (_slope(place), *_ANGLES):
+        level = affinity.rotate(place, -angle, origin=(0.0, 0.0), use_radians=True)
+        free = spots(box, 0.0, level, _FINE_STEP, level.centroid)[1:]
+        for stacked in (False, True):
+            centres = _in_order(free, len(words), stacked=stacked)
+            if centres is not None:
+                return _apart(words, centres, float(angle), box, outline, stacked=stacked)
+    return None
+
+
+def _in_order(free: Floats, count: int, *, stacked: bool) -> Floats | None:
+    """Centres (count, 2) in reading order, as near to each other and to one line as there is room.
+
+    Args:
+        free: (n, 2) possible centres.
+        count: of letters.
+        stacked: below each other.
+    """
+    step = LEAST_HEIGHT * (STACK if stacked else ADVANCE)
+    level = free[:, ::-1] * [-1.0, 1.0] if stacked else free  # along, across
+    best, least = None, np.inf
+    for first in range(len(level)):
+        taken = [first]
+        while len(taken) < count:
+            ahead, aside = (level - level[taken[-1]]).T
+            cost = np.where(ahead >= step - _HAIR, ahead + 2.0 * np.abs(aside), np.inf)
+            cost[np.abs(level[:, 1] - level[first, 1]) > _ASIDE] = np.inf
+            taken.append(int(np.argmin(np.round(cost, 6))))
+            if not np.isfinite(cost[taken[-1]]):
+                break
+        else:
+            reach = np.ptp(level[taken, 0]) + 2.0 * np.ptp(level[taken, 1])
+            if reach < least - _HAIR:
+                best, least = free[taken], reach
+    return best
+
+
+def _apart(
+    words: str,
+    centres: Floats,
+    angle: float,
+    box: tuple[float, float],
+    outline: Polygon,
+    *,
+    stacked: bool,
+) -> Placed:
+    """Letters at their centres, before all are turned; from below they are read backwards."""
+    letters = [text(letter, LEAST_HEIGHT) for letter in words]
+    below = centres if stacked else centres[::-1]
+    top = [stroke + at for at, one in zip(centres, letters, strict=True) for stroke in one]
+    bottom = [
+        stroke * [-1.0, 1.0] + at for at, one in zip(below, letters, strict=True) for stroke in one
+    ]
+    boxes = shapely.union_all([box_at(box, 0.0, (float(x), float(y))) for x, y in centres])
+    origin = (0.0, 0.0)
+    return _placed(
+        turned(tuple(top), angle, origin),
+        turned(tuple(bottom), angle, origin),
+        affinity.rotate(boxes, angle, origin=origin, use_radians=True),
+        outline,
+    )
+
+
+def mark(outline: Polygon, body: Polygon, taken: shapely.Geometry, wanted: Labels) -> Strokes:
     """An arrow to +y, near to the place that is taken; a small ring at the upper end if no room."""
     near = (taken.centroid.x, taken.centroid.y)
     for place in (outline.difference(taken), body.difference(taken)):
@@ -160,9 +178,9 @@ def mark(outline: Polygon, body: Polygon, taken: Polygon, wanted: Labels) -> Str
             pen = min(wanted.stroke, 0.4 * size)
             for margin in _MARGINS:
                 box = (size + pen + 2 * margin, 0.75 * size + pen + 2 * margin)
-                centre = _room_for(box, 0.0, place, near)
+                centre = room_for(box, 0.0, place, near)
                 if centre is not None:
-                    scaled = tuple((_points(line) - [2.0, 1.5]) * size / 4 for line in _ARROW)
+                    scaled = tuple((on_grid(line) - [2.0, 1.5]) * size / 4 for line in _ARROW)
                     return _clipped(turned(scaled, 0.0, centre), outline)
     return (_ring(outline),)
 
@@ -204,7 +222,7 @@ def _attempts(outline: Polygon, largest: float) -> Iterator[tuple[float, bool, f
             yield float(height), False, margin, slope
             across = slope + np.pi / 2 if slope < 0 else slope - np.pi / 2
             yield float(height), True, margin, across
-    for angle in np.deg2rad(np.arange(-90.0, 90.0, 10.0)):
+    for angle in _ANGLES:
         yield LEAST_HEIGHT, False, _MARGINS[-1], float(angle)
         yield LEAST_HEIGHT, True, _MARGINS[-1], float(angle)
 
@@ -215,42 +233,3 @@ def _slope(outline: Polygon) -> float:
     edges = np.diff(points, axis=0)
     x, y = edges[np.argmax(np.round(np.linalg.norm(edges, axis=1), 6))]
     return float(np.arctan2(y, x) if x > 0 or (x == 0 and y > 0) else np.arctan2(-y, -x))
-
-
-def _room_for(
-    box: tuple[float, float],
-    angle: float,
-    outline: Polygon,
-    near: tuple[float, float] | None = None,
-) -> tuple[float, float] | None:
-    """Centre of a box inside an outline, as near as can be to its centroid or to ``near``.
-
-    The centre lies in each copy of the outline that is shifted by minus a point of the box's rim.
-    """
-    rim = np.asarray(_box(box, angle, (0.0, 0.0)).exterior.coords)
-    rim = np.concatenate([rim[:-1], (rim[:-1] + rim[1:]) / 2])
-    copies = [affinity.translate(outline, -x, -y) for x, y in rim]
-    region = shapely.intersection_all(copies)
-    if region.area == 0.0:
-        return None
-    target = outline.centroid if near is None else shapely.Point(near)
-    nearest = shapely.get_coordinates(shapely.shortest_line(region, target))[0]
-    x0, y0, x1, y1 = region.bounds
-    x, y = np.meshgrid(np.arange(x0, x1, _STEP), np.arange(y0, y1, _STEP))
-    grid = np.column_stack([x.ravel(), y.ravel()])
-    distance = np.linalg.norm(grid - [target.x, target.y], axis=1)
-    grid = grid[np.argsort(np.round(distance, 6), kind="stable")]
-    centres = np.concatenate([nearest[None], grid[shapely.contains_xy(region, grid)]])
-    boxes = shapely.polygons(centres[:, None, :] + rim[[0, 4, 1, 5, 2, 6, 3, 7]] * (1.0 - 1e-6))
-    shapely.prepare(outline)
-    fits = np.flatnonzero(shapely.contains(outline, boxes))
-    if not len(fits):
-        return None
-    x, y = centres[fits[0]]
-    return float(x), float(y)
-
-
-def _box(size: tuple[float, float], angle: float, centre: tuple[float, float]) -> Polygon:
-    width, height = size[0] / 2, size[1] / 2
-    rim = np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
-    return Polygon(turned((rim,), angle, centre)[0])

@@ -10,6 +10,7 @@ import shapely
 
 from pipeline.fabrication import dxf, dxf_r12, flat, meshes, svg
 from pipeline.fabrication.fixtures import fixtures
+from pipeline.fabrication.jig import jig
 from pipeline.fabrication.parts import Part, Specimen
 from pipeline.fabrication.plates import plates
 from pipeline.fabrication.sheets import sheets
@@ -115,7 +116,8 @@ def coupon_solid(part: Part, wanted: Fabrication) -> Solid:
 
 
 def _fixture(package: Package) -> None:
-    solids = list(fixtures(package.specimen, package.wanted, package.asked.lattice.spacing))
+    told = (package.specimen, package.wanted, package.asked.lattice.spacing)
+    solids = [*fixtures(*told), *jig(*told)]
     for solid in solids:
         meshes.write_stl([solid.mesh], package.path(f"fixture/{solid.id}.stl"))
     _plates(package, "fixture/fixture", solids)

@@ -50,7 +50,9 @@ def _fixing(specimen: Specimen) -> list[str]:
     if specimen.clamped:
         told.append(f"Set the clamped units into their pads: {', '.join(specimen.clamped)}.")
     if specimen.driven:
-        told.append(f"Fix the adapter of the drive to: {', '.join(specimen.driven)}.")
+        driven = ", ".join(specimen.driven)
+        room = "Where its neighbours leave no room for fingers, glue it on."
+        told.append(f"Fix the adapter of the drive to: {driven}. {room}")
     return [*told, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely import Geometry, Polygon, STRtree
 
+from pipeline.fabrication.checks import reading
 from pipeline.fabrication.checks.alignment import aligned
 from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, line, named
 from pipeline.fabrication.checks.curves import polygon as bounded
@@ -20,7 +21,6 @@ TOLERANCE = 1e-3
 """Lengths of a drawing are right to this, mm."""
 
 LEAST_LETTER = 2.0
-_CLIPPED = 0.2  # mm that a slot may take off a letter
 _KERF_TOLERANCE = 2e-3
 _JOINED = 0.05  # mm; strokes so near to each other make one letter
 _HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
@@ -125,27 +125,34 @@ def _sides(shape: Geometry) -> tuple[float, float]:
 
 
 def _letters(drawing: Drawing) -> Iterator[Fault]:
-    """Engraved letters of each part: two millimetres high, inside of the part."""
+    """Engraved letters of each part, inside of the part; those of a unit are its id."""
+    units = drawing.file.name.startswith("units")
     for part, curves in drawing.parts().items():
-        strokes = [curve for curve in curves if curve.layer == ENGRAVE]
+        strokes = [curve for curve in curves if curve.layer == ENGRAVE and len(curve.points) > 1]
         outer = [bounded(curve) for curve in curves if curve.layer == OUTER and curve.closed]
-        if not strokes or not outer:
-            continue
-        yield from _legible(drawing, part, strokes, shapely.union_all(outer))
+        if outer and (strokes or units):
+            written = shapely.MultiLineString([line(curve) for curve in strokes])
+            shown = (shapely.union_all(outer), written)
+            if not shown[0].covers(written):
+                what, remedy = "engraving beyond its outline", "give smaller letters"
+                yield _on(drawing, part, what, "labels.height", remedy, shown)
+            height = _of_id(part, strokes) if units else _of_letters(written)
+            if height < LEAST_LETTER - TOLERANCE:
+                what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
+                if height == 0.0:
+                    what = "what is engraved does not show its id and how it stands"
+                yield _on(drawing, part, what, "labels.height", "give larger letters", shown)
 
 
-def _legible(
-    drawing: Drawing, part: str, strokes: list[Curve], outline: Geometry
-) -> Iterator[Fault]:
-    written = shapely.MultiLineString([line(curve) for curve in strokes if len(curve.points) > 1])
+def _of_id(part: str, strokes: Sequence[Curve]) -> float:
+    """Height of the letters of a unit's id; zero if the strokes show another one, or none."""
+    return (reading.height(part, [curve.points for curve in strokes]) or 0.0) if strokes else 0.0
+
+
+def _of_letters(written: Geometry) -> float:
+    """Height of the largest letter of any text."""
     pieces = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
-    height = max(widest(piece) - 2 * _JOINED for piece in pieces)  # arrows are smaller
-    if height < LEAST_LETTER - _CLIPPED:
-        what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
-        yield _on(drawing, part, what, "labels.height", "give larger letters", (outline, written))
-    if not outline.covers(written):
-        what = "engraving beyond its outline"
-        yield _on(drawing, part, what, "labels.height", "give smaller letters", (outline, written))
+    return max(widest(piece) - 2 * _JOINED for piece in pieces)
 
 
 def compensation(

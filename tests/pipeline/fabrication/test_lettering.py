@@ -5,7 +5,8 @@ import pytest
 import shapely
 from shapely import LineString, Polygon, box
 
-from pipeline.fabrication.lettering import extent, fitted, mark, text
+from pipeline.fabrication.font import extent, text
+from pipeline.fabrication.lettering import fitted, mark
 from pipeline.fabrication.markers import dots
 from pipeline.fabrication.parts import column_letters, labels
 from pipeline.problem.fabrication import Labels, Markers
