@@ -33,6 +33,7 @@ def work(args: argparse.Namespace) -> None:
     from pipeline.fabrication import assembly, bom, manifest, package, units
     from pipeline.fabrication.checks.package import STEPS, check_package
     from pipeline.fabrication.network import network
+    from pipeline.fabrication.parts import THIN_WALL
 
     asked = problem.load(args.problem, args.preset)
     design = datasets.read(args.design, "design")
@@ -54,6 +55,10 @@ def work(args: argparse.Namespace) -> None:
         shutil.rmtree(pictures, ignore_errors=True)
         check_package(room, design, args.structure, asked.fabrication, pictures, bar.update)
     LOG.info("%s: %s", args.out_dir, units.summary(made))
+    if made.thin:
+        thinnest = min(made.thin, key=lambda label: made.thin[label])
+        told = (args.out_dir, len(made.thin), THIN_WALL, made.thin[thinnest], thinnest)
+        LOG.warning("%s: %d units have walls under %g mm (from %.2f mm, unit %s)", *told)
 
 
 @contextmanager

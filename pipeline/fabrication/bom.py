@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from pipeline.fabrication.parts import Shim, Specimen, Unit
+from pipeline.fabrication.parts import THIN_WALL, Shim, Specimen, Unit
 from pipeline.problem.fabrication import Fabrication
 
 DENSITIES = {
@@ -121,8 +121,18 @@ def _unit(unit: Unit, density: float, holders: Mapping[str, Sequence[str]]) -> R
         width=y1 - y0,
         height=unit.height,
         files=" ".join(holders.get(unit.label, ())),
-        note=f"column {unit.column + 1} row {unit.row + 1}",
+        note=f"column {unit.column + 1} row {unit.row + 1}{_slots(unit)}",
     )
+
+
+def _slots(unit: Unit) -> str:
+    """Depths of the slots, by vertex, and the thinnest wall."""
+    if not unit.slots:
+        return ""
+    slots = sorted(unit.slots, key=lambda slot: slot.vertex)
+    depths = " ".join(f"{slot.depth:g}" for slot in slots)
+    warning = " (thin)" if unit.wall < THIN_WALL else ""
+    return f"; slots {depths} mm deep; walls from {unit.wall:.2f} mm{warning}"
 
 
 def _shim(shim: Shim, asked: Fabrication, holders: Mapping[str, Sequence[str]]) -> Row:

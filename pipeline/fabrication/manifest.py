@@ -31,6 +31,7 @@ def write(folder: Path, specimen: Specimen, asked: Problem, design: Path) -> Non
         "parameters_note": "lengths in mm; spares is a ratio",
         "units": [unit.label for unit in specimen.units],
         "shims": {shim.id: shim.count for shim in specimen.shims},
+        "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),
         "git_commit": git_commit(),
         "files": {path.relative_to(folder).as_posix(): file_hash(path) for path in files},

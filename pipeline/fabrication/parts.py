@@ -16,6 +16,9 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 Floats = NDArray[np.float64]
+THIN_WALL = 1.2
+"""Walls below this print, but break easily: they are warned of, mm."""
+
 Strokes = tuple[Floats, ...]
 """Open polylines (n, 2)."""
 
@@ -135,6 +138,11 @@ class Unit:
     thickened: float = 0.0
 
     @property
+    def wall(self) -> float:
+        """Thinnest wall around the inner ends of its slots; infinite without slots."""
+        return min((slot.wall for slot in self.slots), default=np.inf)
+
+    @property
     def part(self) -> Part:
         """The unit as a part to be cut."""
         return Part(self.label, self.outline, self.height, engraving=self.lettering + self.mark)
@@ -207,6 +215,11 @@ class Specimen:
     def by_label(self) -> dict[str, Unit]:
         """Units by label."""
         return {unit.label: unit for unit in self.units}
+
+    @property
+    def thin(self) -> dict[str, float]:
+        """Thinnest walls by label, of the units that have thin ones."""
+        return {unit.label: unit.wall for unit in self.units if unit.wall < THIN_WALL}
 
 
 def column_letters(column: int) -> str:

@@ -159,6 +159,7 @@ class Fabrication(Section):
         minimum_wall: thinnest wall at a slot's inner end and between two slots.
         minimum_gap: smallest distance of two units.
         fillet_radius: of the units' corners.
+        paper: size of the pages of the assembly sheet.
     """
 
     material: Literal["PLA", "PETG", "ABS", "ASA", "PA12", "PMMA", "POM"] = "PLA"
@@ -166,6 +167,7 @@ class Fabrication(Section):
     minimum_wall: Length = 0.8
     minimum_gap: Gap = 0.1
     fillet_radius: Gap = 0.0
+    paper: Literal["A4", "Letter"] = "A4"
     slots: Slots = Slots()
     shims: Shims = Shims()
     labels: Labels = Labels()

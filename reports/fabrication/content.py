@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.fabrication.checks.papers import rows
+from pipeline.fabrication.parts import THIN_WALL
 from pipeline.problem import Problem
 from reports.fabrication import pictures
 
@@ -92,6 +93,9 @@ def _facts(folder: Path, manifest: Mapping[str, Any]) -> Iterator[Fact]:
     yield Fact(units["count"], "units", f"{manifest['units'][0]} to {manifest['units'][-1]}")
     yield Fact(shims["count"], "shims with spares", f"of {kinds} lengths")
     yield Fact(f"{float(units['mass_g']):.0f} g", "mass of the units", units["note"])
+    if thin := manifest["thin_walls_mm"]:
+        told = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
+        yield Fact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", told)
     volume = float(units["volume_mm3"]) / 1000.0
     yield Fact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
     sheets = sum(row["item"] == "sheet" and "_nominal" in row["id"] for row in bill)

@@ -53,8 +53,8 @@ def test_links_lead_somewhere(html: str, report: Path) -> None:
     for href in links.hrefs.values():
         if href.startswith("#"):
             assert href[1:] in links.ids
-        elif not href.startswith("data:"):
-            assert (report / href).is_file()
+        elif href != "../fabrication/index.html":  # which a target of its own makes
+            assert href.startswith("data:") or (report / href).is_file()
 
 
 def test_inlined_tables_are_the_files_beside_the_page(html: str, report: Path) -> None:

@@ -12,7 +12,6 @@ from pipeline.fabrication.assembly.paper import (
     POINT,
     SIGNAL,
     Box,
-    Paper,
     Sheet,
 )
 from pipeline.fabrication.assembly.plan import Plan, legend
@@ -25,14 +24,13 @@ _LINE = 4.4  # mm from one line of a table to the next
 _ROW = 3.4
 
 
-def write(path: Path, specimen: Specimen, asked: Fabrication, paper: Paper = "A4") -> None:
+def write(path: Path, specimen: Specimen, asked: Fabrication) -> None:
     """Write the assembly sheet of a specimen; the same specimen gives the same bytes.
 
     Args:
         path: the PDF to write.
         specimen: what is built.
         asked: the parameters of fabrication.
-        paper: size of the pages.
     """
     from reportlab.pdfgen.canvas import Canvas
 
@@ -40,7 +38,7 @@ def write(path: Path, specimen: Specimen, asked: Fabrication, paper: Paper = "A4
     title = f"{specimen.study}, {specimen.structure}"
     canvas.setTitle(f"Assembly of {title}")
     canvas.setAuthor("metacloak")
-    sheet = Sheet(canvas, paper, title)
+    sheet = Sheet(canvas, asked.paper, title)
     canvas.setPageSize((sheet.width * POINT, sheet.height * POINT))
     plan = Plan(specimen, sheet)
     pages = tiles(plan.box, sheet.room[2:])

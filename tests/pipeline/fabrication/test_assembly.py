@@ -146,3 +146,18 @@ def test_the_same_specimen_gives_the_same_bytes(tmp_path: Path) -> None:
         bom.write(tmp_path / name / "bom.csv", handmade.specimen(), ASKED, DENSITY, {})
     for name in ("assembly.pdf", "bom.csv"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+@pytest.mark.parametrize(("paper", "width"), [("A4", b"595.27"), ("Letter", b"612 ")])
+def test_pages_have_the_size_that_is_asked_for(tmp_path: Path, paper: str, width: bytes) -> None:
+    path = tmp_path / "assembly.pdf"
+    assembly.write(path, handmade.specimen(), ASKED.model_copy(update={"paper": paper}))
+    assert b"/MediaBox [ 0 0 " + width in path.read_bytes()
+
+
+def test_the_bill_tells_of_slots_and_of_thin_walls(tmp_path: Path) -> None:
+    specimen = handmade.specimen()
+    bom.write(tmp_path / "bom.csv", specimen, ASKED, DENSITY, {})
+    first = rows(tmp_path / "bom.csv")[0]
+    assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm (thin)"
+    assert specimen.thin == {unit.label: 1.0 for unit in specimen.units}
