@@ -31,12 +31,14 @@ Track the units of a specimen through a video.
 
   python -m pipeline.track RECORDING.yaml --out track.nc [--design NC]
   python -m pipeline.track init VIDEO --design NC [--pixel-size MM] [--out-dir FOLDER]
+  python -m pipeline.track points POINTS.yaml --out track.nc [--design NC]
   python -m pipeline.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
 
 The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
 The second proposes a recording YAML, draws the units that it found on the first frame, and says
-what it could not tell. The third writes NAME_recording.yaml and NAME_design.nc for a described test
-video, which the first then tracks.
+what it could not tell. The third reads the points of a commercial DIC system, a CSV that the YAML
+names, instead of a video. The fourth writes NAME_recording.yaml and NAME_design.nc for a described
+test video, which the first then tracks.
 """
 
 
@@ -64,11 +66,33 @@ def work(args: argparse.Namespace) -> None:
         _import(Path(args.words[1]), args.video, args.out_dir)
     elif command == "init" and args.design is not None:
         _init(Path(args.words[1]), args)
+    elif command == "points" and args.out is not None:
+        _points(Path(args.words[1]), args)
     elif len(args.words) == 1 and args.out is not None:
         _track(Path(args.words[0]), args)
     else:
         remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
         raise UserError("one recording and --out are wanted", remedy=remedy)
+
+
+def _points(path: Path, args: argparse.Namespace) -> None:
+    from pipeline import datasets, provenance
+    from pipeline.tracking import points, table
+    from pipeline.tracking.specimen import as_built
+
+    asked = points.load(path)
+    source = _design(asked.design, path, args.design)
+    design = as_built(datasets.read(source, "design"), asked.structure)
+    held = path.parent / asked.points
+    try:
+        made = points.track(design, points.cloud(held, asked))
+    except UserError as error:
+        error.file = error.file or str(path)
+        raise
+    parents = {"design": source, "points": held}
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    datasets.write(made, args.out, "track", origin)
+    table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
 
 
 def _init(video: Path, args: argparse.Namespace) -> None:
@@ -164,12 +188,17 @@ def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Pa
     if asked.video is None:
         remedy = "render it first, with pipeline.virtual_lab, and track the YAML beside the video"
         raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
-    if asked.design is None and study is None:
+    return path.parent / asked.video, _design(asked.design, path, study)
+
+
+def _design(named: str | None, path: Path, study: Path | None) -> Path:
+    """The design that a YAML names, or that of its study."""
+    if named is not None:
+        return path.parent / named
+    if study is None:
         remedy = "add the path of the specimen's design dataset, or give --design"
         raise UserError("no design is named", file=path, key="design", remedy=remedy)
-    design = study if asked.design is None else path.parent / asked.design
-    assert design is not None
-    return path.parent / asked.video, design
+    return study
 
 
 def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:

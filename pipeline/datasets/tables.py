@@ -358,17 +358,23 @@ _TRACK: Table = {
         ("time",), "N", "force of the load cell, where there was one", gaps=True
     ),
     "camera_homography": Variable(
-        ("row", "column"), "px, mm", "homography from the specimen's plane to undistorted pixels"
+        ("row", "column"),
+        "px, mm",
+        "homography from the specimen's plane to undistorted pixels",
+        gaps=True,
     ),
-    "camera_centre": Variable(("xy",), "px", "centre of the distortion"),
+    "camera_centre": Variable(("xy",), "px", "centre of the distortion", gaps=True),
     "camera_radial": Variable(
-        ("power",), "1", "distortion at half the image's larger side: square and fourth power"
+        ("power",),
+        "1",
+        "distortion at half the image's larger side: square and fourth power",
+        gaps=True,
     ),
     "camera_residual": Variable(
         ("unit", "xy"), "px", "first frame: place of the unit less that by design", gaps=True
     ),
     "image_size": Variable(("xy",), "px", "width and height of the image", "int64"),
-    "blur": Variable((), "px", "standard deviation of the camera's blur at edges"),
+    "blur": Variable((), "px", "standard deviation of the camera's blur at edges", gaps=True),
 }
 
 _SHOWN = (
