@@ -31,7 +31,7 @@ _LIKE = 0.6
 def track(images: Iterator[Image], specimen: Specimen, px_per_mm: float) -> Floats:
     """Displacements (frames, units, 3), mm and rad; NaN where fewer than two corners are found."""
     first = next(images)
-    found = sight(first, specimen, px_per_mm)
+    found = sight(first, specimen, px_per_mm)[0]
     flip = np.array([px_per_mm, -px_per_mm])
     followers = [
         _Follower(first, place, _INWARD * specimen.polygon(one) * flip, specimen.pitch * px_per_mm)

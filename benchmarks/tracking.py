@@ -87,7 +87,7 @@ def _measure(video: Path, folder: Path, plainly: bool) -> None:
     print(f"{video.name:<24}{line}{rate:10.1f}", flush=True)
     if plainly:
         start = time.process_time()
-        found = plain.track((frame.image for frame in images), specimen, scale)
+        found = plain.track((frame.image.astype(np.uint8) for frame in images), specimen, scale)
         rate = len(images) / (time.process_time() - start)
         nothing = " " * len(honesty(track, real))
         print(f"{'  plain OpenCV':<24}{accuracy(found, real, scale)}{nothing}{rate:10.1f}")

@@ -104,7 +104,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     from pipeline.whole import whole
 
     design = datasets.read(args.design, "design")
-    first = next(frames(video), None)
+    first = next(frames(video, rate=1.0), None)
     if first is None:
         raise UserError("the video has no frames", file=video, remedy="give another file")
     scale = None if args.pixel_size is None else 1 / args.pixel_size
@@ -212,7 +212,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     from pipeline.tracking.video import frames
 
     end = np.inf if asked.window.end is None else asked.window.end
-    shown = frames(video, asked.window.start, end)
+    shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
     try:
         track = follow(shown, of_design(design), scale)

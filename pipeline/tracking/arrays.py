@@ -14,6 +14,8 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Image = NDArray[np.uint8]
+Picture = Image | Singles
+"""Brightness from 0 to 255, in steps of one or finer."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -10,11 +10,19 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from pipeline.tracking import camera as cameras
-from pipeline.tracking.arrays import Floats, Image, Ints
+from pipeline.tracking import orient
+from pipeline.tracking.arrays import Floats, Image, Ints, Picture
 from pipeline.tracking.camera import Camera
 from pipeline.tracking.specimen import Specimen
 
-_ROUNDS = 12
+_ROUNDS = 8
+_AFFINE_ROUNDS = 4
+_LEAST = 6
+_UPRIGHT = 10  # deg
+_NEARLY = 0.95
+_GATE = 0.25
+"""How far a blob may be from where a unit is expected, at last, pitches."""
+_BLOB_SIGMA = 0.2
 
 
 @dataclass(frozen=True)
@@ -36,28 +44,73 @@ class Sighting:
     bright: bool
 
 
-def sight(image: Image, specimen: Specimen, px_per_mm: float | None) -> Sighting:
-    """Finds the specimen, upright within 45 degrees, in either polarity.
+def placed(camera: Camera) -> str:
+    """How the specimen lies in the image: upright, turned, seen from behind."""
+    along = camera.homography[:2, 0]
+    turn = round(float(np.rad2deg(np.arctan2(-along[1], along[0]))))
+    lies = f"turned by {turn} deg" if abs(turn) > _UPRIGHT else "upright"
+    behind = np.linalg.det(camera.homography[:2, :2]) > 0
+    return f"{lies} and mirrored, as from behind" if behind else lies
+
+
+def told(found: Sighting, specimen: Specimen) -> str:
+    """How many units were found, and where."""
+    seen = f"{found.blobs} units found, {len(found.unit)} of {specimen.count} in their places"
+    if not len(found.unit):
+        return seen
+    low, high = found.blob.min(axis=0), found.blob.max(axis=0)
+    return f"{seen}, from ({low[0]:.0f}, {low[1]:.0f}) to ({high[0]:.0f}, {high[1]:.0f}) px"
+
+
+def sight(image: Picture, specimen: Specimen, px_per_mm: float | None) -> list[Sighting]:
+    """Finds the specimen, of either polarity, whichever way it is turned, mirrored or not.
 
     Args:
         image: the first frame.
         specimen: what to look for.
         px_per_mm: roughly; without it, the specimen is taken to fill most of the image.
+
+    Returns:
+        All ways of seeing it that match nearly as many units as the best: a lattice may look the
+        same turned. Upright comes first, mirrored last. Their cameras are without distortion.
     """
     scales = [px_per_mm] if px_per_mm else _likely_scales(image, specimen)
+    ways = [_ways(image, specimen, scale, bright) for scale in scales for bright in (True, False)]
+    found = max(ways, key=_most)
+    return [one for one in found if len(one.unit) >= _NEARLY * _most(found)]
+
+
+def _ways(image: Picture, specimen: Specimen, scale: float, bright: bool) -> list[Sighting]:
+    centroids = blobs(image, specimen, scale, bright)
+    size = (image.shape[1], image.shape[0])
+    camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
+    nothing = Sighting(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
     found = [
-        _matched(image, specimen, scale, bright) for scale in scales for bright in (True, False)
+        _matched(specimen, centroids, matrix, scale, nothing)
+        for matrix in orient.starts(specimen.centre, centroids)
     ]
-    return max(found, key=lambda one: (len(one.unit), -one.blobs))
+    return found or [nothing]
 
 
-def _likely_scales(image: Image, specimen: Specimen) -> list[float]:
+def _most(ways: list[Sighting]) -> int:
+    return max(len(one.unit) for one in ways)
+
+
+def refined(specimen: Specimen, sighting: Sighting) -> Sighting:
+    """The same with distortion in its camera."""
+    first = sighting.camera
+    seen = specimen.centre[sighting.unit]
+    camera = cameras.fit(seen, sighting.blob, first.size, _BLOB_SIGMA)
+    return replace(sighting, camera=camera)
+
+
+def _likely_scales(image: Picture, specimen: Specimen) -> list[float]:
     extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
     most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
     return [float(most * share) for share in (0.95, 0.8, 0.67, 0.56)]
 
 
-def blobs(image: Image, specimen: Specimen, scale: float, bright: bool) -> Floats:
+def blobs(image: Picture, specimen: Specimen, scale: float, bright: bool) -> Floats:
     """Centroids (n, 2) in px of patches of a unit's size."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
@@ -87,43 +140,22 @@ def _filled(mask: Image, largest: float) -> Image:
     return np.where(small[labels], np.uint8(1), mask)
 
 
-def _matched(image: Image, specimen: Specimen, scale: float, bright: bool) -> Sighting:
-    centroids = blobs(image, specimen, scale, bright)
-    size = (image.shape[1], image.shape[0])
-    nothing = Camera(np.eye(3), np.zeros(2), np.zeros(2), size)
-    if len(centroids) < 6:
-        return Sighting(nothing, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
-    matrix = _boxed(specimen.centre, centroids)
-    unit = place = np.empty(0, int)
+def _matched(
+    specimen: Specimen, centroids: Floats, matrix: Floats, scale: float, nothing: Sighting
+) -> Sighting:
+    """One to one, from a first guess of the homography, by turns with a better one."""
     for turn in range(_ROUNDS):
-        seen = _seen(matrix, specimen.centre)
-        unit, place = one_to_one(seen, centroids, specimen.pitch * scale * (0.5 if turn else 0.8))
-        if len(unit) < 6:
-            return Sighting(nothing, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
-        matrix = (
-            _affine(specimen.centre[unit], centroids[place])
-            if turn < 4
-            else cameras.homography(specimen.centre[unit], centroids[place])
-        )
-    camera = cameras.fit(specimen.centre[unit], centroids[place], size, 0.2)
+        gate = specimen.pitch * scale * (0.5 if turn else 0.8)
+        unit, place = one_to_one(_seen(matrix, specimen.centre), centroids, gate)
+        if len(unit) < _LEAST:
+            return nothing
+        found = _affine if turn < _AFFINE_ROUNDS else cameras.homography
+        matrix = found(specimen.centre[unit], centroids[place])
     unit, place = one_to_one(
-        camera.project(specimen.centre), centroids, 0.2 * specimen.pitch * scale
+        _seen(matrix, specimen.centre), centroids, _GATE * specimen.pitch * scale
     )
-    return Sighting(camera, unit, centroids[place], len(centroids), bright)
-
-
-def _boxed(points: Floats, pixels: Floats) -> Floats:
-    """Homography without perspective that lays the points' box, y up, over that of the pixels."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    first, last = pixels.min(axis=0), pixels.max(axis=0)
-    gain = (last - first) / (high - low)
-    return np.array(
-        [
-            [gain[0], 0, first[0] - gain[0] * low[0]],
-            [0, -gain[1], last[1] + gain[1] * low[1]],
-            [0, 0, 1.0],
-        ]
-    )
+    camera = replace(nothing.camera, homography=matrix / matrix[2, 2])
+    return replace(nothing, camera=camera, unit=unit, blob=centroids[place])
 
 
 def _affine(points: Floats, pixels: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.tracking import patch
-from pipeline.tracking.arrays import Floats, Image, Mask, Singles
+from pipeline.tracking.arrays import Floats, Mask, Picture, Singles
 from pipeline.tracking.blocks import SIZE, Scene, room
 from pipeline.tracking.camera import Camera
 from pipeline.tracking.patch import Fits, Start, Templates
@@ -35,7 +35,7 @@ class Fitter:
 
     def fit(
         self,
-        image: Image,
+        image: Picture,
         pose: Floats,
         photometry: Floats,
         chosen: Mask | None = None,
@@ -74,7 +74,7 @@ class Fitter:
             patch.fit(scene, self.templates, start, wanted, FULL_STEPS, room(across**2), out)
         return patch.unpack(out)
 
-    def _padded(self, image: Image) -> Singles:
+    def _padded(self, image: Picture) -> Singles:
         """The image on whole blocks."""
         out = np.zeros(self.plane.shape[:2], np.float32)
         out[: image.shape[0], : image.shape[1]] = image

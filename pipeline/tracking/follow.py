@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -9,15 +10,19 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
-from pipeline.tracking.arrays import Floats, Image, Ints
-from pipeline.tracking.calibrate import Calibration, calibrate
-from pipeline.tracking.find import Sighting, sight
+from pipeline.tracking.arrays import Floats, Ints, Picture
+from pipeline.tracking.calibrate import Calibration, calibrate, oriented
+from pipeline.tracking.find import Sighting, placed, sight, told
 from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
 from pipeline.tracking.tracker import Found, Tracker
 from pipeline.tracking.video import Frame
 
+LOG = logging.getLogger(__name__)
+
+_DARK = 8.0
+_SCALE = 0.15
 _ENOUGH = 0.6
 """Least part of the units that a first frame must show for the design to be its own."""
 
@@ -64,7 +69,9 @@ def follow(
     first = next(frames, None)
     if first is None:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
-    calibration = calibrate(first.image, specimen, _sighted(first.image, specimen, px_per_mm))
+    calibration = calibrate(first.image, specimen, sighted(first.image, specimen, px_per_mm))
+    if (lies := placed(calibration.camera)) != "upright":
+        LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     tracker = Tracker(specimen, fitter(first.image, specimen, calibration))
     times, numbers, poses, sigmas, qualities = [], [], [], [], []
     for frame in _all(first, frames):
@@ -92,7 +99,7 @@ def follow(
     )
 
 
-def fitter(image: Image, specimen: Specimen, calibration: Calibration) -> Fitter:
+def fitter(image: Picture, specimen: Specimen, calibration: Calibration) -> Fitter:
     """Templates as a first frame shows the units, at rest."""
     learner = Learner(calibration.grid, calibration.blur, calibration.pixel)
     rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
@@ -109,23 +116,45 @@ def _image_sigma(found: Found) -> Floats:
     return uncertainty.standard_errors(found.fits.scatter, found.fits.blocks).astype(np.float32)
 
 
-def _sighted(image: Image, specimen: Specimen, px_per_mm: float | None) -> Sighting:
-    if image.max() < 8 or np.ptp(image) < 8:
+def sighted(image: Picture, specimen: Specimen, px_per_mm: float | None) -> Sighting:
+    """The specimen in a first frame.
+
+    Raises:
+        UserError: it is not there, or not at this scale.
+    """
+    if float(np.ptp(image)) < _DARK:
         raise UserError(
             "the first frame is black or without contrast",
             key="window.start",
             remedy="start where the specimen is lit",
         )
-    sighting = sight(image, specimen, px_per_mm)
-    if len(sighting.unit) < _ENOUGH * specimen.count:
-        where = ""
-        if len(sighting.blob):
-            low, high = sighting.blob.min(axis=0), sighting.blob.max(axis=0)
-            where = f", matched from ({low[0]:.0f}, {low[1]:.0f}) to ({high[0]:.0f}, {high[1]:.0f})"
+    found = sight(image, specimen, px_per_mm)
+    if px_per_mm is not None and not _shown(found, specimen):
+        anywhere = sight(image, specimen, None)
+        if _shown(anywhere, specimen):
+            _check_scale(anywhere[0], specimen, px_per_mm)
+            found = anywhere
+    if not _shown(found, specimen):
         raise UserError(
-            f"the first frame does not show this design: {sighting.blobs} units found, "
-            f"{len(sighting.unit)} of {specimen.count} in their places{where} px",
+            f"the first frame does not show this design: {told(found[0], specimen)}",
             key="design",
-            remedy="give the design of the specimen and its pixel_size, upright, not mirrored",
+            remedy="give the design of the specimen, and its pixel_size",
         )
-    return sighting
+    return oriented(image, specimen, found)
+
+
+def _shown(found: list[Sighting], specimen: Specimen) -> bool:
+    return len(found[0].unit) >= _ENOUGH * specimen.count
+
+
+def _check_scale(found: Sighting, specimen: Specimen, px_per_mm: float) -> None:
+    """Refuses a pixel size far from that which shows the specimen."""
+    jacobian = found.camera.jacobian(specimen.centre)
+    size = float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
+    if abs(np.log(size / px_per_mm)) > _SCALE:
+        raise UserError(
+            f"the specimen is there, but pixels measure about {1 / size:.3g} mm on it",
+            key="pixel_size",
+            value=f"{1 / px_per_mm:.3g} mm",
+            remedy="correct it, or leave it out",
+        )

@@ -10,14 +10,14 @@ import numpy as np
 import xarray as xr
 
 from pipeline.errors import UserError
-from pipeline.tracking.arrays import Floats, Image
-from pipeline.tracking.find import Sighting, sight
+from pipeline.tracking.arrays import Floats, Image, Picture
+from pipeline.tracking.calibrate import oriented
+from pipeline.tracking.find import Sighting, placed, sight, told
 from pipeline.tracking.specimen import Specimen, as_built, of_design
 
 _ENOUGH = 0.6
 _CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
-_BETTER = 1.1
 _MARKED = 0.02  # of a face
 _DOTS = 4
 _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
@@ -43,28 +43,21 @@ class Proposal(NamedTuple):
     doubts: tuple[str, ...]
 
 
-def propose(image: Image, design: xr.Dataset, px_per_mm: float | None = None) -> Proposal:
+def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) -> Proposal:
     """Looks for every structure of the design in a frame.
 
     Raises:
-        UserError: none is there; tells whether the picture is a mirrored or a turned one.
+        UserError: none is there.
     """
     tried = list(_structures(image, design, px_per_mm))
-    structure, specimen, sighting = max(tried, key=_share)
-    share = _share((structure, specimen, sighting))
-    if better := _turned(image, design, px_per_mm, share):
-        raise UserError("the specimen is not upright in the video", remedy=better)
+    structure, specimen, ways = max(tried, key=_share)
+    share = _share((structure, specimen, ways))
     if share < _ENOUGH:
         raise UserError(
-            f"the first frame does not show this design: {sighting.blobs} units found,"
-            f" {len(sighting.unit)} of {specimen.count} in their places",
+            f"the first frame does not show this design: {told(ways[0], specimen)}",
             remedy="give the design of the specimen, and the size of a pixel with --pixel-size",
         )
-    if _mirrored(image, specimen, sighting):
-        raise UserError(
-            "the units are mirror images of the design's: so is the video, or the specimen",
-            remedy="mirror the video, or give the design that was built",
-        )
+    sighting = oriented(image, specimen, ways)
     alike = [
         name
         for name, units, seen in tried
@@ -74,14 +67,14 @@ def propose(image: Image, design: xr.Dataset, px_per_mm: float | None = None) ->
     jacobian = sighting.camera.jacobian(specimen.centre[sighting.unit])
     pixel = float(1 / np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
     kind = _kind(image, specimen, sighting, 1 / pixel)
-    doubts = tuple(_doubts(alike, specimen.count - len(sighting.unit)))
+    doubts = tuple(_doubts(alike, specimen.count - len(sighting.unit), sighting))
     return Proposal(structure, specimen, sighting, kind, pixel, doubts)
 
 
-_Tried = tuple[str, Specimen, Sighting]
+_Tried = tuple[str, Specimen, list[Sighting]]
 
 
-def _structures(image: Image, design: xr.Dataset, px_per_mm: float | None) -> Iterator[_Tried]:
+def _structures(image: Picture, design: xr.Dataset, px_per_mm: float | None) -> Iterator[_Tried]:
     for name in ("cloaked", "altered", "intact"):
         specimen = of_design(as_built(design, name))
         yield name, specimen, sight(image, specimen, px_per_mm)
@@ -89,55 +82,23 @@ def _structures(image: Image, design: xr.Dataset, px_per_mm: float | None) -> It
 
 def _share(tried: _Tried) -> float:
     """Part of the units that are in their places."""
-    return len(tried[2].unit) / tried[1].count
+    return len(tried[2][0].unit) / tried[1].count
 
 
-def _turned(image: Image, design: xr.Dataset, px_per_mm: float | None, share: float) -> str:
-    """What would make the design fit clearly better than it does; nothing if it fits."""
-    if share == 1:
-        return ""
-    views = {
-        "turn the video by 180 deg": np.rot90(image, 2),
-        "turn the video by 90 deg to the left": np.rot90(image),
-        "turn the video by 90 deg to the right": np.rot90(image, 3),
-        "mirror the video": image[:, ::-1],
-    }
-    for what, view in views.items():
-        tried = _structures(np.ascontiguousarray(view), design, px_per_mm)
-        best = max(tried, key=_share)
-        if _share(best) > max(share + _CLEARLY, _ENOUGH):
-            return f"{what}: {len(best[2].unit)} of {best[1].count} units are then in their places"
-    return ""
-
-
-def _mirrored(image: Image, specimen: Specimen, sighting: Sighting) -> bool:
-    """Whether mirrored outlines part light from dark clearly better than the outlines do."""
-    apart = []
-    for sign in (1.0, -1.0):
-        mask = np.zeros(image.shape, np.uint8)
-        for unit in sighting.unit:
-            corners = specimen.centre[unit] + specimen.polygon(unit) * [sign, 1.0]
-            cv2.fillPoly(mask, [np.round(sighting.camera.project(corners)).astype(np.int32)], 1)
-        reach = int(0.15 * specimen.pitch * np.sqrt(mask.sum() / specimen.area.sum())) | 1
-        about = cv2.dilate(mask, np.ones((reach, reach), np.uint8)) - mask
-        apart.append(abs(float(image[mask > 0].mean() - image[about > 0].mean())))
-    return apart[1] > _BETTER * apart[0]
-
-
-def _doubts(alike: list[str], missing: int) -> Iterator[str]:
+def _doubts(alike: list[str], missing: int, sighting: Sighting) -> Iterator[str]:
     if alike:
         yield f"structure: as many units fit {' and '.join(alike)}; say which was built"
     if missing:
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
-    yield "orientation: where the lattice is the same turned or mirrored, so is the picture;"
-    yield "  unit (0, 0) is taken to be at the bottom left"
+    yield f"orientation: the specimen seems {placed(sighting.camera)};"
+    yield "  where its lattice is the same turned, another turn may be the right one"
     yield "window: whether the specimen is at rest in the first frame"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"
 
 
-def _kind(image: Image, specimen: Specimen, sighting: Sighting, px_per_mm: float) -> str:
+def _kind(image: Picture, specimen: Specimen, sighting: Sighting, px_per_mm: float) -> str:
     """What most faces bear, by the number of patches on them that differ from their own shade."""
     contrast = float(np.subtract(*np.percentile(image, [95, 5])))
     counts = [_marks(image, specimen, sighting, unit, contrast) for unit in sighting.unit]
@@ -148,7 +109,9 @@ def _kind(image: Image, specimen: Specimen, sighting: Sighting, px_per_mm: float
     return "speckle" if usual > _DOTS or small else "dots"
 
 
-def _marks(image: Image, specimen: Specimen, sighting: Sighting, unit: int, contrast: float) -> int:
+def _marks(
+    image: Picture, specimen: Specimen, sighting: Sighting, unit: int, contrast: float
+) -> int:
     """Number of patches on a face, its rim left out."""
     shrunk = specimen.centre[unit] + 0.75 * specimen.polygon(unit)
     polygon = np.round(sighting.camera.project(shrunk)).astype(np.int32)
@@ -165,7 +128,7 @@ def _marks(image: Image, specimen: Specimen, sighting: Sighting, unit: int, cont
     return int(cv2.connectedComponents(differs, connectivity=8)[0]) - 1
 
 
-def picture(image: Image, found: Proposal) -> Image:
+def picture(image: Picture, found: Proposal) -> Image:
     """The frame with the outlines of all units and their ids; orange where none was found."""
     scale = 2 if max(image.shape) < 1000 else 1
     drawn = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.lab.setup import Virtual
 from pipeline.problem import yamlfile
 from pipeline.problem.loading import told
-from pipeline.problem.quantities import Delay, Duration, Length
+from pipeline.problem.quantities import Delay, Duration, Frequency, Length
 from pipeline.problem.section import Section, exactly_one
 
 
@@ -51,6 +51,7 @@ class Recording(Section):
         specimen: what the units show; `auto` finds out.
         pixel_size: roughly, in the specimen's plane; without it, the units are looked for in
             several sizes.
+        frame_rate: of a folder of pictures, which have no times of their own.
         window: of time, since the file's first frame.
         load_axis: what comparisons are drawn over.
         load_cell: forces logged beside it.
@@ -65,6 +66,7 @@ class Recording(Section):
     case: Annotated[int, Field(ge=0, strict=True)] = 0
     specimen: Literal["auto", "dots", "speckle", "bare"] = "auto"
     pixel_size: Length | None = None
+    frame_rate: Frequency | None = None
     window: Window = Window()
     load_axis: Literal["time", "driven displacement"] = "time"
     load_cell: LoadCell | None = None

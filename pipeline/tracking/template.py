@@ -11,7 +11,7 @@ from copy import copy
 import cv2
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Image, Ints, Singles
+from pipeline.tracking.arrays import Floats, Ints, Picture, Singles
 from pipeline.tracking.blocks import SIZE
 from pipeline.tracking.camera import Camera
 from pipeline.tracking.patch import Templates
@@ -136,7 +136,7 @@ class Learner:
         self._count = np.zeros(grid.inside.shape)
 
     def add(
-        self, image: Image, camera: Camera, pose: Floats, photometry: Floats, share: Floats
+        self, image: Picture, camera: Camera, pose: Floats, photometry: Floats, share: Floats
     ) -> None:
         """Adds a frame.
 

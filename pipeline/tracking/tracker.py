@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Image, Ints, Mask
+from pipeline.tracking.arrays import Floats, Ints, Mask, Picture
 from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.patch import Fits
 from pipeline.tracking.predict import Neighbourhood
@@ -66,7 +66,7 @@ class Tracker:
         self._noise = np.empty(0)
         self._usual = np.zeros(specimen.count)
 
-    def step(self, image: Image) -> Found:
+    def step(self, image: Picture) -> Found:
         """Finds the units in the next frame."""
         ahead = self._pose + self._velocity
         found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
@@ -103,7 +103,7 @@ class Tracker:
         seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
 
-    def _spread(self, image: Image, fits: Fits, good: Mask) -> Mask:
+    def _spread(self, image: Picture, fits: Fits, good: Mask) -> Mask:
         """Tries the units that were not found where their neighbours would have carried them."""
         for _ in range(_ROUNDS):
             good &= ~self._neighbours.strayed(fits.pose, good, _STRAY * self._pitch)
@@ -120,7 +120,7 @@ class Tracker:
             good |= new
         return good
 
-    def _uncover(self, image: Image, fits: Fits, good: Mask) -> Mask:
+    def _uncover(self, image: Picture, fits: Fits, good: Mask) -> Mask:
         """Tries those again that may be hidden in part: place and brightness are known."""
         photometry = self._photometry * self._brighter(fits, good)
         tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
@@ -135,7 +135,7 @@ class Tracker:
 
     def _tried(
         self,
-        image: Image,
+        image: Picture,
         fits: Fits,
         good: Mask,
         trial: tuple[Floats, Floats, Floats | None, float],

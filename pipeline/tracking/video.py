@@ -1,4 +1,4 @@
-"""Frames of a video, one after the other, with the file's own time stamps."""
+"""Frames of a video, or of a folder of pictures, one after the other, with their times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import av
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.tracking.arrays import Image
+from pipeline.tracking.arrays import Picture
+from pipeline.tracking.pictures import brightness, images
 
 LOG = logging.getLogger(__name__)
 
@@ -26,27 +27,52 @@ class Frame:
     Attributes:
         index: from zero.
         time: since the file's first frame, s, by the file's time stamps.
-        image: (rows, columns) brightness.
+        image: (rows, columns) brightness, from 0 to 255.
     """
 
     index: int
     time: float
-    image: Image
+    image: Picture
 
 
-def frames(path: Path, start: float = 0.0, end: float = float("inf")) -> Iterator[Frame]:
+def frames(
+    path: Path, start: float = 0.0, end: float = float("inf"), rate: float | None = None
+) -> Iterator[Frame]:
     """Decodes the video once, in sequence; nothing but the present frame is held.
 
-    A file that breaks off ends there, with a warning.
+    A file that breaks off, or changes its size, ends there, with a warning.
 
     Args:
-        path: the video.
+        path: the video, or a folder of pictures.
         start: of the time window, s; the first frame of the file is at zero.
         end: of the time window, s.
+        rate: frames per second of a folder of pictures.
 
     Raises:
-        UserError: no such file, or none that can be read as a video.
+        UserError: no such file, or none that can be read; a folder without a rate.
     """
+    if not path.is_dir():
+        yield from _even(path, _filmed(path, start, end))
+        return
+    if rate is None:
+        remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
+        raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
+    shown = (Frame(index, index / rate, image) for index, image in enumerate(images(path)))
+    yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
+
+
+def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
+    """The frames as long as they are of one size."""
+    size: tuple[int, ...] | None = None
+    for frame in shown:
+        size = frame.image.shape if size is None else size
+        if frame.image.shape != size:
+            LOG.warning("warning: %s changes its size after %d frames", path, frame.index)
+            return
+        yield frame
+
+
+def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
     try:
         with av.open(str(path)) as container:
             yield from _decoded(container, path, start, end)
@@ -92,9 +118,11 @@ def _nominal(stream: av.VideoStream, index: int) -> float:
     return index / float(stream.average_rate or 1)
 
 
-def _brightness(frame: av.VideoFrame) -> Image:
+def _brightness(frame: av.VideoFrame) -> Picture:
+    if max(part.bits for part in frame.format.components) > 8:
+        return brightness(frame.to_ndarray(format="gray16le"))
     if frame.format.name not in _READY:
-        return frame.to_ndarray(format="gray").astype(np.uint8)
+        return brightness(frame.to_ndarray(format="gray"))
     plane = frame.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
     return np.ascontiguousarray(rows[:, : plane.width])

@@ -30,7 +30,7 @@ def _work(args: argparse.Namespace) -> None:
         def shown() -> Iterator[Frame]:
             for frame in _of_track(args.video, asked, track):
                 if frame.index in chosen:
-                    kept.append(frame.image)
+                    kept.append(frame.image.astype(np.uint8))
                 bar.update()
                 yield frame
 
@@ -50,7 +50,8 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
     """The frames of the video that the track has."""
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
-    return (each for each in frames(video, asked.window.start, end) if each.index in wanted)
+    shown = frames(video, asked.window.start, end, asked.frame_rate)
+    return (each for each in shown if each.index in wanted)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

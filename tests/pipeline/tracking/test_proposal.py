@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline import datasets, track
-from pipeline.errors import UserError
 from pipeline.tracking import importing, proposal, recording
+from pipeline.tracking.find import placed
 from pipeline.tracking.video import frames
 from tests.pipeline.tracking.conftest import CLIPS
 
@@ -32,10 +32,10 @@ def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
     assert any("case" in doubt for doubt in found.doubts)
 
 
-def test_a_mirrored_video_is_refused() -> None:
+def test_a_mirrored_video_is_seen_as_such() -> None:
     design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
-    with pytest.raises(UserError, match="mirror images"):
-        proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
+    found = proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
+    assert "mirrored" in placed(found.sighting.camera)
 
 
 def test_a_proposal_is_a_recording_and_a_picture(
@@ -57,7 +57,7 @@ def test_a_proposal_is_a_recording_and_a_picture(
     assert "there is a recording already" in capsys.readouterr().err
 
 
-def test_a_turned_video_is_refused() -> None:
+def test_a_turned_video_is_seen_as_such() -> None:
     """The top row is left out of the picture, so that up and down can be told apart."""
     design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
     image = first("f_silhouette")
@@ -70,5 +70,6 @@ def test_a_turned_video_is_refused() -> None:
     names = ("vertices", "vertices_initial")
     cut = design.assign({name: design[name].where(~gone[:, None, None]) for name in names})
     assert len(proposal.propose(below, cut, 2.74).sighting.unit) == 210
-    with pytest.raises(UserError, match="not upright"):
-        proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74)
+    turned = proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74).sighting
+    assert len(turned.unit) == 210
+    assert "90 deg" in placed(turned.camera)

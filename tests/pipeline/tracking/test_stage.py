@@ -46,11 +46,19 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
 def test_another_design_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8")
     other = recording.with_name("other.yaml")
-    other.write_text(text.replace("spacing_mm: 15.0", "spacing_mm: 27.0"), encoding="utf-8")
+    assert "grid:\n- 15\n- 15\n" in text
+    other.write_text(text.replace("grid:\n- 15\n", "grid:\n- 8\n"), encoding="utf-8")
     video = str(CLIPS / "f_silhouette.mp4")
     folder = str(recording.parent)
     assert track.main(["import", str(other), "--video", video, "--out-dir", folder]) == 0
-    assert "does not show this design" in refused(recording, capsys)
+    told = refused(recording, capsys)
+    assert "does not show this design" in told
+    assert "of 120 in their places" in told
+
+
+def test_a_wrong_scale_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    changed(recording, "pixel_size: 0.365 mm", "pixel_size: 0.6 mm")
+    assert "pixels measure about 0.36" in refused(recording, capsys)
 
 
 def test_what_is_no_video_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
