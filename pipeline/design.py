@@ -109,6 +109,11 @@ def optimise(
     folder.mkdir(parents=True, exist_ok=True)
     paths = Paths(folder / f"{method}.paths")
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
+        evaluate = evaluator(scene, plan, paths)
+
+        def from_rest(x: Floats) -> tuple[float, Floats, Floats]:
+            paths.forget()
+            return evaluate(x)
 
         def show(evaluation: Evaluation) -> None:
             paths.accept(evaluation)
@@ -120,11 +125,12 @@ def optimise(
             ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
-                    journal.wrap(evaluator(scene, plan, paths)),
+                    journal.wrap(evaluate),
                     constraints,
                     np.zeros(scene.space.n_variables) if start is None else start,
                     options=_options(asked, method),
                     callback=show,
+                    confirm=from_rest if scene.static else None,
                 )
         except InfeasibleStartError as error:
             raise failures.infeasible(error, constraints, source) from error

@@ -22,6 +22,7 @@ def minimise(
     bounds: tuple[Floats | float, Floats | float] | None = None,
     options: SqpOptions | MmaOptions | None = None,
     callback: Callback | None = None,
+    confirm: Evaluate | None = None,
 ) -> Result:
     """Minimises a loss subject to constraints >= 0 and returns the best feasible design met.
 
@@ -37,6 +38,8 @@ def minimise(
         bounds: lower and upper bounds of the variables.
         options: of the method.
         callback: called with each Evaluation as it is recorded.
+        confirm: what ``evaluate`` should return without help of earlier evaluations, if it has
+            that; a design whose loss it does not find again is not returned.
 
     Raises:
         InfeasibleStartError: no feasible design near the start.
@@ -54,6 +57,7 @@ def minimise(
         chosen.evaluations,
         chosen.target,
         callback,
+        confirm,
     )
     if method == "sqp" and isinstance(chosen, SqpOptions):
         return sqp(problem, start, chosen)

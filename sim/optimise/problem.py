@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -19,6 +20,11 @@ Constrain = Callable[[Floats], tuple[Floats, "sp.csr_array | Floats"]]
 """Design (n,) -> values (m,), required to be >= 0, and their Jacobian (m, n), sparse or dense."""
 
 Callback = Callable[["Evaluation"], None]
+
+CONFIRMED = 1e-6
+"""Relative difference up to which a loss counts as found again."""
+
+log = logging.getLogger(__name__)
 
 
 class InfeasibleStartError(ValueError):
@@ -125,6 +131,7 @@ class Problem:
         budget: largest number of evaluations.
         target: loss below which a feasible design is good enough.
         callback: called with each record.
+        confirm: the loss found without help of earlier evaluations, if they help ``evaluate``.
         steepest: largest entry of the first gradient, the scale of all KKT residuals.
     """
 
@@ -135,6 +142,7 @@ class Problem:
     budget: int
     target: float = -np.inf
     callback: Callback | None = None
+    confirm: Evaluate | None = None
     evaluations: list[Evaluation] = field(default_factory=list)
     best: Point | None = None
     steepest: float | None = None
@@ -226,10 +234,8 @@ class Problem:
         )
 
     def result(self, reason: str) -> Result:
-        """The best design; the first evaluation must have succeeded."""
-        if self.best is None:
-            raise RuntimeError("no evaluation succeeded")
-        best = self.best
+        """The best design that is confirmed; the first evaluation must have succeeded."""
+        best = self._confirmed()
         return Result(
             x=best.x,
             loss=best.loss,
@@ -241,3 +247,24 @@ class Problem:
             evaluations=tuple(self.evaluations),
             reason=reason,
         )
+
+    def _confirmed(self) -> Point:
+        """The best design; with ``confirm``, the best whose loss is found again."""
+        if self.best is None:
+            raise RuntimeError("no evaluation succeeded")
+        if self.confirm is None:
+            return self.best
+        succeeded = (each for each in self.evaluations if each.failure is None)
+        for each in sorted(succeeded, key=lambda each: (each.violation, each.loss)):
+            try:
+                loss, gradient, aux = self.confirm(each.x.copy())
+            except SimulationError as failure:
+                log.warning("evaluation %d is not confirmed: %s", each.number, failure)
+                continue
+            if abs(loss - each.loss) <= CONFIRMED * abs(each.loss):
+                place = self.place(each.x)
+                return Point(
+                    place.x, place.values, place.jacobian, each.number, each.loss, gradient, aux
+                )
+            log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)
+        return self.best

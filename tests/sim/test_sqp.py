@@ -181,6 +181,24 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
     assert kicked.evaluations[: len(still.evaluations)][-1].loss == still.evaluations[-1].loss
 
 
+@pytest.mark.parametrize("method", ["sqp", "mma"])
+def test_a_design_that_is_not_confirmed_is_not_returned(method: Method) -> None:
+    known = corner()
+
+    def confirm(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        loss, gradient, aux = known.loss(x)
+        if loss < -1.4:
+            raise SimulationError("out of reach")
+        return loss + (0.1 if loss < -1.2 else 0.0), gradient, aux
+
+    found = minimise(method, known.loss, known.constraints, known.start, confirm=confirm)
+    losses = np.array([each.loss for each in found.evaluations if each.violation == 0.0])
+    assert losses.min() < -1.4
+    assert found.loss == losses[losses >= -1.2].min()
+    assert found.loss == known.loss(found.x)[0]
+    assert found.evaluations[found.best].loss == found.loss
+
+
 def test_runs_are_reproducible_bit_for_bit() -> None:
     runs = [solve(many(40, 120), retreats=2, evaluations=60) for _ in range(2)]
     assert runs[0].x.tobytes() == runs[1].x.tobytes()
