@@ -48,7 +48,7 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     """Margins of the constraints, gaps and overlaps of the design at rest."""
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
     for name, margin in margins:
-        label = f"{_MARGINS.get(str(name), str(name))}: margin to the bound"
+        label = f"{_MARGINS[str(name)]}: margin to the bound"
         length, left = str(name) in {"edge_length", "gap"}, settled(float(margin))
         value = left if length else float(np.degrees(left))
         note = "smallest of the design at rest; 0 is active, negative violated"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline import datasets, design, select, simulate
+from pipeline import datasets, design, reconsider, select, simulate
 from pipeline.problem import load
 
 
@@ -27,9 +27,7 @@ class Built:
 
 def build(problem: Path, preset: str | None, folder: Path) -> Built:
     """Designs by every method that the problem asks for, ships the better, simulates it."""
-    study = ["--problem", str(problem), "--quiet"]
-    study += [] if preset is None else ["--preset", preset]
-    ways = []
+    study, ways = _options(problem, preset), []
     for method in load(problem, preset).optimiser.methods.chosen:
         ways.append(str(folder / f"design_{method}.nc"))
         assert design.main([*study, "--method", method, "--out", ways[-1]]) == 0
@@ -37,3 +35,19 @@ def build(problem: Path, preset: str | None, folder: Path) -> Built:
     assert select.main([*study, "--designs", *ways, "--out", str(shipped)]) == 0
     assert simulate.main([*study, "--design", str(shipped), "--out", str(response)]) == 0
     return Built(datasets.read(shipped, "design"), datasets.read(response, "response"))
+
+
+def build_again(problem: Path, preset: str | None, folder: Path) -> Built:
+    """The design for contact on distance of a study that was built in the folder."""
+    study = _options(problem, preset)
+    first = ["--design", str(folder / "design.nc"), "--response", str(folder / "response.nc")]
+    second, response = folder / "geometric_design.nc", folder / "geometric_response.nc"
+    assert reconsider.main([*study, *first, "--out", str(second)]) == 0
+    moved = ["--design", str(second), "--geometric", "--out", str(response)]
+    assert simulate.main([*study, *moved]) == 0
+    return Built(datasets.read(second, "design"), datasets.read(response, "response"))
+
+
+def _options(problem: Path, preset: str | None) -> list[str]:
+    study = ["--problem", str(problem), "--quiet"]
+    return study if preset is None else [*study, "--preset", preset]

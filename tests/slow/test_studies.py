@@ -9,30 +9,43 @@ import pytest
 import yaml
 
 from pipeline.environment import ROOT
-from tests.e2e.stages import build
+from tests.e2e.stages import Built, build, build_again
 
 EXPECTED = yaml.safe_load((ROOT / "tests/data/studies.yaml").read_text())
 
 
 @dataclass(frozen=True)
 class Expected:
-    """Losses of a study: of the structure that is altered, and of the design shipped."""
+    """Losses of a study: of the structure that is altered, and of the design shipped.
+
+    `geometric` is that of the design for contact on distance, with that contact.
+    """
 
     altered: float
     cloaked: float
+    geometric: float
     tolerance: float
+
+    def check(self, built: Built, most: float) -> None:
+        """The design reaches a loss, can be made, and is followed through stable states."""
+        losses = built.response["loss"].isel(case=0)
+        reached = float(losses.sel(structure="cloaked"))
+        assert reached <= most * (1 + self.tolerance)
+        assert reached == pytest.approx(built.best_loss, rel=1e-6)
+        assert float(built.design["constraint_margin"].min()) >= 0.0
+        assert int(built.design["overlaps"]) == 0
+        assert (built.response["stability"].sel(structure="cloaked") >= 1).all()
 
 
 @pytest.mark.parametrize("target", EXPECTED)
-def test_a_study_reaches_its_loss(target: str, tmp_path: Path) -> None:
+def test_a_study_reaches_its_losses(target: str, tmp_path: Path) -> None:
     expected = Expected(**EXPECTED[target])
     name, _, preset = target.partition("@")
-    built = build(ROOT / f"experiments/{name}/problem.yaml", preset or None, tmp_path)
-    losses = built.response["loss"].isel(case=0)
-    assert float(losses.sel(structure="altered")) == pytest.approx(expected.altered, rel=1e-6)
-    reached = float(losses.sel(structure="cloaked"))
-    assert reached <= expected.cloaked * (1 + expected.tolerance)
-    assert reached == pytest.approx(built.best_loss, rel=1e-6)
-    assert float(built.design["constraint_margin"].min()) >= 0.0
-    assert int(built.design["overlaps"]) == 0
-    assert (built.response["stability"].sel(structure="cloaked") == 1).all()
+    study = ROOT / f"experiments/{name}/problem.yaml", preset or None, tmp_path
+    built = build(*study)
+    altered = float(built.response["loss"].isel(case=0).sel(structure="altered"))
+    assert altered == pytest.approx(expected.altered, rel=1e-6)
+    expected.check(built, expected.cloaked)
+    again = build_again(*study)
+    expected.check(again, expected.geometric)
+    assert int(again.response["overlaps"].sel(structure="cloaked").max()) == 0
