@@ -48,11 +48,12 @@ def _fixing(specimen: Specimen) -> list[str]:
     """The last steps: into the fixtures (tinted on the plan), out of the jig."""
     told = []
     if specimen.clamped:
-        told.append(f"Set the clamped units into their pads: {', '.join(specimen.clamped)}.")
+        clamped = ", ".join(specimen.clamped)
+        told.append(f"Set the clamped units into their pads or grips: {clamped}.")
     if specimen.driven:
         driven = ", ".join(specimen.driven)
-        room = "Where its neighbours leave no room for fingers, glue it on."
-        told.append(f"Fix the adapter of the drive to: {driven}. {room}")
+        room = "Where neighbours leave an adapter no room for fingers, glue it on."
+        told.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
     return [*told, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
 
 

@@ -60,7 +60,7 @@ def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
 
 def test_fixtures_are_named_in_the_order_of_work(tmp_path: Path) -> None:
     first = " ".join(pages.words(written(tmp_path))[0])
-    assert "Set the clamped units into their pads: A1, C2." in first
+    assert "Set the clamped units into their pads or grips: A1, C2." in first
 
 
 @pytest.mark.parametrize("paper", ["A4", "Letter"])
