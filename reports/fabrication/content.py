@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.fabrication.checks.papers import rows
+from pipeline.fabrication.checks.bill import rows
 from pipeline.fabrication.parts import THIN_WALL
 from pipeline.problem import Problem
 from reports.fabrication import pictures

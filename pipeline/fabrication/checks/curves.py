@@ -9,7 +9,7 @@ import shapely
 from shapely import Geometry, LineString, Point, Polygon, STRtree
 
 from pipeline.fabrication.checks.drawings import OUTER, Curve, Drawing
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 
 INNER, ENGRAVE, SCORE, REFERENCE = "CUT_INNER", "ENGRAVE", "SCORE", "REFERENCE"
 LAYERS = (INNER, OUTER, ENGRAVE, SCORE, REFERENCE)
@@ -18,8 +18,6 @@ CUT_KINDS = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "PATH", "POLYGON", "RECT")
 LINE_KINDS = (*CUT_KINDS, "LINE", "SIMPLELINE", "ARC")
 SHORTEST = 1e-4
 """Segments below this, mm, count as none; so do gaps."""
-
-_EXPORTER = "run the same command again; if it stays, the exporter has a bug"
 
 
 def check(drawing: Drawing) -> Iterator[Fault]:
@@ -142,11 +140,11 @@ def _held(curve: Curve, outers: Iterable[Polygon]) -> bool:
 def _fault(drawing: Drawing, curve: Curve, what: str, spot: Geometry | None = None) -> Fault:
     shown = (line(curve),)
     where = spot if spot is not None else shown[0]
-    return Fault(named(curve.part), what, "laser", _EXPORTER, drawing.file, shown, where)
+    return Fault(named(curve.part), what, "laser", BUG, drawing.file, shown, where)
 
 
 def _whole(drawing: Drawing, what: str) -> Fault:
-    return Fault("the drawing", what, "laser", _EXPORTER, drawing.file)
+    return Fault("the drawing", what, "laser", BUG, drawing.file)
 
 
 def named(part: str) -> str:

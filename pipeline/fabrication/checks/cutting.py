@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.fabrication.checks import curves, drawings, sheets
+from pipeline.fabrication.checks import bill, curves, drawings, sheets
 from pipeline.fabrication.checks.curves import REFERENCE
 from pipeline.fabrication.checks.drawings import Curve, Drawing
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.placed import Shapes, check_outline
-from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.fabrication.checks.wanted import Wanted, every_unit
 from pipeline.problem.fabrication import Fabrication
 
-_BUG = "run the same command again; if it stays, the exporter has a bug"
 NOMINAL = "nominal"
 
 
@@ -35,6 +34,7 @@ def check(folder: Path, wanted: Wanted, placed: Shapes, asked: Fabrication) -> I
         kind, _, variant = path.stem.split("_")
         variants.setdefault((kind, variant), []).append(drawings.read(path))
     yield from _units(folder, variants.get(("units", NOMINAL), []), wanted, placed)
+    yield from bill.check_pieces(folder.parent / "bom.csv", variants.get(("shims", NOMINAL), []))
     for drawing in (drawing for found in variants.values() for drawing in found):
         yield from _sheet(drawing, asked)
         yield from _formats(drawing, folder, asked)
@@ -61,7 +61,7 @@ def _formats(drawing: Drawing, folder: Path, asked: Fabrication) -> Iterator[Fau
         yield from curves.check_form(other)
         yield from sheets.check_scale(other, asked.laser)
         if (what := _difference(drawing, other)) is not None:
-            yield Fault("the drawing", what, "laser", _BUG, other.file)
+            yield Fault("the drawing", what, "laser", BUG, other.file)
 
 
 def _difference(one: Drawing, other: Drawing) -> str | None:
@@ -102,7 +102,7 @@ def _kerfs(
             yield from sheets.compensation(variants[kind, name], nominal, kerf)
         else:
             what = f"there is no sheet of {kind} for a kerf of {kerf:g} mm"
-            yield Fault("the drawings", what, "laser.kerf", _BUG, nominal[0].file)
+            yield Fault("the drawings", what, "laser.kerf", BUG, nominal[0].file)
 
 
 def _units(folder: Path, units: list[Drawing], wanted: Wanted, placed: Shapes) -> Iterator[Fault]:
@@ -112,14 +112,3 @@ def _units(folder: Path, units: list[Drawing], wanted: Wanted, placed: Shapes) -
     for label, shape, file in found:
         if label in wanted.polygons:
             yield from check_outline(label, file, shape, placed)
-
-
-def every_unit(found: Mapping[str, int], wanted: Wanted, where: Path) -> Iterator[Fault]:
-    """Faults of the number of units: each is there once, and no other."""
-    for label in wanted.polygons:
-        if (count := found.get(label, 0)) != 1:
-            what = "it is missing" if count == 0 else f"it is there {count} times"
-            yield Fault(f"unit {label}", what, "laser", _BUG, where)
-    for label in sorted(set(found) - set(wanted.polygons)):
-        what = "it is made, but the structure has no such unit"
-        yield Fault(f"unit {label}", what, "laser", _BUG, where)

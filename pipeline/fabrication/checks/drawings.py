@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from shapely import Point, Polygon, STRtree
 
 from pipeline.errors import UserError
+from pipeline.fabrication.checks.faults import BUG
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing as Document
@@ -238,5 +239,5 @@ def _unreadable(path: Path, why: str) -> UserError:
     return UserError(
         f"a drawing that was just written cannot be read back: {why}",
         file=path,
-        remedy="run the same command again; if it stays, the exporter has a bug",
+        remedy=BUG,
     )

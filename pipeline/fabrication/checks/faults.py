@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from shapely import Geometry
 
+BUG = "run the same command again; if it stays, the exporter has a bug"
+"""The remedy where no parameter helps."""
+
 PICTURES = 6
 """Most pictures that one stop leaves behind."""
 

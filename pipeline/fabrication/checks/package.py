@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.fabrication.checks import cutting, papers, placed, printing, solids
+from pipeline.fabrication.checks import bill, cutting, papers, placed, printing, solids
 from pipeline.fabrication.checks.faults import Fault, stop
 from pipeline.fabrication.checks.wanted import of_design
 from pipeline.problem.fabrication import Fabrication
@@ -42,10 +42,11 @@ def check_package(
     found = placed.shapes(assembled, wanted, asked)
     faults: list[Fault] = []
     steps: Iterable[Iterator[Fault]] = (
-        printing.check(folder / "print", wanted, found, asked),
         placed.check_assembled(assembled, found, wanted, asked),
+        printing.check(folder / "print", wanted, found, asked),
         cutting.check(folder / "laser", wanted, found, asked),
         printing.check_fixtures(folder / "fixture", asked),
+        bill.check(folder / "bom.csv", wanted, found, asked),
         papers.check(folder, wanted),
     )
     for step in steps:
@@ -54,5 +55,5 @@ def check_package(
     stop([replace(fault, file=fault.file.relative_to(folder)) for fault in faults], pictures)
 
 
-STEPS = 5
+STEPS = 6
 """How often `check_package` tells of progress."""

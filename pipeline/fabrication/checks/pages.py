@@ -9,12 +9,11 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from pipeline.errors import UserError
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 
 _STREAM = re.compile(rb"stream\r?\n(.*?)endstream", re.DOTALL)
 _SHOWN = re.compile(rb"\(((?:[^()\\]|\\.)*)\)\s*Tj")
 _ESCAPED = re.compile(r"\\(.)")
-_BUG = "run the same command again; if it stays, the exporter has a bug"
 
 
 def words(path: Path) -> list[list[str]]:
@@ -37,7 +36,7 @@ def check(path: Path, ids: Collection[str]) -> Iterator[Fault]:
     """Faults of an assembly sheet that should name each of `ids` on its plan."""
     shown = {text for page in words(path) for text in page}
     for missing in sorted(set(ids) - shown):
-        yield Fault(f"unit {missing}", "it is not on the assembly sheet", "labels", _BUG, path)
+        yield Fault(f"unit {missing}", "it is not on the assembly sheet", "labels", BUG, path)
 
 
 def _unpacked(stream: bytes) -> bytes:
@@ -56,5 +55,5 @@ def _unreadable(path: Path, why: str) -> UserError:
     return UserError(
         f"the assembly sheet that was just written cannot be read back: {why}",
         file=path,
-        remedy=_BUG,
+        remedy=BUG,
     )

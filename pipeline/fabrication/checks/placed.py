@@ -15,9 +15,9 @@ from shapely import Geometry, STRtree
 
 from pipeline.fabrication.checks import corners
 from pipeline.fabrication.checks.corners import Shape
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.sheets import closest
-from pipeline.fabrication.checks.solids import BUG, TOLERANCE, Solid, check, fault
+from pipeline.fabrication.checks.solids import TOLERANCE, Solid, check, fault
 from pipeline.fabrication.checks.wanted import Wanted
 from pipeline.problem.fabrication import Fabrication
 
@@ -26,16 +26,17 @@ Shapes = Mapping[str, Geometry]
 
 
 def shapes(solid: Solid, wanted: Wanted, asked: Fabrication) -> dict[str, Geometry]:
-    """The outlines of the units in an assembled specimen; those that are in their places."""
+    """Outlines of units in an assembled specimen, each over the design that it covers most of."""
     sections = shapely.get_parts(solid.section(asked.thickness / 2))
-    tree = STRtree(sections)
-    found = {}
-    for label, design in wanted.polygons.items():
-        near = [sections[k] for k in tree.query(design, predicate="intersects")]
-        over = [s for s in near if s.intersection(design).area > 0.5 * s.area]
-        if len(over) == 1:
-            found[label] = over[0]
-    return found
+    labels, designs = list(wanted.polygons), np.array(list(wanted.polygons.values()))
+    over, under = STRtree(designs).query(sections, predicate="intersects")
+    shared = shapely.area(shapely.intersection(sections[over], designs[under]))
+    found: dict[str, list[Geometry]] = {label: [] for label in labels}
+    for number, section in enumerate(sections):
+        mine = np.flatnonzero(over == number)
+        if len(mine):
+            found[labels[under[mine[np.argmax(shared[mine])]]]].append(section)
+    return {label: own[0] for label, own in found.items() if len(own) == 1}
 
 
 def check_assembled(
@@ -46,11 +47,10 @@ def check_assembled(
     yield from faults
     if faults:
         return
-    for label, design in wanted.polygons.items():
-        if label not in found:
-            yield fault(solid, f"unit {label} is not in its place")
-            continue
-        shape = Shape(label, solid.file, design, found[label], wanted.slots[label])
+    for label in sorted(wanted.polygons.keys() - found.keys()):
+        yield fault(solid, f"unit {label} is not in its place")
+    for label, made in found.items():
+        shape = Shape(label, solid.file, wanted.polygons[label], made, wanted.slots[label])
         yield from corners.check(shape, asked)
     yield from _gaps(solid, found, asked)
 

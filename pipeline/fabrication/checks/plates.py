@@ -8,12 +8,11 @@ import numpy as np
 import shapely
 from shapely import Geometry
 
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.sheets import closest
 from pipeline.fabrication.checks.solids import TOLERANCE, Solid, check
 from pipeline.problem.fabrication import Print
 
-_BUG = "run the same command again; if it stays, the exporter has a bug"
 _CUT = 0.5  # of its height: where a part's footprint is taken
 
 
@@ -59,4 +58,4 @@ def _on_bed(plate: Sequence[Solid], footprints: np.ndarray, printer: Print) -> I
 def _fault(solid: Solid, what: str, key: str, shown: np.ndarray) -> Fault:
     around = tuple(shown)
     spot = around[0] if around else None
-    return Fault(f"part {solid.name}", what, key, _BUG, solid.file, around, spot)
+    return Fault(f"part {solid.name}", what, key, BUG, solid.file, around, spot)

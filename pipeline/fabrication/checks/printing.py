@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.fabrication.checks import plates, solids
-from pipeline.fabrication.checks.cutting import every_unit
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.placed import Shapes, check_outline
 from pipeline.fabrication.checks.solids import Solid, fault
-from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.fabrication.checks.wanted import Wanted, every_unit
 from pipeline.problem.fabrication import Fabrication
 
 _ALIKE = 1e-3
@@ -36,7 +35,9 @@ def check(folder: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> It
         yield from faults
         if not faults and label in wanted.polygons:
             yield from _unit(label, solid, found, asked)
-    yield from _plates(folder, units, wanted, asked)
+    names, faults = _plates(folder.glob("units_*.3mf"), units, asked)
+    yield from faults
+    yield from every_unit(Counter(names), wanted, folder)
     for path in sorted(folder.glob("coupon_*.3mf")):
         yield from plates.check_plate(solids.read_3mf(path), asked.print)
 
@@ -46,15 +47,11 @@ def check_fixtures(folder: Path, asked: Fabrication) -> Iterator[Fault]:
     parts = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("*.stl"))}
     for solid in parts.values():
         yield from solids.check(solid)
-    names: list[str] = []
-    for path in sorted(folder.glob("*.3mf")):
-        plate = solids.read_3mf(path)
-        names += [solid.name for solid in plate]
-        yield from plates.check_plate(plate, asked.print)
-        yield from _others(plate, parts)
+    names, faults = _plates(folder.glob("*.3mf"), parts, asked)
+    yield from faults
     if sorted(names) != sorted(parts):
         what = "the plates do not hold each of the fixture's parts once"
-        yield Fault("the fixture", what, "fixture", solids.BUG, folder)
+        yield Fault("the fixture", what, "fixture", BUG, folder)
 
 
 def levels(asked: Fabrication) -> list[float]:
@@ -78,16 +75,17 @@ def _unit(label: str, solid: Solid, found: Shapes, asked: Fabrication) -> Iterat
 
 
 def _plates(
-    folder: Path, units: Mapping[str, Solid], wanted: Wanted, asked: Fabrication
-) -> Iterator[Fault]:
-    """Each unit on one plate, the same as in its own file."""
+    paths: Iterable[Path], parts: Mapping[str, Solid], asked: Fabrication
+) -> tuple[list[str], list[Fault]]:
+    """Names of the objects on plates, and faults: each is to be as in its own file."""
     names: list[str] = []
-    for path in sorted(folder.glob("units_*.3mf")):
+    faults: list[Fault] = []
+    for path in sorted(paths):
         plate = solids.read_3mf(path)
         names += [solid.name for solid in plate]
-        yield from plates.check_plate(plate, asked.print)
-        yield from _others(plate, units)
-    yield from every_unit(Counter(names), wanted, folder)
+        faults += plates.check_plate(plate, asked.print)
+        faults += _others(plate, parts)
+    return names, faults
 
 
 def _others(plate: Sequence[Solid], parts: Mapping[str, Solid]) -> Iterator[Fault]:

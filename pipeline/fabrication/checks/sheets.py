@@ -14,7 +14,7 @@ from pipeline.fabrication.checks.alignment import aligned
 from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, line, named
 from pipeline.fabrication.checks.curves import polygon as bounded
 from pipeline.fabrication.checks.drawings import MILLIMETRES, OUTER, Curve, Drawing
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.problem.fabrication import Laser
 
 TOLERANCE = 1e-3
@@ -24,7 +24,6 @@ LEAST_LETTER = 2.0
 _KERF_TOLERANCE = 2e-3
 _JOINED = 0.05  # mm; strokes so near to each other make one letter
 _HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
-_BUG = "run the same command again; if it stays, the exporter has a bug"
 _SVG = re.compile(r"<svg[^>]*>", re.DOTALL)
 
 
@@ -84,7 +83,7 @@ def _places(drawing: Drawing, laser: Laser) -> Iterator[Fault]:
     for first, second, gap in closest(shapes, laser.gap - TOLERANCE):
         what = f"{gap:.3f} mm from part {parts[second][0]}, less than {laser.gap:g} mm"
         shown = (shapes[first], shapes[second])
-        yield _on(drawing, parts[first][0], what, "laser.gap", _BUG, shown)
+        yield _on(drawing, parts[first][0], what, "laser.gap", BUG, shown)
 
 
 def closest(shapes: np.ndarray, gap: float) -> Iterator[tuple[int, int, float]]:
@@ -174,7 +173,7 @@ def compensation(
         for (drawing, curve), (_, drawn) in zip(found, wanted[part, layer], strict=True):
             if not _offset(curve, drawn, shift):
                 what = f"not {abs(shift):g} mm {'out' if shift > 0 else 'in'} of the nominal cut"
-                yield _on(drawing, part, what, "laser.kerf", _BUG, (line(curve),))
+                yield _on(drawing, part, what, "laser.kerf", BUG, (line(curve),))
 
 
 def _cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tuple[Drawing, Curve]]]:
@@ -218,4 +217,4 @@ def _on(
 
 
 def _whole(drawing: Drawing, what: str, key: str = "laser") -> Fault:
-    return Fault("the drawing", what, key, _BUG, drawing.file)
+    return Fault("the drawing", what, key, BUG, drawing.file)

@@ -15,7 +15,7 @@ import shapely
 from numpy.typing import NDArray
 
 from pipeline.errors import UserError
-from pipeline.fabrication.checks.faults import Fault
+from pipeline.fabrication.checks.faults import BUG, Fault
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -30,7 +30,6 @@ TOLERANCE = 1e-3
 """Lengths of a mesh are right to this, mm (binary STL holds single precision)."""
 
 VOLUME_TOLERANCE = 1e-3
-BUG = "run the same command again; if it stays, the exporter has a bug"
 _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
 

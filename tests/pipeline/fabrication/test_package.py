@@ -12,7 +12,9 @@ import pytest
 
 from pipeline.errors import UserError
 from pipeline.fabrication import manifest
+from pipeline.fabrication.checks import bill, placed, solids
 from pipeline.fabrication.checks.package import check_package
+from pipeline.fabrication.checks.wanted import of_design
 from pipeline.problem import Problem
 from pipeline.provenance import file_hash
 from tests.pipeline.fabrication import built
@@ -120,11 +122,13 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "one unit more": (copied("print/units/A1.stl", "print/units/D7.stl"), "unit D7"),
     "stl larger": (scaled("print/units/A1.stl", 1.01), "part A1: it is 8.181 mm high"),
     "stl cut short": (halved("print/units/A1.stl"), "cannot be read back"),
-    "assembled larger": (scaled("print/assembled.stl", 1.5), "is not in its place"),
+    "assembled larger": (scaled("print/assembled.stl", 1.5), "unit C1 is not in its place"),
     "3mf cut short": (halved("print/units_plate1.3mf"), "cannot be read back"),
     "fixture broken": (halved("fixture/JIG1.stl"), "cannot be read back"),
     "bill": (edited("bom.csv", "unit,B2,1", "unit,B2,2"), "unit B2: it is there 2 times"),
-    "shims": (edited("bom.csv", "shim,S8.25,", "spare,S8.25,"), "none to spare"),
+    "shims": (edited("bom.csv", "shim,S8.25,", "spare,S8.25,"), "8 on the sheets, 0 in the bill"),
+    "too few shims": (edited("bom.csv", "shim,S8.25,8,", "shim,S8.25,7,"), "8 on the sheets, 7 in"),
+    "another shim": (edited("bom.csv", "8.2500,8.1000", "8.2700,8.1000"), "it is not 8.27 x 8.10"),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
 }
 
@@ -141,6 +145,16 @@ def test_a_damaged_package_is_refused(
     damage, expected = DAMAGES[name]
     damage(package)
     assert expected in refused(package, whole[1])
+
+
+def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
+    package: Path, whole: tuple[Path, Problem]
+) -> None:
+    edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
+    wanted, asked = of_design(built.design(), "cloaked"), whole[1].fabrication
+    found = placed.shapes(solids.read_stl(package / "print/assembled.stl"), wanted, asked)
+    told = [fault.what for fault in bill.check(package / "bom.csv", wanted, found, asked)]
+    assert told == ["no shim is 8.25 mm long, from slot end to slot end"] * len(wanted.joints)
 
 
 @pytest.mark.parametrize("name", ["bom.csv", "laser/comb_sheet1_nominal.svg"])

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from shapely import Polygon
+from shapely import MultiPolygon, Polygon
 
 from pipeline.fabrication.candidates import Corner
-from pipeline.fabrication.checks import corners
+from pipeline.fabrication.checks import corners, placed
 from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks.wanted import Wanted
 from pipeline.fabrication.network import Network
 from pipeline.fabrication.parts import Unit
 from pipeline.fabrication.units import unit
@@ -45,3 +47,13 @@ def test_a_slender_unit_is_made_without_a_fault(found: dict[str, Any]) -> None:
     assert [fault.what for fault in corners.check(shape, ASKED)] == []
     gaps = [one.outline.distance(Polygon(ring)) for ring in found["neighbours"]]
     assert min(gaps, default=1.0) >= ASKED.minimum_gap - 1e-4
+
+
+def test_a_unit_that_grew_to_twice_its_size_is_found_in_its_place() -> None:
+    """Less than half of it covers its design."""
+    thin, beside = Polygon([(0, 0), (9, 0), (9, 1), (0, 1)]), Polygon([(0, 4), (9, 4), (9, 9)])
+    grown = thin.buffer(1.0, join_style="mitre")
+    solid = SimpleNamespace(section=lambda _height: MultiPolygon([beside, grown]))
+    found = placed.shapes(solid, Wanted({"A1": thin, "A2": beside}, {}, ()), ASKED)  # type: ignore[arg-type]
+    assert found["A1"].equals(grown)
+    assert found["A2"].equals(beside)
