@@ -111,6 +111,8 @@ def _plan(args: argparse.Namespace) -> None:
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
+    from pipeline import datasets, provenance
+    from pipeline.lab import truth
     from pipeline.lab.encode import encode
     from pipeline.tracking import recording as recordings
     from pipeline.whole import whole
@@ -125,16 +127,19 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
             file=out,
             remedy=f"name it *{asked.virtual.codec.suffixes[0]}",
         )
+    parents = {"response": response, "design": design}
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
     film = _prepared(asked, path, response)
     title = asked.title or path.stem
     labels = {"title": f"SYNTHETIC: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
         encode(out, film.images(bar.update), asked.virtual.rate, asked.virtual.codec, labels)
-    _write_truth(film, asked, (response, design), out.with_name(f"{out.stem}_truth.nc"))
-    values = _described(asked, out, design)
+    made = truth.dataset(film.response, film.present, film.motion, film.scene.view)
+    datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
     comments = (SYNTHETIC, "Written by pipeline.virtual_lab; python -m pipeline.track takes it.")
     with whole(out.with_suffix(".yaml")) as aside:
-        aside.write_text(recordings.text(values, comments), encoding="utf-8")
+        text = recordings.text(_described(asked, out, design), comments)
+        aside.write_text(text, encoding="utf-8")
 
 
 def _prepared(asked: Recording, path: Path, response: Path) -> Filming:
@@ -148,16 +153,6 @@ def _prepared(asked: Recording, path: Path, response: Path) -> Filming:
     except UserError as error:
         error.file = error.file or str(path)
         raise
-
-
-def _write_truth(film: Filming, asked: Recording, parents: tuple[Path, Path], out: Path) -> None:
-    from pipeline import datasets, provenance
-    from pipeline.lab import truth
-
-    held = {"response": parents[0], "design": parents[1]}
-    origin = provenance.recorded(asked.model_dump_json(), held, synthetic=True)
-    made = truth.dataset(film.response, film.present, film.motion, film.scene.view)
-    datasets.write(made, out, "truth", origin)
 
 
 def _described(asked: Recording, video: Path, design: Path) -> dict[str, object]:

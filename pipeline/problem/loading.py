@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -17,7 +17,10 @@ from pipeline.problem.checks import findings
 from pipeline.problem.drives import TimeSeries
 from pipeline.problem.model import Problem
 from pipeline.problem.quantities import FOLDER
+from pipeline.problem.section import Section
 from pipeline.problem.yamlfile import Document, KeyPath
+
+Alone = TypeVar("Alone", bound=Section)
 
 
 def load(path: str | Path, preset: str | None = None) -> Problem:
@@ -80,6 +83,19 @@ def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
         remedy = "write the keys that it changes below it"
         raise refused("keys and values are wanted here", f"presets.{name}", remedy)
     return presets[name]
+
+
+def section(path: Path, kind: type[Alone]) -> Alone:
+    """A section that is a YAML file of its own.
+
+    Raises:
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    document = yamlfile.read(path)
+    try:
+        return kind.model_validate(document.data)
+    except ValidationError as error:
+        raise told(error, document, document.data, None) from error
 
 
 def told(

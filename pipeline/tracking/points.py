@@ -8,12 +8,11 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 import shapely
 import xarray as xr
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from pipeline.datasets import TABLES
 from pipeline.errors import UserError
-from pipeline.problem import yamlfile
-from pipeline.problem.loading import told
+from pipeline.problem.loading import section
 from pipeline.problem.quantities import Angle, Coordinate
 from pipeline.problem.section import Section
 from pipeline.tracking import columns
@@ -83,11 +82,7 @@ def load(path: Path) -> Points:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    document = yamlfile.read(path)
-    try:
-        return Points.model_validate(document.data)
-    except ValidationError as error:
-        raise told(error, document, document.data, None) from error
+    return section(path, Points)
 
 
 def cloud(path: Path, asked: Points) -> Cloud:

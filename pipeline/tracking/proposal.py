@@ -62,7 +62,6 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
         name
         for name, units, seen in tried
         if name != structure and _share((name, units, seen)) > share - _CLEARLY
-        if not np.array_equal(units.outline, specimen.outline, equal_nan=True)
     ]
     jacobian = sighting.camera.jacobian(specimen.centre[sighting.unit])
     pixel = float(1 / np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
@@ -75,9 +74,19 @@ _Tried = tuple[str, Specimen, list[Sighting]]
 
 
 def _structures(image: Picture, design: xr.Dataset, px_per_mm: float | None) -> Iterator[_Tried]:
+    """Every structure of the design that differs from those before, and where it is seen."""
+    tried: list[Specimen] = []
     for name in ("cloaked", "altered", "intact"):
         specimen = of_design(as_built(design, name))
-        yield name, specimen, sight(image, specimen, px_per_mm)
+        if not any(
+            np.array_equal(specimen.ids, one.ids) and _alike(specimen, one) for one in tried
+        ):
+            tried.append(specimen)
+            yield name, specimen, sight(image, specimen, px_per_mm)
+
+
+def _alike(one: Specimen, other: Specimen) -> bool:
+    return np.array_equal(one.outline, other.outline, equal_nan=True)
 
 
 def _share(tried: _Tried) -> float:
@@ -131,7 +140,8 @@ def _marks(
 def picture(image: Picture, found: Proposal) -> Image:
     """The frame with the outlines of all units and their ids; orange where none was found."""
     scale = 2 if max(image.shape) < 1000 else 1
-    drawn = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    grey = np.asarray(image, np.uint8)
+    drawn = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
     drawn = cv2.cvtColor(drawn, cv2.COLOR_GRAY2BGR)
     seen = np.isin(np.arange(found.specimen.count), found.sighting.unit)
     for unit, number in enumerate(found.specimen.ids):

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import yaml
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.lab.setup import Virtual
-from pipeline.problem import yamlfile
-from pipeline.problem.loading import told
+from pipeline.problem.loading import section
 from pipeline.problem.quantities import Delay, Duration, Frequency, Length
 from pipeline.problem.section import Section, exactly_one
 
@@ -84,11 +83,7 @@ def load(path: Path) -> Recording:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    document = yamlfile.read(path)
-    try:
-        return Recording.model_validate(document.data)
-    except ValidationError as error:
-        raise told(error, document, document.data, None) from error
+    return section(path, Recording)
 
 
 def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:

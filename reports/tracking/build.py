@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline import cli, datasets
+from pipeline import cli, datasets, provenance
+from pipeline.errors import UserError
 from pipeline.lab.encode import encode
 from pipeline.lab.setup import Codec
 from pipeline.tracking.arrays import Image
@@ -22,6 +24,7 @@ from reports.tracking import measures, overlay
 
 def _work(args: argparse.Namespace) -> None:
     track = datasets.read(args.track, "track")
+    _check_origin(track, args.track, args.video)
     asked = Recording.model_validate_json(track.attrs["recording"], context={"sim_units": True})
     with cli.progress(track.sizes["time"], "overlay") as bar:
         kept: list[Image] = []
@@ -44,6 +47,15 @@ def _work(args: argparse.Namespace) -> None:
 
     with whole(args.out_dir / "index.html") as aside:
         aside.write_text(page.render(track, asked, found), encoding="utf-8", newline="\n")
+
+
+def _check_origin(track: xr.Dataset, path: Path, video: Path) -> None:
+    """Refuses a video that the track was not made of."""
+    if not video.exists():
+        raise UserError("no such video", file=video, remedy="check the path")
+    if json.loads(track.attrs["parents"]).get("video") != provenance.path_hash(video):
+        remedy = "give the video that was tracked, or track this one"
+        raise UserError(f"{path} was not made of this video", file=video, remedy=remedy)
 
 
 def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Frame]:

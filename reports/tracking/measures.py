@@ -22,6 +22,7 @@ _RESTING = 2.5
 """A frame shows the specimen at rest if its units are so many uncertainties from the first's."""
 _LEAST = 4
 _SAMPLES = 12
+_WHITE = 234
 
 
 class Light(NamedTuple):
@@ -173,9 +174,14 @@ def _floor(pose: Floats) -> Floats:
 
 def _light(images: Iterable[Image]) -> Light:
     rows = [
-        (*np.percentile(image, [99, 1]) / 255, (image >= 254).mean(), image.mean())
-        for image in images
+        (*np.percentile(image, [99, 1]) / 255, _clipped(image), image.mean()) for image in images
     ]
     table = np.array(rows)
     bright, dark, clipped, mean = table.mean(axis=0)
     return Light(float(bright), float(dark), float(clipped), float(table[:, 3].std() / mean))
+
+
+def _clipped(image: Image) -> float:
+    """Part of the pixels at the end of the range, which in a video may be 235."""
+    top = image.max()
+    return float((image == top).mean()) if top >= _WHITE else 0.0

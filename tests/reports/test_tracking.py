@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import datasets
+from pipeline import datasets, provenance
 from pipeline.tracking import importing
 from pipeline.tracking.video import Frame
 from reports.tracking import advice, build, measures, overlay
@@ -73,7 +74,7 @@ def grey(level: int = 120) -> np.ndarray:
 
 
 def of(track: xr.Dataset, alone: float = 1.0) -> measures.Measures:
-    return measures.measured(track, [grey(250)] * 3, Stream("ffv1", alone))
+    return measures.measured(track, [grey(230)] * 3, Stream("ffv1", alone))
 
 
 def test_measures_are_those_of_the_track(track: xr.Dataset) -> None:
@@ -135,8 +136,6 @@ def _about(place: np.ndarray) -> tuple[slice, slice]:
 
 
 def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_path: Path) -> None:
-    origin = {"problem": "{}"}
-    datasets.write(track, tmp_path / "track.nc", "track", origin)
     with av.open(str(tmp_path / "v.mkv"), "w") as container:
         stream = container.add_stream("ffv1", rate=10)
         stream.width = stream.height = 176
@@ -144,6 +143,8 @@ def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_pa
         for _ in range(FRAMES):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(grey(), format="gray")))
         container.mux(stream.encode(None))
+    origin = {"parents": json.dumps({"video": provenance.file_hash(tmp_path / "v.mkv")})}
+    datasets.write(track, tmp_path / "track.nc", "track", origin)
     made = []
     for name in ("first", "second"):
         words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
@@ -155,3 +156,14 @@ def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_pa
     with av.open(str(tmp_path / "first/overlay.mp4")) as shown:
         assert "SYNTHETIC" in shown.metadata["comment"]
         assert sum(1 for _ in shown.decode(video=0)) == FRAMES
+
+
+def test_another_video_is_refused(
+    track: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    datasets.write(track, tmp_path / "track.nc", "track", {"parents": '{"video": "abc"}'})
+    (tmp_path / "v.mkv").write_bytes(b"another")
+    words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
+    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 2
+    assert "was not made of this video" in capsys.readouterr().err
+    assert not (tmp_path / "report").exists()

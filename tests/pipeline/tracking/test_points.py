@@ -10,14 +10,9 @@ import pytest
 from pipeline import datasets, track
 from pipeline.tracking import importing
 from pipeline.tracking.specimen import of_design
+from tests.pipeline.lab.conftest import GRID
 
-GRID = {
-    "name": "g",
-    "grid": [4, 4],
-    "spacing_mm": 15.0,
-    "ligament_gap_mm": 2.3,
-    "bias_angle_deg": 20.0,
-}
+SMALL = GRID | {"grid": [4, 4]}
 ORIGIN, ROTATION = np.array([100.0, 40.0]), np.deg2rad(30.0)
 NOISE = 0.002
 AXES = "origin: [100 mm, 40 mm]\nrotation: 30 deg\nflipped: true\n"
@@ -26,7 +21,7 @@ AXES = "origin: [100 mm, 40 mm]\nrotation: 30 deg\nflipped: true\n"
 @pytest.fixture
 def export(tmp_path: Path) -> tuple[Path, np.ndarray]:
     """A YAML beside its CSV, y downwards and turned; and the motion (2, 16, 3) of the units."""
-    design = importing.design(GRID)
+    design = importing.design(SMALL)
     datasets.write(design, tmp_path / "design.nc", "design", {"problem": "{}"})
     specimen = of_design(design)
     random = np.random.default_rng(4)

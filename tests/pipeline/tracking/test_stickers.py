@@ -12,7 +12,7 @@ import pytest
 
 from pipeline import datasets, markers
 from pipeline.tracking import importing
-from tests.pipeline.tracking.test_points import GRID
+from tests.pipeline.tracking.test_points import SMALL
 
 POINT = 72 / 25.4
 
@@ -25,7 +25,7 @@ def drawn(path: Path) -> list[str]:
 
 @pytest.fixture
 def design(tmp_path: Path) -> Path:
-    datasets.write(importing.design(GRID), tmp_path / "design.nc", "design", {"problem": "{}"})
+    datasets.write(importing.design(SMALL), tmp_path / "design.nc", "design", {"problem": "{}"})
     return tmp_path / "design.nc"
 
 
