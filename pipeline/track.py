@@ -100,6 +100,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
 
     from pipeline import datasets
     from pipeline.tracking import proposal, recording
+    from pipeline.tracking.origin import WORD, rendered
     from pipeline.tracking.video import frames
     from pipeline.whole import whole
 
@@ -120,9 +121,13 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "specimen": found.kind,
         "pixel_size": f"{found.pixel_size:.4g} mm",
         "window": {"start": "0 s"},
+        "synthetic": rendered(video) or None,
     }
+    note = WORD if rendered(video) else ""
     with whole(drawn) as aside:
-        aside.write_bytes(cv2.imencode(".png", proposal.picture(first.image, found))[1].tobytes())
+        aside.write_bytes(
+            cv2.imencode(".png", proposal.picture(first.image, found, note))[1].tobytes()
+        )
     with whole(out) as aside:
         comments = ("What the first frame did not tell:", *found.doubts)
         aside.write_text(recording.text(values, comments), encoding="utf-8")
@@ -155,6 +160,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     from pipeline.tracking import loadcell, table
     from pipeline.tracking import recording as recordings
     from pipeline.tracking.dataset import dataset
+    from pipeline.tracking.origin import rendered
     from pipeline.tracking.specimen import as_built
 
     asked = recordings.load(path)
@@ -166,7 +172,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         parents["load_cell"] = path.parent / cell.file
         force = loadcell.forces(parents["load_cell"], cell, asked.window.start + track.time)
     made = dataset(design, track, force)
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    synthetic = asked.synthetic or rendered(video)
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
     table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if not args.no_report:

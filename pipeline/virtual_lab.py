@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from pipeline import cli
 from pipeline.errors import UserError
+from pipeline.tracking.origin import WORD
 
 if TYPE_CHECKING:
     from pipeline.lab.filming import Filming
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-SYNTHETIC = "SYNTHETIC: rendered from a simulation, not filmed"
+SYNTHETIC = f"{WORD}: rendered from a simulation, not filmed"
 DESCRIPTION = """\
 Film a simulated response.
 
@@ -131,7 +132,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
     film = _prepared(asked, path, response)
     title = asked.title or path.stem
-    labels = {"title": f"SYNTHETIC: {title}", "comment": SYNTHETIC}
+    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
         encode(out, film.images(bar.update), asked.virtual.rate, asked.virtual.codec, labels)
     made = truth.dataset(film.response, film.present, film.motion, film.scene.view)

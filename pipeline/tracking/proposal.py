@@ -137,8 +137,14 @@ def _marks(
     return int(cv2.connectedComponents(differs, connectivity=8)[0]) - 1
 
 
-def picture(image: Picture, found: Proposal) -> Image:
-    """The frame with the outlines of all units and their ids; orange where none was found."""
+def picture(image: Picture, found: Proposal, note: str = "") -> Image:
+    """The frame with the outlines of all units and their ids; orange where none was found.
+
+    Args:
+        image: the frame.
+        found: what it shows.
+        note: stands in its corner.
+    """
     scale = 2 if max(image.shape) < 1000 else 1
     grey = np.asarray(image, np.uint8)
     drawn = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
@@ -151,6 +157,7 @@ def picture(image: Picture, found: Proposal) -> Image:
         cv2.polylines(drawn, [outline], True, colour, 2, cv2.LINE_AA)
         x, y = _at(found.sighting.camera.project(found.specimen.centre[unit]), scale).tolist()
         _centred(drawn, str(number), (x, y), colour)
+    _centred(drawn, note, (60, 16), _MISSING)
     return np.asarray(drawn, np.uint8)
 
 

@@ -30,7 +30,10 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
     out = tmp_path / "run.mp4"
     assert render(files, recording(tmp_path), out) == 0
     (tmp_path / "load.csv").write_text("s,N\n5,0\n6,10\n", encoding="utf-8")
-    with out.with_suffix(".yaml").open("a", encoding="utf-8") as file:
+    described = out.with_suffix(".yaml").read_text(encoding="utf-8")
+    assert "synthetic: true\n" in described
+    with out.with_suffix(".yaml").open("w", encoding="utf-8") as file:
+        file.write(described.replace("synthetic: true\n", ""))  # the video itself says so
         file.write("load_cell: {file: load.csv, time: s, force: N, offset: 5}\n")
     assert track.main([str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")]) == 0
     made = datasets.read(tmp_path / "track.nc", "track")
