@@ -214,6 +214,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     Raises:
         UserError: naming the recording's file where the video does not show the design.
     """
+    from pipeline.tracking.calibrate import Setup
     from pipeline.tracking.follow import follow
     from pipeline.tracking.specimen import of_design
     from pipeline.tracking.video import frames
@@ -222,7 +223,8 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
     try:
-        track = follow(shown, of_design(design), scale)
+        setup = Setup(asked.thickness, asked.camera_distance)
+        track = follow(shown, of_design(design), scale, setup=setup)
     except UserError as error:
         if error.file is None:
             error.file = str(source)

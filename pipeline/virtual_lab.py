@@ -167,6 +167,8 @@ def _described(asked: Recording, video: Path, design: Path) -> dict[str, object]
         "case": asked.case,
         "specimen": "bare" if asked.specimen == "auto" else asked.specimen,
         "pixel_size": f"{asked.virtual.camera.pixel_size:g} mm",
+        "thickness": f"{asked.virtual.look.thickness:g} mm",
+        "camera_distance": f"{asked.virtual.camera.distance:g} mm",
         "load_axis": asked.load_axis,
         "synthetic": True,
     }

@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.tracking import camera as cameras
 from pipeline.tracking.arrays import Floats, Ints, Picture
 from pipeline.tracking.camera import Camera
+from pipeline.tracking.depth import Depth, depth_of
 from pipeline.tracking.find import Sighting, refined
 from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.patch import Templates
@@ -19,6 +20,8 @@ from pipeline.tracking.template import Grid, outlines, plane_of
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
 """Standard deviations that are tried, px."""
 _ROUNDS = 3
+_DISTANCES = (300.0, 400.0, 550.0, 750.0, 1000.0, 1350.0, 1800.0, 2500.0)
+"""Of a camera whose distance is not told, mm."""
 _USUAL_BLUR = 1.0
 _ALIKE = 1.1
 _SOME = 40
@@ -36,6 +39,7 @@ class Calibration(NamedTuple):
         blur: standard deviation of the blur at edges, mm.
         pixel: size of a pixel at the middle of the specimen, mm.
         residual: (units, 2) where the units are seen less where they should be, px.
+        depth: of thick units whose walls are of the shade of their faces.
     """
 
     camera: Camera
@@ -43,26 +47,60 @@ class Calibration(NamedTuple):
     blur: float
     pixel: float
     residual: Floats
+    depth: Depth | None
 
 
-def calibrate(image: Picture, specimen: Specimen, sighting: Sighting) -> Calibration:
+class Setup(NamedTuple):
+    """What is known of the set-up: thickness of the units and distance of the camera, mm."""
+
+    thickness: float = 0.0
+    distance: float | None = None
+
+
+def calibrate(
+    image: Picture, specimen: Specimen, sighting: Sighting, setup: Setup | None = None
+) -> Calibration:
     """Refines the camera of a sighting on the outlines of all units.
 
     The specimen is taken to be at rest where the design has it; what the units deviate from it
-    is their own tolerance and stays in the residual.
+    is their own tolerance and stays in the residual. Where the set-up tells of thick units, their
+    outlines are those of faces and walls together, if that is what the frame shows.
     """
     sighting = refined(specimen, sighting)
     pixel, gain = _pixel(specimen, sighting.camera), _gain(image, sighting)
-    grid = Grid(specimen, 1 / pixel, (3 * max(BLURS) + 2) * pixel)
-    some, plane = grid.of(_few(specimen)), plane_of(sighting.camera)
+    plane, some = plane_of(sighting.camera), _few(specimen)
 
-    def misfit(blur: float) -> float:
-        fitter = Fitter(sighting.camera, outlines(some, blur * pixel, pixel), plane)
-        return _misfit(image, fitter, gain)
+    def fitted(depth: Depth | None) -> tuple[float, float, Grid]:
+        reach = (3 * max(BLURS) + 2) * pixel + _furthest(specimen, depth)
+        grid = Grid(specimen, 1 / pixel, reach, depth)
+        few = grid.of(some)
 
-    blur = _lowest(misfit, BLURS) * pixel
-    camera, residual = _refined(image, specimen, sighting.camera, outlines(grid, blur, pixel), gain)
-    return Calibration(camera, grid, blur, pixel, residual)
+        def misfit(blur: float) -> float:
+            fitter = Fitter(sighting.camera, outlines(few, blur * pixel, pixel), plane)
+            return _misfit(image, fitter, gain)
+
+        return *_lowest(misfit, BLURS), grid
+
+    depth = None
+    least, blur, grid = fitted(None)
+    if setup is not None and setup.thickness > 0:
+        middle, told = specimen.centre.mean(axis=0), setup.distance
+        for distance in _DISTANCES if told is None else (told,):
+            thick = depth_of(sighting.camera, middle, setup.thickness, distance)
+            with_walls = fitted(thick)
+            if with_walls[0] < least:
+                depth, (least, blur, grid) = thick, with_walls
+    templates = outlines(grid, blur * pixel, pixel)
+    camera, residual = _refined(image, specimen, sighting.camera, templates, gain)
+    return Calibration(camera, grid, blur * pixel, pixel, residual, depth)
+
+
+def _furthest(specimen: Specimen, depth: Depth | None) -> float:
+    """How far a back is seen from its face, at most, mm."""
+    if depth is None:
+        return 0.0
+    offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
+    return 1.5 * float(np.linalg.norm(offset, axis=1).max())
 
 
 def oriented(image: Picture, specimen: Specimen, sightings: list[Sighting]) -> Sighting:
@@ -114,12 +152,12 @@ def _refined(
     return camera, residual
 
 
-def _lowest(misfit: Callable[[float], float], candidates: tuple[float, ...]) -> float:
-    """The candidate with the least misfit, which has one minimum: stops when it rises."""
-    best, least = candidates[0], np.inf
-    for value in candidates:
+def _lowest(misfit: Callable[[float], float], values: tuple[float, ...]) -> tuple[float, float]:
+    """The least misfit, which has one minimum, and its value: stops when it rises."""
+    least, best = np.inf, values[0]
+    for value in values:
         found = misfit(value)
         if found > least:
             break
-        best, least = value, found
-    return best
+        least, best = found, value
+    return least, best

@@ -22,6 +22,8 @@ _UPRIGHT = 10  # deg
 _NEARLY = 0.95
 _GATE = 0.25
 """How far a blob may be from where a unit is expected, at last, pitches."""
+_AREA = 3.0
+"""A camera that makes units so many times larger or smaller than told sees something else."""
 _BLOB_SIGMA = 0.2
 
 
@@ -155,6 +157,9 @@ def _matched(
         _seen(matrix, specimen.centre), centroids, _GATE * specimen.pitch * scale
     )
     camera = replace(nothing.camera, homography=matrix / matrix[2, 2])
+    areas = np.abs(np.linalg.det(camera.jacobian(specimen.centre))) / scale**2
+    if not (areas.min() > 1 / _AREA and areas.max() < _AREA):
+        return nothing
     return replace(nothing, camera=camera, unit=unit, blob=centroids[place])
 
 

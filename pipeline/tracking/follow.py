@@ -11,13 +11,14 @@ import numpy as np
 from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
 from pipeline.tracking.arrays import Floats, Ints, Picture
-from pipeline.tracking.calibrate import Calibration, calibrate, oriented
+from pipeline.tracking.calibrate import Calibration, Setup, calibrate, oriented
 from pipeline.tracking.find import Sighting, placed, sight, told
 from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
 from pipeline.tracking.tracker import Found, Tracker
 from pipeline.tracking.video import Frame
+from pipeline.tracking.walls import Walls
 
 LOG = logging.getLogger(__name__)
 
@@ -54,6 +55,7 @@ def follow(
     specimen: Specimen,
     px_per_mm: float | None = None,
     tell: Callable[[], None] | None = None,
+    setup: Setup | None = None,
 ) -> Track:
     """Tracks the specimen; what is kept of a frame are its poses, so memory hardly grows.
 
@@ -62,6 +64,7 @@ def follow(
         specimen: what they show.
         px_per_mm: roughly.
         tell: is called after each frame.
+        setup: thickness of the units and distance of the camera, where they are thick.
 
     Raises:
         UserError: no frames, or the specimen is not in the first one.
@@ -69,10 +72,11 @@ def follow(
     first = next(frames, None)
     if first is None:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
-    calibration = calibrate(first.image, specimen, sighted(first.image, specimen, px_per_mm))
+    sighting = sighted(first.image, specimen, px_per_mm)
+    calibration = calibrate(first.image, specimen, sighting, setup)
     if (lies := placed(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
-    tracker = Tracker(specimen, fitter(first.image, specimen, calibration))
+    tracker = tracker_of(first.image, specimen, calibration)
     times, numbers, poses, sigmas, qualities = [], [], [], [], []
     for frame in _all(first, frames):
         found = tracker.step(frame.image)
@@ -99,12 +103,17 @@ def follow(
     )
 
 
-def fitter(image: Picture, specimen: Specimen, calibration: Calibration) -> Fitter:
-    """Templates as a first frame shows the units, at rest."""
-    learner = Learner(calibration.grid, calibration.blur, calibration.pixel)
+def tracker_of(image: Picture, specimen: Specimen, calibration: Calibration) -> Tracker:
+    """Templates as a first frame shows the units, at rest, and what follows them."""
+    grid, blur, pixel = calibration.grid, calibration.blur, calibration.pixel
+    learner = Learner(grid, blur, pixel)
     rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
     learner.add(image, calibration.camera, rest, photometry, np.ones(specimen.count))
-    return Fitter(calibration.camera, learner.templates())
+    templates = learner.templates()
+    depth, walls = calibration.depth, None
+    if depth is not None:
+        walls = Walls(specimen, depth, grid, templates, blur, pixel)
+    return Tracker(specimen, Fitter(calibration.camera, templates), walls)
 
 
 def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:

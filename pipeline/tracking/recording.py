@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from pipeline.lab.setup import Virtual
 from pipeline.problem.loading import section
-from pipeline.problem.quantities import Delay, Duration, Frequency, Length
+from pipeline.problem.quantities import Delay, Duration, Frequency, Gap, Length
 from pipeline.problem.section import Section, exactly_one
 
 
@@ -50,6 +50,8 @@ class Recording(Section):
         specimen: what the units show; `auto` finds out.
         pixel_size: roughly, in the specimen's plane; without it, the units are looked for in
             several sizes.
+        thickness: of the units, if their side walls show: bare ones a few millimetres thick do.
+        camera_distance: from the specimen's middle; without it, thick units tell it roughly.
         frame_rate: of a folder of pictures, which have no times of their own.
         window: of time, since the file's first frame.
         load_axis: what comparisons are drawn over.
@@ -65,6 +67,8 @@ class Recording(Section):
     case: Annotated[int, Field(ge=0, strict=True)] = 0
     specimen: Literal["auto", "dots", "speckle", "bare"] = "auto"
     pixel_size: Length | None = None
+    thickness: Gap = 0.0
+    camera_distance: Length | None = None
     frame_rate: Frequency | None = None
     window: Window = Window()
     load_axis: Literal["time", "driven displacement"] = "time"

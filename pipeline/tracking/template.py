@@ -14,6 +14,7 @@ import numpy as np
 from pipeline.tracking.arrays import Floats, Ints, Picture, Singles
 from pipeline.tracking.blocks import SIZE
 from pipeline.tracking.camera import Camera
+from pipeline.tracking.depth import Depth
 from pipeline.tracking.patch import Templates
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.spline import coefficients, sample
@@ -29,6 +30,12 @@ _FAR = 1e6
 class Grid:
     """Nodes about the centroids of all units, with their distances to outline and joints.
 
+    Args:
+        specimen: the units.
+        px_per_mm: of the camera.
+        reach: how far the nodes go beyond the outlines, mm.
+        depth: of thick units; their outlines are then their silhouettes at rest.
+
     Attributes:
         step: distance of the nodes, mm.
         half: from the middle to the last node, mm.
@@ -38,7 +45,9 @@ class Grid:
         centre: (units, 2) the centroids at rest, mm.
     """
 
-    def __init__(self, specimen: Specimen, px_per_mm: float, reach: float) -> None:
+    def __init__(
+        self, specimen: Specimen, px_per_mm: float, reach: float, depth: Depth | None = None
+    ) -> None:
         self.step = 1 / (NODES_PER_PIXEL * px_per_mm)
         nodes = int(np.ceil((specimen.radius.max() + reach) / self.step)) + 3
         self.half = nodes * self.step
@@ -47,9 +56,14 @@ class Grid:
         shape = (specimen.count, *self.x.shape)
         self.inside = np.empty(shape, np.float32)
         self.joint = np.empty(shape, np.float32)
+        rest = np.zeros((specimen.count, 3))
+        back = None if depth is None else depth.offset(specimen.centre, rest)
         for unit in range(specimen.count):
             polygon = specimen.polygon(unit)
-            self.inside[unit] = self._signed_distance(polygon)
+            shown = polygon
+            if depth is not None and back is not None:
+                shown = depth.silhouette(polygon, back[unit])
+            self.inside[unit] = self.signed_distance(shown)
             ends = polygon[specimen.joined[unit, : len(polygon)]]
             self.joint[unit] = self._distance(ends)
         self.centre = specimen.centre
@@ -67,7 +81,8 @@ class Grid:
             far = np.minimum(far, np.hypot(self.x - x, self.y - y))
         return far
 
-    def _signed_distance(self, polygon: Floats) -> Floats:
+    def signed_distance(self, polygon: Floats) -> Singles:
+        """From the nodes (nodes, nodes) to a polygon about the centroid, positive inside, mm."""
         far = np.full(self.x.shape, np.inf)
         odd = np.zeros(self.x.shape, dtype=bool)
         for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
@@ -78,10 +93,10 @@ class Grid:
             if by != ay:
                 crossing = (self.y < ay) != (self.y < by)
                 odd ^= crossing & (self.x < ax + (self.y - ay) * ex / ey)
-        return np.where(odd, far, -far)
+        return np.where(odd, far, -far).astype(np.float32)
 
 
-def _smooth(value: Floats, low: float, high: float) -> Floats:
+def _smooth(value: Singles, low: float, high: float) -> Singles:
     share = np.clip((value - low) / (high - low), 0, 1)
     return share * share * (3 - 2 * share)
 
@@ -96,6 +111,25 @@ def _templates(grid: Grid, brightness: Singles, weight: Singles) -> Templates:
     return Templates(brightness, weight, grid.half, grid.step, grid.centre, np.sqrt(square), reach)
 
 
+def blurred(grid: Grid, inside: Singles, blur: float) -> Singles:
+    """What is inside, one, against what is not, zero, as the camera blurs it."""
+    sharp = np.clip(inside / grid.step + 0.5, 0, 1).astype(np.float32)
+    spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
+    return np.asarray(cv2.GaussianBlur(sharp, (0, 0), float(spread)), np.float32)
+
+
+def shown(inside: Singles, joint: Singles, blur: float, pixel: float) -> Singles:
+    """Weight of nodes in templates that are learned: what is inside, and the blurred edge.
+
+    Outside, what is near a joint moves otherwise.
+    """
+    outside = _REACH * blur + 0.5 * pixel
+    weight = _smooth(inside, -outside - pixel, -outside)
+    beyond = _smooth(-inside, -0.5 * blur, 0.5 * blur)
+    free = _smooth(joint, 3 * pixel, 4 * pixel)
+    return np.asarray(weight * (1 - beyond * (1 - free)), np.float32)
+
+
 def outlines(grid: Grid, blur: float, pixel: float) -> Templates:
     """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
 
@@ -104,14 +138,12 @@ def outlines(grid: Grid, blur: float, pixel: float) -> Templates:
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
     """
-    sharp = np.clip(grid.inside / grid.step + 0.5, 0, 1)
-    spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
-    faces = np.stack([cv2.GaussianBlur(face, (0, 0), float(spread)) for face in sharp])
+    faces = np.stack([blurred(grid, inside, blur) for inside in grid.inside])
     outside = _REACH * blur + 0.5 * pixel
     weight = _smooth(grid.inside, -outside - pixel, -outside)
     weight *= 1 - _smooth(grid.inside, outside, outside + pixel)
     weight *= _smooth(grid.joint, outside, outside + 2 * pixel)
-    return _templates(grid, faces.astype(np.float32), weight.astype(np.float32))
+    return _templates(grid, faces, weight.astype(np.float32))
 
 
 class Learner:
@@ -125,10 +157,8 @@ class Learner:
 
     def __init__(self, grid: Grid, blur: float, pixel: float) -> None:
         self._grid = grid
+        self._weight = shown(grid.inside, grid.joint, blur, pixel)
         outside = _REACH * blur + 0.5 * pixel
-        weight = _smooth(grid.inside, -outside - pixel, -outside)
-        beyond = _smooth(-grid.inside, -0.5 * blur, 0.5 * blur)
-        self._weight = weight * (1 - beyond * (1 - _smooth(grid.joint, 3 * pixel, 4 * pixel)))
         self._wanted = [
             np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))
         ]

@@ -12,6 +12,7 @@ from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.patch import Fits
 from pipeline.tracking.predict import Neighbourhood
 from pipeline.tracking.specimen import Specimen
+from pipeline.tracking.walls import Walls
 
 GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
 """Quality of a unit in a frame, and the reason why it is missing."""
@@ -52,10 +53,11 @@ class Tracker:
     Args:
         specimen: the units.
         fitter: the camera and the units' looks; the first frame is its reference.
+        walls: of thick units.
     """
 
-    def __init__(self, specimen: Specimen, fitter: Fitter) -> None:
-        self._fitter = fitter
+    def __init__(self, specimen: Specimen, fitter: Fitter, walls: Walls | None = None) -> None:
+        self._fitter, self._walls = fitter, walls
         self._pitch = specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre, self._radius = specimen.centre, specimen.radius
@@ -69,6 +71,8 @@ class Tracker:
     def step(self, image: Picture) -> Found:
         """Finds the units in the next frame."""
         ahead = self._pose + self._velocity
+        if self._walls is not None:
+            self._walls.follow(ahead)
         found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
         fits = Fits(*(values.copy() for values in found))
         first = not len(self._gain)
@@ -160,6 +164,8 @@ class Tracker:
         """
         carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
         ahead = self._pose + self._velocity
+        if self._walls is not None:
+            self._walls.follow(ahead)
         yield np.where(np.isfinite(carried), carried, ahead)
         yield ahead
         place = self._neighbours.stretched(fits.pose, good, ~good)

@@ -53,7 +53,7 @@ def calibrated(motion: Floats, sigma: Floats, centre: Floats, steady: Mask) -> F
     """
     if len(motion) < 8:
         return sigma
-    near = cKDTree(centre).query(centre, k=min(7, len(centre)))[1][:, 1:]
+    near = cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:]
     calm = _calmed(sigma)
     factors = [_factor(motion[..., dof], calm[..., dof], near, steady) for dof in range(3)]
     return calm * np.stack(factors, axis=-1)

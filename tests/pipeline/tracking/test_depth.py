@@ -1,0 +1,67 @@
+"""Thick units, filmed in the virtual lab from 1 m: their side walls show off axis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from pipeline.lab import sensor
+from pipeline.lab.faces import marks
+from pipeline.lab.scene import Scene
+from pipeline.lab.setup import Virtual
+from pipeline.lab.viewpoint import viewpoint
+from pipeline.tracking import importing
+from pipeline.tracking.calibrate import Setup
+from pipeline.tracking.depth import Depth, depth_of
+from pipeline.tracking.follow import follow
+from pipeline.tracking.specimen import of_design
+from pipeline.tracking.video import Frame
+from tests.pipeline.lab.conftest import GRID
+
+ASKED = Virtual.model_validate(
+    {"camera": {"image": [320, 320], "tilt": ["2 deg", "-1 deg"], "distortion": [0.01, 0.0]}}
+)
+MIDDLE = np.array([48.0, 40.0])  # that the camera looks at; the specimen is off axis
+
+
+def filmed(frames: int) -> tuple[Scene, list[np.ndarray], list[Frame]]:
+    specimen = of_design(importing.design({**GRID, "grid": [5, 5]}))
+    view = viewpoint(ASKED.camera, MIDDLE)
+    none = np.empty((0, 2, 2), int)
+    scene = Scene(specimen, none, marks(specimen, "bare", ASKED.look, 0), ASKED.look, view)
+    place = np.round(specimen.centre / 15)
+    sign = np.where(place.sum(axis=1) % 2 == 0, -0.3, 0.3)
+    full = np.column_stack([-0.04 * specimen.centre[:, 0], 0.02 * specimen.centre[:, 1], sign])
+    poses = [share * full for share in np.linspace(0, 1, frames)]
+    images = [sensor.frame(scene, pose[None], 0.0, k, ASKED) for k, pose in enumerate(poses)]
+    return scene, poses, [Frame(k, k / 30, image) for k, image in enumerate(images)]
+
+
+def test_walls_are_no_motion() -> None:
+    scene, poses, frames = filmed(8)
+    errors = []
+    for setup in (Setup(8.0, 1000.0), Setup()):
+        track = follow(iter(frames), scene.specimen, 1 / 0.365, setup=setup)
+        apart = (track.displacement - poses)[..., :2] / track.calibration.pixel
+        errors.append(np.sqrt(np.mean(apart**2)))
+    assert errors[0] < 0.03
+    assert errors[0] < errors[1] / 2
+
+
+def test_a_distance_tells_where_the_camera_stands() -> None:
+    view = viewpoint(ASKED.camera, MIDDLE)
+    found = depth_of(view.camera, MIDDLE, 8.0, 1000.0)
+    np.testing.assert_allclose([*found.foot, found.height], view.eye, rtol=1e-3)
+
+
+@pytest.mark.parametrize("offset", [(0.5, 0.2), (-0.4, 0.0)])
+def test_the_silhouette_of_a_convex_unit_is_the_hull_of_face_and_back(
+    offset: tuple[float, float],
+) -> None:
+    polygon = np.array([[6.0, 2.0], [-2.0, 6.0], [-6.0, -2.0], [2.0, -6.0]])
+    depth = Depth(8.0, np.zeros(2), 1000.0)
+    back = depth.shrink * polygon + offset
+    hull = shapely.convex_hull(shapely.multipoints(np.concatenate([polygon, back])))
+    made = shapely.Polygon(depth.silhouette(polygon, np.array(offset)))
+    assert shapely.area(shapely.symmetric_difference(made, hull)) < 1e-9

@@ -1,0 +1,74 @@
+"""Faults of timing and stated uncertainties, on motions that are made up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.tracking import timing, uncertainty
+
+NOISE = 0.004
+FRAMES = 60
+CENTRE = np.stack(np.meshgrid(*2 * [np.arange(8) * 15.0]), axis=-1).reshape(-1, 2)
+
+
+def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Units that swing in two shapes, and noise."""
+    random = np.random.default_rng(seed)
+    swing = np.sin(2 * np.pi * clock / 25)[:, None] * CENTRE[:, 0] / 60
+    sway = np.cos(2 * np.pi * clock / 37)[:, None] * CENTRE[:, 1] / 80
+    turn = 0.2 * swing * np.where(CENTRE.sum(axis=1) / 15 % 2 == 0, 1, -1)
+    made = np.stack([swing, sway, turn], axis=-1)
+    return made + NOISE * random.normal(size=made.shape)
+
+
+def faults(clock: np.ndarray, time: np.ndarray | None = None) -> dict[int, int]:
+    moved = motion(clock)
+    told = timing.faults(
+        np.arange(len(clock)) / 30 if time is None else time, moved, np.full(moved.shape, NOISE)
+    )
+    return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
+
+
+def test_even_frames_have_no_fault() -> None:
+    assert faults(np.arange(FRAMES, dtype=float)) == {}
+
+
+@pytest.mark.parametrize("frame", [12, 25, 40])
+def test_a_gap_is_found(frame: int) -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[frame:] += 1
+    assert faults(clock) == {frame: timing.DROPPED}
+
+
+def test_a_gap_that_the_file_tells_is_none() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[25:] += 1
+    assert faults(clock, clock / 30) == {}
+
+
+def test_frames_shown_again_are_found() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[25:] -= 1
+    moved = motion(clock)
+    moved[25] = moved[24]
+    told = timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert np.flatnonzero(told).tolist() == [25]
+    assert told[25] == timing.DUPLICATE
+
+
+def test_stated_uncertainty_is_that_of_the_noise() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
+    moved[20:30, 5] = np.nan
+    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE / 5), CENTRE, steady)
+    assert np.median(told) == pytest.approx(NOISE, rel=0.15)
+
+
+def test_units_that_are_seen_badly_say_so() -> None:
+    random = np.random.default_rng(1)
+    clock = np.arange(FRAMES, dtype=float)
+    moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
+    moved[:, 9] += 4 * NOISE * random.normal(size=moved[:, 9].shape)
+    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE), CENTRE, steady)
+    assert np.median(told[:, 9]) > 2.5 * np.median(told)
