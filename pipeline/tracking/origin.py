@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import av
-
 WORD = "SYNTHETIC"
 """Stands in the title or comment of a video that was rendered."""
 
@@ -15,6 +13,8 @@ def rendered(video: Path) -> bool:
 
     A file that cannot be read counts as filmed: reading its frames tells what is wrong.
     """
+    import av
+
     if not video.is_file():
         return False
     try:
