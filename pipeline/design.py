@@ -6,6 +6,7 @@ import argparse
 import logging
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,10 +19,14 @@ if TYPE_CHECKING:
     from pipeline.problem import Problem
     from pipeline.structures import Floats
     from sim.optimise import Evaluation, MmaOptions, Result, SqpOptions
+    from sim.optimise.problem import Evaluate
     from sim.plan import Plan
     from sim.scene import Scene
 
 LOG = logging.getLogger(__name__)
+
+CONFIRMING = 4
+"""Loads passed for each of the loss when a design's loss is confirmed."""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -109,11 +114,6 @@ def optimise(
     folder.mkdir(parents=True, exist_ok=True)
     paths = Paths(folder / f"{method}.paths")
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
-        evaluate = evaluator(scene, plan, paths)
-
-        def from_rest(x: Floats) -> tuple[float, Floats, Floats]:
-            paths.forget()
-            return evaluate(x)
 
         def show(evaluation: Evaluation) -> None:
             paths.accept(evaluation)
@@ -125,12 +125,12 @@ def optimise(
             ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
-                    journal.wrap(evaluate),
+                    journal.wrap(evaluator(scene, plan, paths)),
                     constraints,
                     np.zeros(scene.space.n_variables) if start is None else start,
                     options=_options(asked, method),
                     callback=show,
-                    confirm=from_rest if scene.static else None,
+                    confirm=_from_rest(scene, plan),
                 )
         except InfeasibleStartError as error:
             raise failures.infeasible(error, constraints, source) from error
@@ -138,6 +138,19 @@ def optimise(
             raise failures.unsolved(error, scene, "initial", plan.solver.asked, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
+
+
+def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
+    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
+
+    A path that starts from that of a similar design, or steps far, may pass where it should end.
+    """
+    from sim.evaluation import evaluator
+    from sim.statics import StaticSolver
+
+    if not isinstance(plan.solver, StaticSolver):
+        return None
+    return evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:

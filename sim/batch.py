@@ -78,7 +78,7 @@ def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
     shape = (-1, case.solver.topology.n_units, 3)
     try:
         displacement, velocity, record = solve_case(case.solver, case.values, case.drive)
-    except SimulationError as error:
+        solved = Solved(case, displacement.reshape(shape), velocity.reshape(shape), record)
+        return Outcome(measure(solved))
+    except SimulationError as error:  # of the measure too: it may simulate with finer steps
         return Outcome(None, str(error), error)
-    solved = Solved(case, displacement.reshape(shape), velocity.reshape(shape), record)
-    return Outcome(measure(solved))

@@ -73,10 +73,6 @@ class Paths:
         if evaluation.accepted and evaluation.failure is None:
             self._accepted = _name(evaluation.x)
 
-    def forget(self) -> None:
-        """Lets the next evaluations start from scratch, until one is accepted."""
-        self._accepted = None
-
 
 def _name(design: Floats) -> str:
     return hashlib.sha256(design.tobytes()).hexdigest()[:32]
