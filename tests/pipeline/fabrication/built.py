@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from pipeline.fabrication import assembly, bom, manifest, package, units
 from pipeline.fabrication.network import network
 from pipeline.fabrication.parts import Specimen
 from pipeline.problem import Problem
+from pipeline.problem.fabrication import Fabrication
+from pipeline.problem.quantities import SIM_UNITS
 from tests.pipeline.fabrication import handmade
 
 PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
@@ -52,9 +55,15 @@ def specimen(asked: Problem) -> Specimen:
     return units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
 
 
-def write(folder: Path) -> Problem:
-    """Write the package into a new folder; returns the problem that it was made with."""
-    asked = problem.load(PROBLEM)
+def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Problem:
+    """Write the package into a new folder; returns the problem that it was made with.
+
+    Args:
+        folder: of the package.
+        parameters: of fabrication, where they are not the defaults.
+    """
+    wanted = Fabrication.model_validate(parameters or {}, context=SIM_UNITS)
+    asked = problem.load(PROBLEM).model_copy(update={"fabrication": wanted})
     made = specimen(asked)
     folder.mkdir(parents=True)
     filled = package.Package(folder, made, asked, str(PROBLEM))

@@ -1,0 +1,43 @@
+"""Packages with other parameters than the defaults pass the same checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.fabrication.checks.package import check_package
+from tests.pipeline.fabrication import built
+
+OPTIONS: dict[str, dict[str, object]] = {
+    "strips, recesses, no kerf": {
+        "slots": {"direction": "ligament"},
+        "markers": {"kind": "recess", "count": 1},
+        "print": {"first_layer_inset": "0.15 mm"},
+        "laser": {"kerf": "0 mm"},
+        "shims": {"strips": True},
+        "paper": "Letter",
+    },
+    "raised dots, other sheet and bed": {
+        "slots": {"direction": "bisector"},
+        "markers": {"kind": "dots", "count": 3},
+        "print": {"bed": ["180 mm", "180 mm"]},
+        "laser": {"kerf": "0.3 mm", "sheet": ["300 mm", "200 mm"]},
+        "fillet_radius": "0.5 mm",
+        "thickness": "6 mm",
+        "material": "PMMA",
+    },
+    "other foil": {
+        "slots": {"clearance": "0.05 mm", "depth": "2.5 mm", "depth_max": "4 mm", "tip": "0.3 mm"},
+        "shims": {"thickness": "0.5 mm", "spares": 0.3},
+        "labels": {"height": "2.5 mm", "stroke": "0.3 mm"},
+        "coupon": ["0 mm", "0.1 mm"],
+    },
+}
+
+
+@pytest.mark.parametrize("name", OPTIONS)
+def test_other_parameters_make_a_right_package(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "cloaked"
+    asked = built.write(folder, OPTIONS[name]).fabrication
+    check_package(folder, built.design(), "cloaked", asked, tmp_path / "faults")
