@@ -13,12 +13,11 @@ from pipeline.fabrication.fixtures import corridors, printable
 from pipeline.fabrication.flat import cuts
 from pipeline.fabrication.font import extent, text, turned
 from pipeline.fabrication.parts import Specimen
-from pipeline.fabrication.solids import Layer, Solid, flat, pen
+from pipeline.fabrication.solids import MERGED, Layer, Solid, flat, merged, pen
 from pipeline.problem.fabrication import Fabrication
 
 _RIM, _BASE, _WALL = 6.0, 2.4, 4.0  # mm
 _PEN = 0.5  # mm
-_MERGED = 0.02  # mm by which strokes grow: two that touch in a point would leave an open mesh
 _LETTER = 4.0  # mm
 
 
@@ -53,8 +52,8 @@ def _plate(
     left, low, _, _ = tile.bounds
     title = turned(text(name, _LETTER), 0.0, (left + width / 2 + 1.5, low + height / 2 + 1.0))
     sunk = shapely.union_all([written, pen(title, _PEN)]).intersection(tile.buffer(-0.5))
-    letters = shapely.set_precision(sunk.difference(walls.buffer(2 * _MERGED)), 1e-3)
-    floor = tile.difference(letters.buffer(_MERGED, join_style="mitre"))
+    letters = shapely.set_precision(sunk.difference(walls.buffer(2 * MERGED)), 1e-3)
+    floor = tile.difference(merged(letters))
     deep = _BASE - wanted.labels.depth
     return Solid(
         name,

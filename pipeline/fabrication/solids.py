@@ -21,6 +21,8 @@ _SPECK = 1e-6  # mm^2
 _RESOLVED = 1e-4  # mm; single precision in an STL would make triangles of shorter edges collapse
 _RIM = 0.15  # mm that letters leave of the outline
 _GRID = 1e-3  # mm, of letters
+MERGED = 0.02
+"""By how much lettering grows so that its pieces do not touch in a point, mm."""
 
 
 class Layer(NamedTuple):
@@ -116,6 +118,11 @@ def pen(strokes: Strokes, width: float) -> BaseGeometry:
     return shapely.union_all(shapely.buffer(lines, width / 2, quad_segs=_PEN_QUARTER))
 
 
+def merged(area: BaseGeometry) -> BaseGeometry:
+    """An area a little larger: pieces that touch in a point would leave an open mesh."""
+    return area.buffer(MERGED, join_style="mitre")
+
+
 def discs(circles: tuple[Circle, ...], clearance: float = 0.0) -> BaseGeometry:
     """The area of circles."""
     return shapely.union_all(
@@ -133,7 +140,7 @@ def unit_solid(unit: Unit, wanted: Fabrication) -> Solid:
     )
     height, outline = unit.height, unit.outline
     rim = outline.buffer(-_RIM, join_style="mitre")  # also keeps nearly equal vertices apart
-    written = shapely.set_precision(written.intersection(rim), _GRID)
+    written = merged(shapely.set_precision(written.intersection(rim), _GRID))
     marks, dots = wanted.markers, discs(unit.markers)
     base = outline.difference(written)
     inset = wanted.print.first_layer_inset

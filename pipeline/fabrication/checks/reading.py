@@ -18,7 +18,7 @@ from pipeline.fabrication.font import text
 
 Floats = NDArray[np.float64]
 
-LEGIBLE = 0.7
+LEGIBLE = 0.6
 """Share of an id's strokes that has to be there."""
 
 _NEAR = 0.02  # mm from a stroke
@@ -40,13 +40,14 @@ def height(words: str, strokes: Sequence[Floats]) -> float | None:
     drawn = _segments(strokes)
     glyphs = [text(letter, 1.0) for letter in words]
     whole = shapely.MultiLineString([stroke for stroke in strokes if len(stroke) > 1])
+    best, most = None, LEGIBLE
     for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
-        found = _read(letters, drawn, whole, spin)
-        if found is not None and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
-            return size
-    return None
+        found, share = _read(letters, drawn, whole, spin)
+        if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
+            best, most = size, share
+    return best
 
 
 def _is_mark(rest: shapely.Geometry) -> bool:
@@ -77,20 +78,18 @@ def _ballots(drawn: Floats, known: Floats) -> list[tuple[float, float]]:
 
 def _read(
     letters: Sequence[Sequence[Floats]], drawn: Floats, whole: shapely.Geometry, spin: Floats
-) -> shapely.Geometry | None:
-    """The letters where they stand, in reading order; None if too little of them is there."""
+) -> tuple[shapely.Geometry, float]:
+    """The letters where they stand, in reading order, and the share of them that is there."""
     offers = [_spots(letter, drawn, whole) for letter in letters]
     lengths = np.array([shapely.MultiLineString(letter).length for letter in letters])
-    best, most = None, LEGIBLE
+    best, most = np.zeros((0, 2)), 0.0
     for chosen in product(*offers):
         share = float(np.dot([there for there, _ in chosen], lengths) / lengths.sum())
         spots = np.array([spot for _, spot in chosen])
-        if share >= most and _ordered(spots @ np.linalg.inv(spin)):
+        if share > most and _ordered(spots @ np.linalg.inv(spin)):
             best, most = spots, share
-    if best is None:
-        return None
-    lines = [one + at for at, letter in zip(best, letters, strict=True) for one in letter]
-    return shapely.MultiLineString(lines)
+    lines = [one + at for at, letter in zip(best, letters, strict=False) for one in letter]
+    return shapely.MultiLineString(lines), most
 
 
 def _spots(

@@ -22,6 +22,7 @@ TOLERANCE = 1e-3
 
 LEAST_LETTER = 2.0
 _KERF_TOLERANCE = 2e-3
+_READ = 0.1  # mm, to which the height of letters is read that slots cut
 _JOINED = 0.05  # mm; strokes so near to each other make one letter
 _HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
 _SVG = re.compile(r"<svg[^>]*>", re.DOTALL)
@@ -136,7 +137,7 @@ def _letters(drawing: Drawing) -> Iterator[Fault]:
                 what, remedy = "engraving beyond its outline", "give smaller letters"
                 yield _on(drawing, part, what, "labels.height", remedy, shown)
             height = _of_id(part, strokes) if units else _of_letters(written)
-            if height < LEAST_LETTER - TOLERANCE:
+            if height < LEAST_LETTER - (_READ if units else TOLERANCE):
                 what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
                 if height == 0.0:
                     what = "what is engraved does not show its id and how it stands"
