@@ -9,6 +9,7 @@ import pytest
 
 from sim.batch import Case, Outcome, Solved, run_batch
 from sim.dynamics import Drive
+from sim.errors import SimulationError
 from sim.loads import LinearRamp
 from sim.observables import observe
 from sim.statics import StaticSolver
@@ -43,6 +44,17 @@ def test_a_failed_case_is_kept_with_its_reason(threads: int) -> None:
     outcomes: list[Outcome[float]] = list(run_batch(three, largest, threads))
     assert [outcome.value is None for outcome in outcomes] == [False, True, False]
     assert "finite" in str(outcomes[1].failure)
+
+
+def test_a_case_whose_measure_finds_no_motion_has_failed() -> None:
+    def estimated(solved: Solved) -> float:
+        if largest(solved) > 0.15:
+            raise SimulationError("no equilibrium found with finer steps")
+        return largest(solved)
+
+    outcomes = list(run_batch(cases([0.1, 0.2]), estimated))
+    assert [outcome.failure for outcome in outcomes] == [None, str(outcomes[1].error)]
+    assert outcomes[1].value is None
 
 
 def test_cases_are_taken_as_cores_fall_free() -> None:
