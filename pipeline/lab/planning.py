@@ -16,6 +16,7 @@ from pipeline.lab.encode import encode
 from pipeline.lab.filming import Filming, prepared
 from pipeline.lab.setup import Codec, Virtual
 from pipeline.tracking.arrays import Floats
+from pipeline.tracking.calibrate import Setup
 from pipeline.tracking.follow import follow
 from pipeline.tracking.video import frames
 
@@ -160,10 +161,13 @@ def expected(
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
     film = prepared(response, structure, case, choice.specimen, _clip(choice.setup, count))
+    camera = choice.setup.camera
+    known = Setup(choice.setup.look.thickness, camera.distance)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"clip{choice.setup.codec.suffixes[0]}"
         encode(path, film.images(), choice.setup.rate, choice.setup.codec, {})
-        track = follow(frames(path), film.scene.specimen, 1 / choice.setup.camera.pixel_size)
+        units = film.scene.specimen
+        track = follow(frames(path), units, 1 / camera.pixel_size, setup=known)
     return _compared(film, track.displacement, track.sigma)
 
 
