@@ -39,11 +39,13 @@ def work(args: argparse.Namespace) -> None:
     design = datasets.read(args.design, "design")
     net = network(design, args.structure)
     study = args.problem.resolve().parent.name + (f"@{args.preset}" if args.preset else "")
+    pictures = args.out_dir.with_name(f"{args.out_dir.name}_faults")
+    shutil.rmtree(pictures, ignore_errors=True)
     total = 2 * len(net.numbers) + 2 + STEPS
     with cli.progress(total, f"fabrication, {args.structure}") as bar, _aside(args.out_dir) as room:
-        made = units.specimen(
-            net, asked.fabrication, (study, args.structure), args.design, bar.update
-        )
+        names = (study, args.structure)
+        with _shown(pictures):
+            made = units.specimen(net, asked.fabrication, names, args.design, bar.update)
         filled = package.Package(room, made, asked, str(args.problem), bar.update)
         package.write(filled)
         assembly.write(room / "assembly.pdf", made, asked.fabrication)
@@ -51,14 +53,26 @@ def work(args: argparse.Namespace) -> None:
             room / "bom.csv", made, asked.fabrication, asked.material.density, filled.contents
         )
         manifest.write(room, made, asked, args.design)
-        pictures = args.out_dir.with_name(f"{args.out_dir.name}_faults")
-        shutil.rmtree(pictures, ignore_errors=True)
         check_package(room, design, args.structure, asked.fabrication, pictures, bar.update)
     LOG.info("%s: %s", args.out_dir, units.summary(made))
     if made.thin:
         thinnest = min(made.thin, key=lambda label: made.thin[label])
         told = (args.out_dir, len(made.thin), THIN_WALL, made.thin[thinnest], thinnest)
         LOG.warning("%s: %d units have walls under %g mm (from %.2f mm, unit %s)", *told)
+
+
+@contextmanager
+def _shown(pictures: Path) -> Iterator[None]:
+    """Draws the unit that cannot be made into a folder, and tells of the picture."""
+    from pipeline.fabrication.checks.faults import draw
+    from pipeline.fabrication.unmade import UnmadeError
+
+    try:
+        yield
+    except UnmadeError as error:
+        path = draw(error.what, error.around, error.spot, pictures / "fault_1.png")
+        error.remedy = f"{error.remedy}; see {path}"
+        raise
 
 
 @contextmanager

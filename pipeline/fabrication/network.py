@@ -11,9 +11,9 @@ import shapely
 import xarray as xr
 from shapely import Polygon
 
-from pipeline.errors import UserError
 from pipeline.fabrication.candidates import Corner
 from pipeline.fabrication.parts import Floats, labels
+from pipeline.fabrication.unmade import UnmadeError
 
 _HAIR = 1e-6
 
@@ -93,18 +93,21 @@ def refuse_overlaps(net: Network, file: Path) -> None:
     """Check that the units of a design are simple polygons, apart from each other.
 
     Raises:
-        UserError: they are not; names the first ones and the remedy.
+        UnmadeError: they are not; names the first ones and the remedy.
     """
     polygons = [net.polygons[number] for number in net.numbers]
     for number, polygon in zip(net.numbers, polygons, strict=True):
         if not polygon.is_valid or not polygon.exterior.is_ccw:
             remedy = "design it with constraints on edges and angles"
             what = f"the outline of unit {net.labels[number]} crosses itself"
-            raise UserError(what, file=file, key="vertices", remedy=remedy)
+            lines = (polygon.exterior,)
+            raise UnmadeError(what, lines, *lines, file=file, key="vertices", remedy=remedy)
     tree = shapely.STRtree(polygons)
     for first, second in tree.query(polygons, "intersects").T:
-        if first < second and polygons[first].intersection(polygons[second]).area > _HAIR:
+        shared = polygons[first].intersection(polygons[second])
+        if first < second and shared.area > _HAIR:
             pair = " and ".join(net.labels[net.numbers[at]] for at in (first, second))
             what = f"the units {pair} overlap in the design"
             remedy = 'ask for a gap in the design, e.g. constraints.gap: "0.2 mm"'
-            raise UserError(what, file=file, key="vertices", remedy=remedy)
+            both = (polygons[first], polygons[second])
+            raise UnmadeError(what, both, shared, file=file, key="vertices", remedy=remedy)

@@ -10,13 +10,13 @@ from pathlib import Path
 import shapely
 from shapely import Polygon
 
-from pipeline.errors import UserError
 from pipeline.fabrication import lettering, markers, outlines, slots
 from pipeline.fabrication.candidates import Corner, side_truncations
 from pipeline.fabrication.joints import ligaments, shims
 from pipeline.fabrication.network import Network, corners, refuse_overlaps
 from pipeline.fabrication.parts import Slot, Specimen, Unit
 from pipeline.fabrication.slots import NoRoomError
+from pipeline.fabrication.unmade import UnmadeError
 from pipeline.problem.fabrication import Fabrication
 
 _STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the most that a unit may grow
@@ -42,7 +42,7 @@ def specimen(
         done: called after each unit.
 
     Raises:
-        UserError: units overlap, a slot or an id has no room; names the unit and what to change.
+        UnmadeError: units overlap, a slot or an id has no room; names the unit and what to change.
     """
     refuse_overlaps(net, file)
     slotted = corners(net)
@@ -78,7 +78,7 @@ def unit(
     """A unit as made, and its body without slots.
 
     Raises:
-        UserError: a slot or its id has no room.
+        UnmadeError: a slot or its id has no room.
     """
     label, design = net.labels[number], net.polygons[number]
     body, cuts = _body(design, slotted, neighbours, wanted, label, file)
@@ -87,7 +87,8 @@ def unit(
     if written is None:
         what = f"no room for the id of unit {label}"
         remedy = "ask for larger units in the design (constraints.edge_length)"
-        raise UserError(what, file=file, key="fabrication.labels.height", remedy=remedy)
+        key = "fabrication.labels.height"
+        raise UnmadeError(what, (design,), outline, file=file, key=key, remedy=remedy)
     arrow = lettering.mark(outline, body, written.box, wanted.labels)
     dots = markers.dots(outline, wanted.markers)
     grown = body.area - outlines.filleted(design, wanted.fillet_radius).area
@@ -133,7 +134,7 @@ def _body(
         held = _measured(body, chosen, wanted)
         if all(_holds(slot, wanted) for slot in held):
             return body, held
-    raise _no_slot(label, failure, wanted, file)
+    raise _no_slot(label, design, failure, wanted, file)
 
 
 def _measured(body: Polygon, chosen: Sequence[Slot], wanted: Fabrication) -> tuple[Slot, ...]:
@@ -155,7 +156,9 @@ def _holds(slot: Slot, wanted: Fabrication) -> bool:
     return grip >= wanted.slots.depth_min - _HAIR and slot.wall >= wanted.minimum_wall - _ROUNDING
 
 
-def _no_slot(label: str, failure: NoRoomError, wanted: Fabrication, file: Path) -> UserError:
+def _no_slot(
+    label: str, design: Polygon, failure: NoRoomError, wanted: Fabrication, file: Path
+) -> UnmadeError:
     where = "its slots meet" if failure.vertex is None else f"at vertex {failure.vertex}"
     what = (
         f"unit {label} is too slender for slots with walls of {wanted.minimum_wall:g} mm ({where})"
@@ -166,8 +169,12 @@ def _no_slot(label: str, failure: NoRoomError, wanted: Fabrication, file: Path) 
         f"lower it {wall}or fabrication.slots.depth_min, raise fabrication.slots.thicken, or ask"
         " for longer edges in the design (constraints.edge_length)"
     )
-    return UserError(
+    corners = [shapely.Point(corner) for corner in design.exterior.coords]
+    spot = design.exterior if failure.vertex is None else corners[failure.vertex]
+    return UnmadeError(
         what,
+        (design,),
+        spot,
         file=file,
         key="fabrication.minimum_wall",
         value=f"{wanted.minimum_wall:g} mm",

@@ -61,7 +61,12 @@ def stop(faults: Sequence[Fault], pictures: Path) -> None:
         return
     first = faults[0]
     shown = [
-        draw(fault, pictures / f"fault_{number}.png")
+        draw(
+            f"{fault.part}\n{fault.what}",
+            fault.around,
+            fault.spot,
+            pictures / f"fault_{number}.png",
+        )
         for number, fault in enumerate(faults[:PICTURES], 1)
         if fault.around
     ]
@@ -79,28 +84,28 @@ def _others(faults: Sequence[Fault]) -> str:
     return f" ({len(faults)} faults in all: {named})"
 
 
-def draw(fault: Fault, path: Path) -> Path:
+def draw(title: str, around: Sequence[Geometry], spot: Geometry | None, path: Path) -> Path:
     """A small picture of a fault: outlines in black, the spot in red, a scale in mm."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.0, 4.0), layout="constrained")
     axes = figure.add_subplot()
-    for outline in fault.around:
+    for outline in around:
         _plot(axes, outline, _INK, 1.0)
-    if fault.spot is not None:
-        _plot(axes, fault.spot, _FAULT, 2.5)
-    axes.set_title(f"{fault.part}\n{fault.what}", fontsize=7, wrap=True)
-    axes.set(aspect="equal", xlabel="mm", ylabel="mm", **_window(fault))
+    if spot is not None:
+        _plot(axes, spot, _FAULT, 2.5)
+    axes.set_title(title, fontsize=7, wrap=True)
+    axes.set(aspect="equal", xlabel="mm", ylabel="mm", **_window(around, spot))
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150, metadata={"Software": None})
     return path
 
 
-def _window(fault: Fault) -> dict[str, tuple[float, float]]:
+def _window(around: Sequence[Geometry], spot: Geometry | None) -> dict[str, tuple[float, float]]:
     """Limits around the part and its spot."""
     from shapely import MultiPolygon, box, total_bounds
 
-    shapes = [*fault.around, *([] if fault.spot is None else [fault.spot])]
+    shapes = [*around, *([] if spot is None else [spot])]
     left, low, right, high = total_bounds(
         [box(*shape.bounds) for shape in shapes or [MultiPolygon()]]
     )

@@ -92,3 +92,6 @@ def test_a_mistake_makes_one_message_and_no_package(
         assert part in told
     assert not out.exists()
     assert not list(folder.glob("fabrication/.*"))
+    picture = folder / "fabrication/cloaked_faults/fault_1.png"
+    assert picture.exists() == (name in {"overlap", "slot cuts through"})
+    assert picture.exists() == (picture.name in told)
