@@ -217,14 +217,15 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     from pipeline.tracking.calibrate import Setup
     from pipeline.tracking.follow import follow
     from pipeline.tracking.specimen import of_design
-    from pipeline.tracking.video import frames
+    from pipeline.tracking.video import frames, length
 
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
     try:
-        setup = Setup(asked.thickness, asked.camera_distance)
-        track = follow(shown, of_design(design), scale, setup=setup)
+        setup = Setup(asked.thickness, asked.camera_distance, asked.specimen)
+        with cli.progress(length(video), "tracking") as bar:
+            track = follow(shown, of_design(design), scale, bar.update, setup)
     except UserError as error:
         if error.file is None:
             error.file = str(source)

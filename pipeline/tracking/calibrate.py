@@ -51,15 +51,20 @@ class Calibration(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """What is known of the set-up: thickness of the units and distance of the camera, mm."""
+    """What is known of the set-up.
+
+    Attributes:
+        thickness: of the units, mm.
+        distance: of the camera, mm.
+        kind: what the units show: auto, dots, speckle or bare.
+    """
 
     thickness: float = 0.0
     distance: float | None = None
+    kind: str = "auto"
 
 
-def calibrate(
-    image: Picture, specimen: Specimen, sighting: Sighting, setup: Setup | None = None
-) -> Calibration:
+def calibrate(image: Picture, specimen: Specimen, sighting: Sighting, setup: Setup) -> Calibration:
     """Refines the camera of a sighting on the outlines of all units.
 
     The specimen is taken to be at rest where the design has it; what the units deviate from it
@@ -83,7 +88,7 @@ def calibrate(
 
     depth = None
     least, blur, grid = fitted(None)
-    if setup is not None and setup.thickness > 0:
+    if setup.thickness > 0:
         middle, told = specimen.centre.mean(axis=0), setup.distance
         for distance in _DISTANCES if told is None else (told,):
             thick = depth_of(sighting.camera, middle, setup.thickness, distance)

@@ -48,8 +48,8 @@ class Sighting:
 
 def placed(camera: Camera) -> str:
     """How the specimen lies in the image: upright, turned, seen from behind."""
-    along = camera.homography[:2, 0]
-    turn = round(float(np.rad2deg(np.arctan2(-along[1], along[0]))))
+    upward = camera.homography[:2, 1]
+    turn = round(float(np.rad2deg(np.arctan2(-upward[0], -upward[1]))))
     lies = f"turned by {turn} deg" if abs(turn) > _UPRIGHT else "upright"
     behind = np.linalg.det(camera.homography[:2, :2]) > 0
     return f"{lies} and mirrored, as from behind" if behind else lies

@@ -22,6 +22,7 @@ from pipeline.tracking.walls import Walls
 
 LOG = logging.getLogger(__name__)
 
+_USUAL = Setup()
 _DARK = 8.0
 _SCALE = 0.15
 _ENOUGH = 0.6
@@ -55,7 +56,7 @@ def follow(
     specimen: Specimen,
     px_per_mm: float | None = None,
     tell: Callable[[], None] | None = None,
-    setup: Setup | None = None,
+    setup: Setup = _USUAL,
 ) -> Track:
     """Tracks the specimen; what is kept of a frame are its poses, so memory hardly grows.
 
@@ -64,7 +65,7 @@ def follow(
         specimen: what they show.
         px_per_mm: roughly.
         tell: is called after each frame.
-        setup: thickness of the units and distance of the camera, where they are thick.
+        setup: what is known of it.
 
     Raises:
         UserError: no frames, or the specimen is not in the first one.
@@ -76,43 +77,45 @@ def follow(
     calibration = calibrate(first.image, specimen, sighting, setup)
     if (lies := placed(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
-    tracker = tracker_of(first.image, specimen, calibration)
+    tracker = tracker_of(first.image, specimen, calibration, setup.kind)
     times, numbers, poses, sigmas, qualities = [], [], [], [], []
     for frame in _all(first, frames):
         found = tracker.step(frame.image)
         times.append(frame.time)
         numbers.append(frame.index)
-        poses.append(found.fits.pose.copy())
+        poses.append(found.fits.pose.astype(np.float32))
         sigmas.append(_image_sigma(found))
         qualities.append(found.quality.astype(np.int8))
         if tell is not None:
             tell()
-    motion = np.array(poses)
+    motion = np.array(poses, float)
     motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
-    time, told = np.array(times) - times[0], np.array(sigmas, float)
+    time, told = np.array(times) - times[0], np.array(sigmas)
+    del poses, sigmas, tracker
     faults = timing.faults(time, motion, told)
     sigma = uncertainty.calibrated(motion, told, specimen.centre, faults == timing.STEADY)
+    sigma[~np.isfinite(motion)] = np.nan
     return Track(
         time,
         np.array(numbers),
         motion,
-        np.where(np.isfinite(motion), sigma, np.nan),
+        sigma,
         np.array(qualities),
         faults,
         calibration,
     )
 
 
-def tracker_of(image: Picture, specimen: Specimen, calibration: Calibration) -> Tracker:
+def tracker_of(image: Picture, specimen: Specimen, calibration: Calibration, kind: str) -> Tracker:
     """Templates as a first frame shows the units, at rest, and what follows them."""
     grid, blur, pixel = calibration.grid, calibration.blur, calibration.pixel
-    learner = Learner(grid, blur, pixel)
+    learner = Learner(grid, blur, pixel, kind)
     rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
     learner.add(image, calibration.camera, rest, photometry, np.ones(specimen.count))
     templates = learner.templates()
     depth, walls = calibration.depth, None
     if depth is not None:
-        walls = Walls(specimen, depth, grid, templates, blur, pixel)
+        walls = Walls(specimen, depth, grid, templates, blur, pixel, kind)
     return Tracker(specimen, Fitter(calibration.camera, templates), walls)
 
 

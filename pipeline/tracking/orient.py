@@ -27,8 +27,8 @@ def starts(points: Floats, pixels: Floats) -> list[Floats]:
     aligned = pixels @ lean
     low, high = aligned.min(axis=0), aligned.max(axis=0)
     laid = [
-        _laid(points, turn @ np.diag([1.0, flip]), low, high)
-        for flip in (-1.0, 1.0)
+        _laid(points, turn @ np.diag([side, -1.0]), low, high)
+        for side in (1.0, -1.0)
         for turn in _TURNS
     ]
     out = []

@@ -118,16 +118,21 @@ def blurred(grid: Grid, inside: Singles, blur: float) -> Singles:
     return np.asarray(cv2.GaussianBlur(sharp, (0, 0), float(spread)), np.float32)
 
 
-def shown(inside: Singles, joint: Singles, blur: float, pixel: float) -> Singles:
+def shown(inside: Singles, joint: Singles, blur: float, pixel: float, kind: str) -> Singles:
     """Weight of nodes in templates that are learned: what is inside, and the blurred edge.
 
-    Outside, what is near a joint moves otherwise.
+    Outside, what is near a joint moves otherwise. Bare units are followed by their edges alone,
+    dots and speckle without them, where the specimen's kind is not left open ("auto").
     """
     outside = _REACH * blur + 0.5 * pixel
+    if kind in ("dots", "speckle"):
+        return np.asarray(_smooth(inside, outside, outside + pixel), np.float32)
     weight = _smooth(inside, -outside - pixel, -outside)
     beyond = _smooth(-inside, -0.5 * blur, 0.5 * blur)
-    free = _smooth(joint, 3 * pixel, 4 * pixel)
-    return np.asarray(weight * (1 - beyond * (1 - free)), np.float32)
+    weight *= 1 - beyond * (1 - _smooth(joint, 3 * pixel, 4 * pixel))
+    if kind == "bare":
+        weight *= 1 - _smooth(inside, outside, outside + pixel)
+    return np.asarray(weight, np.float32)
 
 
 def outlines(grid: Grid, blur: float, pixel: float) -> Templates:
@@ -153,11 +158,12 @@ class Learner:
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
+        kind: auto, dots, speckle or bare.
     """
 
-    def __init__(self, grid: Grid, blur: float, pixel: float) -> None:
+    def __init__(self, grid: Grid, blur: float, pixel: float, kind: str) -> None:
         self._grid = grid
-        self._weight = shown(grid.inside, grid.joint, blur, pixel)
+        self._weight = shown(grid.inside, grid.joint, blur, pixel, kind)
         outside = _REACH * blur + 0.5 * pixel
         self._wanted = [
             np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))

@@ -35,7 +35,9 @@ def faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
         sigma: (frames, units, 3) standard uncertainties.
     """
     place = motion[..., :2]
-    noise = np.sqrt(np.nanmedian(sigma[..., :2] ** 2, axis=(1, 2)))
+    noise = np.array(
+        [np.nanmedian(told) if np.isfinite(told).any() else np.inf for told in sigma[..., :2]]
+    )
     out = np.full(len(motion), STEADY)
     out[_repeated(place, noise)] = DUPLICATE
     out[_late(time, place, noise, out == DUPLICATE)] = DROPPED
@@ -43,11 +45,12 @@ def faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
 
 
 def _repeated(place: Floats, noise: Floats) -> Mask:
-    steps = np.diff(place, axis=0)
     out = np.zeros(len(place), dtype=bool)
-    for step in range(2, len(steps) - 2):
-        before, after = steps[max(0, step - _BESIDE) : step], steps[step + 1 : step + 1 + _BESIDE]
-        out[step + 1] = _stands(steps[step], before, after, float(noise[step : step + 2].max()))
+    for step in range(2, len(place) - 3):
+        steps = np.diff(place[max(0, step - _BESIDE) : step + 2 + _BESIDE], axis=0)
+        now = min(step, _BESIDE)
+        before, after = steps[:now], steps[now + 1 :]
+        out[step + 1] = _stands(steps[now], before, after, float(noise[step : step + 2].max()))
     return out
 
 

@@ -79,8 +79,8 @@ class Tracker:
         if first:
             self._refer(fits)
         good = self._judged(fits, _SHARE)
-        good = self._spread(image, fits, good)
-        if not good.all():
+        if good.any():
+            good = self._spread(image, fits, good)
             good = self._uncover(image, fits, good)
         quality = self._reasons(fits, good)
         for values in fits:
@@ -129,6 +129,8 @@ class Tracker:
         photometry = self._photometry * self._brighter(fits, good)
         tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
         for _ in range(_RETRIES):
+            if good.all():
+                break
             before = int(good.sum())
             for guess in self._guesses(fits, good):
                 for least, scale in ((_SHARE, None), (_SHARE_KNOWN, tight)):

@@ -54,9 +54,11 @@ def calibrated(motion: Floats, sigma: Floats, centre: Floats, steady: Mask) -> F
     if len(motion) < 8:
         return sigma
     near = cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:]
-    calm = _calmed(sigma)
-    factors = [_factor(motion[..., dof], calm[..., dof], near, steady) for dof in range(3)]
-    return calm * np.stack(factors, axis=-1)
+    out = np.empty_like(motion)
+    for dof in range(motion.shape[2]):  # one after the other: recordings may be long
+        calm = _calmed(sigma[..., dof].astype(float))
+        out[..., dof] = calm * _factor(motion[..., dof], calm, near, steady)
+    return out
 
 
 def _calmed(sigma: Floats) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.tracking.arrays import Picture
-from pipeline.tracking.pictures import brightness, images
+from pipeline.tracking.pictures import brightness, images, pictures
 
 LOG = logging.getLogger(__name__)
 
@@ -59,6 +59,17 @@ def frames(
         raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
     shown = (Frame(index, index / rate, image) for index, image in enumerate(images(path)))
     yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
+
+
+def length(path: Path) -> int:
+    """Number of frames as the file has it, at least one; the window and faults may make it less."""
+    if path.is_dir():
+        return len(pictures(path))
+    try:
+        with av.open(str(path)) as container:
+            return max([1, *(stream.frames for stream in container.streams.video)])
+    except (av.FFmpegError, FileNotFoundError):
+        return 1
 
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:

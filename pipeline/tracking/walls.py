@@ -26,6 +26,7 @@ class Walls:
         templates: as learned at rest.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
+        kind: auto, dots, speckle or bare.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class Walls:
         templates: Templates,
         blur: float,
         pixel: float,
+        kind: str,
     ) -> None:
         self._specimen, self._depth, self._grid = specimen, depth, grid
-        self._blur, self._pixel, self._templates = blur, pixel, templates
+        self._blur, self._pixel, self._kind, self._templates = blur, pixel, kind, templates
         self._offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
         rest = np.stack([blurred(grid, inside, blur) for inside in grid.inside])
         self._contrast = _contrasts(rest, templates)
@@ -54,7 +56,7 @@ class Walls:
             drawn = self._contrast[unit] * blurred(self._grid, inside, self._blur)
             self._templates.brightness[unit] = self._board[unit] + drawn
             self._templates.weight[unit] = shown(
-                inside, self._grid.joint[unit], self._blur, self._pixel
+                inside, self._grid.joint[unit], self._blur, self._pixel, self._kind
             )
             self._offset[unit] = offset[unit]
 

@@ -1,0 +1,86 @@
+"""Videos as they should not be: what can be tracked of them is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.errors import UserError
+from pipeline.tracking import importing
+from pipeline.tracking.find import placed
+from pipeline.tracking.follow import follow
+from pipeline.tracking.specimen import Specimen, of_design
+from pipeline.tracking.video import Frame, frames
+from tests.pipeline.tracking.conftest import CLIPS
+
+SCALE = 2.74
+
+
+@pytest.fixture(scope="module")
+def specimen() -> Specimen:
+    return of_design(importing.design(importing.description(CLIPS / "f_silhouette.yaml")))
+
+
+@pytest.fixture(scope="module")
+def clip() -> list[np.ndarray]:
+    return [frame.image for frame in frames(CLIPS / "f_silhouette.mp4")][:4]
+
+
+def timed(images: list[np.ndarray]) -> list[Frame]:
+    return [Frame(index, index / 300, image) for index, image in enumerate(images)]
+
+
+def test_units_are_found_again_after_a_black_frame(
+    specimen: Specimen, clip: list[np.ndarray]
+) -> None:
+    shown = timed([*clip[:2], np.zeros_like(clip[0]), *clip[2:]])
+    track = follow(iter(shown), specimen, SCALE)
+    assert np.isnan(track.displacement[2]).all()
+    assert (track.quality[2] != 0).all()
+    assert (track.quality[3:] == 0).all()
+
+
+def test_a_video_from_behind_has_the_same_motions(
+    specimen: Specimen, clip: list[np.ndarray]
+) -> None:
+    plain = follow(iter(timed(clip)), specimen, SCALE)
+    mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in clip]
+    behind = follow(iter(timed(mirrored)), specimen, SCALE)
+    assert "mirrored" in placed(behind.calibration.camera)
+    apart = behind.displacement - plain.displacement
+    assert np.sqrt(np.mean(apart[..., :2] ** 2)) / plain.calibration.pixel < 0.01
+
+
+def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[np.ndarray]) -> None:
+    for number, image in enumerate(clip):
+        path = tmp_path / f"frame{number + 8}.tif"
+        assert cv2.imwrite(str(path), image.astype(np.uint16) * 257)
+    read = list(frames(tmp_path, rate=50.0))
+    assert [frame.time for frame in read] == [0.0, 0.02, 0.04, 0.06]
+    np.testing.assert_allclose(read[3].image, clip[3], atol=1e-3)
+
+
+def test_pictures_without_a_rate_or_of_another_size_are_told(
+    tmp_path: Path, clip: list[np.ndarray], caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(UserError, match="no pictures"):
+        list(frames(tmp_path, rate=1.0))
+    cv2.imwrite(str(tmp_path / "a1.png"), clip[0])
+    cv2.imwrite(str(tmp_path / "a2.png"), clip[1][:50])
+    with pytest.raises(UserError, match="no times"):
+        list(frames(tmp_path))
+    assert len(list(frames(tmp_path, rate=1.0))) == 1
+    assert "changes its size after 1 frames" in caplog.text
+
+
+def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(
+    tmp_path: Path,
+) -> None:
+    whole = (CLIPS / "c_rigid_lossless.mkv").read_bytes()
+    broken = tmp_path / "broken.mkv"
+    broken.write_bytes(whole[: len(whole) * 2 // 3])
+    read = list(frames(broken))
+    assert 0 < len(read) < 6
