@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 LEGIBLE = 0.6
 """Share of an id's strokes that has to be there."""
 
+_WHOLE = 0.98  # of the strokes, with which no better reading is looked for
 _NEAR = 0.02  # mm from a stroke
 _SAMPLE = 0.1  # mm
 _HEIGHTS = (1.9, 12.0)  # mm, of letters
@@ -47,6 +48,8 @@ def height(words: str, strokes: Sequence[Floats]) -> float | None:
         found, share = _read(letters, drawn, whole, spin)
         if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
             best, most = size, share
+        if most > _WHOLE:
+            break
     return best
 
 
