@@ -4,15 +4,17 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
+PRODUCTS := $(foreach product,fabrication recordings,$(addsuffix _$(product),$(STUDIES)))
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(STUDIES) $(addsuffix _fabrication,$(STUDIES))
+.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(STUDIES) $(PRODUCTS)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make fig2_fabrication   drawings, meshes and papers of what is built: results/fig2/fabrication"
+	@echo "make fig2_recordings    videos of the specimens, tracked: results/fig2/recordings"
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
@@ -41,8 +43,8 @@ setup: .venv/requirements.lock
 $(STUDIES): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
-# what a lab builds of a study: make fig2_fabrication
-$(addsuffix _fabrication,$(STUDIES)): setup
+# what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings
+$(PRODUCTS): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
 # a study with a preset: make fig2@edge3
