@@ -1,0 +1,42 @@
+"""Pictures of a real specimen: bare units of 24 x 16 on a bright board, with their overlays."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from pipeline.tracking import importing
+from pipeline.tracking.find import blobs, placed, sight
+from pipeline.tracking.specimen import Specimen, of_design
+from tests.pipeline.lab.conftest import GRID
+from tests.pipeline.tracking.conftest import CLIPS
+
+PIXEL = 0.365 / 0.66  # mm: of the camera, and of the picture made smaller
+
+
+def specimen() -> Specimen:
+    return of_design(importing.design({**GRID, "grid": [24, 16]}))
+
+
+def picture(name: str) -> np.ndarray:
+    return np.asarray(cv2.imread(str(CLIPS / f"real/{name}.png"), cv2.IMREAD_GRAYSCALE))
+
+
+def test_units_at_rest_are_found_in_their_places() -> None:
+    shown = specimen()
+    found = sight(picture("focusing_ref_frame_overlay_contours"), shown, None)[0]
+    assert not found.bright
+    assert len(found.unit) > 0.8 * shown.count
+    assert placed(found.camera) == "upright"
+    area = np.abs(np.linalg.det(found.camera.jacobian(shown.centre)))
+    np.testing.assert_allclose(np.sqrt(np.median(area)), 1 / PIXEL, rtol=0.05)
+    apart = found.camera.project(shown.centre[found.unit]) - found.blob
+    assert np.sqrt(np.mean(apart**2)) * PIXEL < 0.1 * shown.pitch
+
+
+def test_most_units_in_motion_stand_apart() -> None:
+    shown = specimen()
+    image = picture("focusing_dynamic_frame_overlay_quads")
+    found = blobs(image, shown, 1 / PIXEL, bright=False)
+    assert 0.6 * shown.count < len(found) < 1.1 * shown.count
+    assert (np.ptp(found, axis=0) > 0.7 * np.ptp(shown.centre, axis=0) / PIXEL).all()
