@@ -10,6 +10,7 @@ from pipeline.fabrication.font import turned
 from pipeline.fabrication.parts import Floats
 
 _STEP = 0.35  # mm
+_GRID = 1e-6  # mm
 
 
 def room_for(
@@ -42,7 +43,10 @@ def spots(
     rim = np.asarray(box_at(box, angle, (0.0, 0.0)).exterior.coords)
     rim = np.concatenate([rim[:-1], (rim[:-1] + rim[1:]) / 2])
     copies = [affinity.translate(outline, -x, -y) for x, y in rim]
-    region = shapely.intersection_all(copies)
+    try:
+        region = shapely.intersection_all(copies)
+    except shapely.GEOSException:  # it gives up where copies nearly coincide
+        region = shapely.intersection_all(shapely.set_precision(copies, _GRID))
     if region.area == 0.0:
         return np.empty((0, 2))
     nearest = shapely.get_coordinates(shapely.shortest_line(region, target))[0]

@@ -22,7 +22,7 @@ from pipeline.problem.fabrication import Fabrication
 _STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the most that a unit may grow
 _NEAR = 3.0  # mm; farther neighbours never matter
 _HAIR = 1e-6
-_ROUNDING = 1e-3  # mm, of outlines as they are made
+_ROUNDING = 3e-3  # mm, of outlines as they are made
 
 
 def specimen(
