@@ -125,7 +125,7 @@ def _advance(
         predicted = _length(motion, work.saved, system)
         found, smooth = _settle(motion, predicted, wanted, absolute, system, work, counts)
         if found and not smooth and allowed * ahead <= SMALLEST_SMOOTH:
-            found, _ = _stabilise(motion, wanted, absolute, system, work, counts)
+            found, _ = _stabilise(motion, relative, absolute, system, work, counts)
             smooth = jumped = True
         if found and smooth:
             done = 1.0 if last else done + allowed * ahead
@@ -134,7 +134,7 @@ def _advance(
         else:
             motion[:] = work.saved
             increment = 0.25 * allowed * ahead
-            usable = factorise_shifted(motion, system, work, counts) >= 0
+            usable = factorise_shifted(motion, system, work, counts) >= 0.0
             if increment < SMALLEST_INCREMENT or not usable:
                 return done, increment, jumped
     return done, increment, jumped

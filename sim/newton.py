@@ -16,11 +16,13 @@ from sim.potential import admissible_step, gradient, tangent
 from sim.system import System, Workspace
 
 KEEP_FROM_BARRIER = 0.9
-MAX_CORRECTIONS = 60
+MAX_CORRECTIONS = 200
 MAX_BACKTRACKS = 30
 MAX_SHIFTS = 40
 FIRST_SHIFT = 1e-4
 """Of an indefinite tangent, over the median axial stiffness: a few ligaments may be far stiffer."""
+SMALLER_SHIFT = 0.125
+"""Over the last one that did, where the next trial of shifts begins."""
 KEEP_FACTOR, RENEW_FACTOR = 1e-2, 0.1
 """A step that reduces the residual by more than the one has a factor worth keeping, until a step
 reduces it by less than the other."""
@@ -59,18 +61,34 @@ def factorise_tangent(
 
 
 @compiled
-def factorise_shifted(motion: Floats, system: System, work: Workspace, counts: Ints) -> int:
-    """Factor of the tangent, shifted if need be; returns the shifts tried, -1 if none helped."""
+def _factorise(
+    motion: Floats, system: System, work: Workspace, first: float, counts: Ints
+) -> float:
+    """Factor of the tangent, shifted by ``first`` or more if need be; returns the shift.
+
+    It is negative if none helped.
+    """
     shift = 0.0
     for tries in range(MAX_SHIFTS):
         if factorise_tangent(motion, system, work, shift, counts):
-            return tries
+            return shift
         if tries == 0:
             counts[SHIFTED] += 1
-            shift = FIRST_SHIFT * np.median(system.net.law[:, 0])
+            shift = first
         else:
             shift *= 4.0
-    return -1
+    return -1.0
+
+
+@compiled
+def factorise_shifted(motion: Floats, system: System, work: Workspace, counts: Ints) -> float:
+    """Factor of the tangent, shifted if need be; returns the shift, negative if none helped."""
+    return _factorise(motion, system, work, _first_shift(system), counts)
+
+
+@compiled
+def _first_shift(system: System) -> float:
+    return FIRST_SHIFT * float(np.median(system.net.law[:, 0]))
 
 
 @compiled
@@ -120,25 +138,27 @@ def correct(
     """Newton descent at fixed held dofs; True once the residual is below its tolerance."""
     energy, residual, reaction = balance(motion, system, work)
     counts[GRADIENTS] += 1
-    keep, shifts = False, 0
+    keep, shift, first = False, 0.0, _first_shift(system)
     for _ in range(MAX_CORRECTIONS):
         if residual <= max(relative * reaction, absolute):
             return True
         if not keep:
-            shifts = factorise_shifted(motion, system, work, counts)
-            if shifts < 0:
+            shift = _factorise(motion, system, work, first, counts)
+            if shift < 0.0:
                 return False
+            if shift > 0.0:  # the smallest that does leads furthest
+                first = SMALLER_SHIFT * shift
         solve_free(system, work)
         before = residual
         length, energy, residual, reaction = _descend(
-            motion, energy, residual, shifts == 0, system, work, counts
+            motion, energy, residual, shift == 0.0, system, work, counts
         )
         if length == 0.0:
             if not keep:
                 return False
             energy, residual, reaction = balance(motion, system, work)
         limit = RENEW_FACTOR if keep else KEEP_FACTOR
-        keep = shifts == 0 and length == 1.0 and residual < limit * before
+        keep = shift == 0.0 and length == 1.0 and residual < limit * before
     return False
 
 
@@ -149,7 +169,7 @@ def leave_saddle(motion: Floats, system: System, work: Workspace, counts: Ints) 
     That is the lowest mode of the tangent, by inverse iteration; of its two senses the one whose
     largest component is positive.
     """
-    if factorise_shifted(motion, system, work, counts) < 1:
+    if factorise_shifted(motion, system, work, counts) <= 0.0:
         return
     for i in range(len(system.dofs)):
         d = system.dofs[i]

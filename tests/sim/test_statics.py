@@ -182,6 +182,17 @@ def test_a_straight_chain_buckles_and_says_so() -> None:
     assert (lateral[first:] > 1.0).all()
 
 
+@pytest.mark.parametrize("length", [21, 81])
+def test_a_long_chain_finds_its_way_out_of_a_branch_that_ends(length: int) -> None:
+    """Its lowest modes are so soft that the energy is all but flat where they set in."""
+    squares = quads(length, 1, 15.0, 2.25, 0.0)
+    drive = LinearRamp(-0.4 * length, 1.0)
+    rig = Rig(squares, np.array([0]), np.array([length - 1]), drive)
+    record = StaticSolver(rig.topology, np.linspace(0.1, 1.0, 10)).forward(rig.values, rig.drive)[2]
+    np.testing.assert_array_equal(record.stable, 1)
+    assert record.jumped.sum() == 1
+
+
 def bowed() -> Rig:
     """A chain pushed together with its middle to one side, which then moves to the other side.
 
