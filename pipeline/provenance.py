@@ -74,7 +74,11 @@ def path_hash(path: Path) -> str:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hex."""
+    """SHA-256 of a file's bytes, or of the names and bytes of a folder's files, in hex."""
+    if path.is_dir():
+        inside = sorted(each for each in path.iterdir() if each.is_file())
+        listed = "".join(f"{each.name} {file_hash(each)}\n" for each in inside)
+        return hashlib.sha256(listed.encode()).hexdigest()
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -42,3 +42,16 @@ def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     provenance.package_versions.cache_clear()
     assert provenance.package_versions()["no-such-package"] == "absent"
     provenance.package_versions.cache_clear()
+
+
+def test_the_hash_of_a_folder_goes_by_names_and_contents(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        folder.mkdir()
+        (folder / "0.png").write_bytes(b"one")
+        (folder / "1.png").write_bytes(b"two")
+    assert provenance.file_hash(first) == provenance.file_hash(second)
+    (second / "1.png").rename(second / "2.png")
+    renamed = provenance.file_hash(second)
+    (second / "2.png").write_bytes(b"other")
+    assert len({provenance.file_hash(first), renamed, provenance.file_hash(second)}) == 3
