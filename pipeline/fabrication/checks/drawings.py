@@ -20,7 +20,6 @@ from pipeline.errors import UserError
 from pipeline.fabrication.checks.faults import BUG
 
 if TYPE_CHECKING:
-    from ezdxf.document import Drawing as Document
     from ezdxf.entities.dxfentity import DXFEntity
 
 Array = NDArray[np.float64]
@@ -147,13 +146,6 @@ def read_svg(path: Path) -> Drawing:
         for c, colour in found
     )
     return Drawing(path, curves, colours, size=size)
-
-
-def document_of(path: Path) -> Document:
-    """The DXF document itself, for those who damage it on purpose."""
-    from ezdxf import recover
-
-    return recover.readfile(path)[0]
 
 
 def _of_dxf(entity: DXFEntity) -> Curve:
