@@ -9,7 +9,7 @@ import xarray as xr
 
 from pipeline.problem import Problem
 from reports import measures
-from reports.facts import Fact, number, percent, share, worded
+from reports.facts import Fact, number, percent, share, within
 
 JUMPED = 2
 """Flag of a stable state that the path came to by a jump."""
@@ -44,6 +44,15 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         yield number(f"kkt_{method}", f"KKT residual, {name}", residual, digits=2)
 
 
+def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
+    """What the solver's tolerance leaves of errors."""
+    for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
+        value = float(response[key].max())
+        yield Fact(
+            key, f"Estimated error of the {label}", value, "1", within(value, "1", 2), note=note
+        )
+
+
 def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     """Margins of the constraints, gaps and overlaps of the design at rest."""
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
@@ -72,19 +81,21 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
         touching = int(part["contact_pairs"].isel(time=-1).max())
         label = f"Pairs in contact, {name}"
         yield number(f"contact_pairs_{name}", label, touching, note="at the end of the path")
-        yield from _stability(name, part)
+        yield from stability_facts(name, part)
         yield _shim_strain(problem, name, part)
 
 
-def _stability(name: str, part: xr.Dataset) -> Iterator[Fact]:
+def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
+    """Equilibria of a structure (its name in words) that are not stable, or reached by a jump."""
     flags = part["stability"].values
+    key = name.replace(" ", "_")
     if (flags >= 0).any():
         label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
         note = f"of {flags.size}; where the tangent is not positive definite"
-        yield number(f"unstable_{name}", label, count, note=note)
+        yield number(f"unstable_{key}", label, count, note=note)
         label, count = f"Jumps to another branch, {name}", int((flags == JUMPED).sum())
         note = "loads reached only past a limit point or a branching"
-        yield number(f"jumps_{name}", label, count, note=note)
+        yield number(f"jumps_{key}", label, count, note=note)
 
 
 def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
@@ -132,7 +143,7 @@ def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
             continue
         note = (
             f"{percent(loss / float(as_run['loss']) - 1)} against the run; units at equal loads "
-            f"within {worded(float(found['departure']), 'mm', 2)}; "
+            f"{within(float(found['departure']), 'mm', 2)} apart; "
             f"{int(found['contact_pairs'])} pairs in contact at full load"
         )
         yield number(f"check_{key}", f"Loss, cloaked, {name}", loss, unit, digits=3, note=note)

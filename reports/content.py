@@ -42,6 +42,7 @@ def page(
     by_key = {fact.key: fact for fact in facts}
     return Page(
         title=study.problem.title or study.name,
+        targets=[study.target],
         lead=study.problem.doc.strip(),
         credit=words.credit,
         figure_title=words.figure_title,

@@ -76,6 +76,11 @@ def grouped(group: str, facts: Iterable[Fact]) -> list[Fact]:
     return [replace(fact, group=group) for fact in facts]
 
 
+def within(value: float, unit: str, digits: int) -> str:
+    """Wording of an error (not negative): one too small to mean more is told as a bound."""
+    return worded(value, unit, digits) if value >= 1e-9 else f"below {worded(1e-9, unit, 1)}"
+
+
 def worded(value: float, unit: str, digits: int) -> str:
     """Number and unit as they are printed; tiny rounding leftovers are zero."""
     text = "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"

@@ -25,9 +25,13 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Page:
-    """What a page shows. `caption` is HTML; `player` is reports.player's payload."""
+    """What a page shows.
+
+    `caption` is HTML; `player` is reports.player's payload; `targets` build the studies shown.
+    """
 
     title: str
+    targets: Sequence[str]
     lead: str
     credit: str
     figure_title: str

@@ -63,6 +63,7 @@ class Study:
     """
 
     name: str
+    preset: str | None
     problem: Problem
     datasets: dict[Output, xr.Dataset]
     files: dict[str, str]
@@ -76,6 +77,11 @@ class Study:
             UserError: the drive is not harmonic.
         """
         return scene.of(self.problem)
+
+    @property
+    def target(self) -> str:
+        """What builds the study, and the name of its folder of results."""
+        return self.name if self.preset is None else f"{self.name}@{self.preset}"
 
     @property
     def design(self) -> xr.Dataset:
@@ -130,6 +136,7 @@ def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
         _check_problem(chosen, name, data, files[name])
     return Study(
         name=path.resolve().parent.name,
+        preset=preset,
         problem=chosen,
         datasets=read,
         files={f"{kind}.nc": provenance.file_hash(files[kind]) for kind in wanted},

@@ -222,6 +222,4 @@ def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
         note="cloaked, all load cases and times",
     )
     note = "relative, by step halving; the largest of all load cases"
-    for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
-        value = float(response[key].max())
-        yield number(key, f"Estimated error of the {label}", value, digits=2, note=note)
+    yield from checks.error_facts(response, note)

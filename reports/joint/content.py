@@ -78,6 +78,7 @@ def page(
         headline.append(replace(by_key[key], label=label))
     return Page(
         title=asked.title or ", ".join(map(figure.heading, studies)),
+        targets=[study.target for study in studies],
         lead=asked.doc.strip(),
         credit=credit(studies),
         figure_title=asked.title,

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from reports.checks import stability_facts
 from reports.facts import Fact, number, percent, share, worded
 from reports.path import measures
 from reports.path.course import structures
@@ -78,6 +79,7 @@ def _again(study: Study, again: Again) -> Iterator[Fact]:
     gap = worded(float(part["min_gap"].min()), "mm", 2)
     note = f"the most of all loads, by geometry; smallest gap {gap}"
     yield number("second_overlaps", "Its overlapping pairs", int(part["overlaps"].max()), note=note)
+    yield from stability_facts("second design", part)
     history = again.design.isel(method=0)
     violation = float(history["violation"].isel(evaluation=int(history["best_evaluation"])))
     label = "Its largest constraint violation"

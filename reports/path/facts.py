@@ -120,10 +120,7 @@ def loss_facts(study: Study) -> Iterator[Fact]:
         label = f"Loss, {display_name(study.problem, name).lower()}"
         yield number(f"loss_{key}", label, value, unit, digits=3)
     yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
-    for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
-        value = float(study.response[key].max())
-        note = "relative; the largest of all structures"
-        yield number(key, f"Estimated error of the {label}", value, digits=2, note=note)
+    yield from checks.error_facts(study.response, "relative; the largest of all structures")
 
 
 def contraction_facts(study: Study, path: Course) -> Iterator[Fact]:

@@ -92,6 +92,8 @@ def test_wording_of_numbers() -> None:
     assert facts.worded(-0.25, "mm", 3) == "−0.25 mm"
     assert facts.worded(1.234e-7, "1", 2) == "1.2 × 10⁻⁷"
     assert facts.worded(1e-12, "mm", 3) == "0 mm"
+    assert facts.within(1e-12, "mm", 2) == "below 1 × 10⁻⁹ mm"
+    assert facts.within(0.012, "mm", 2) == "0.012 mm"
     assert facts.percent(0.8512) == "85.1 %"
 
 

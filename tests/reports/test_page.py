@@ -53,7 +53,7 @@ def test_links_lead_somewhere(html: str, report: Path) -> None:
     for href in links.hrefs.values():
         if href.startswith("#"):
             assert href[1:] in links.ids
-        elif href != "../fabrication/index.html":  # which a target of its own makes
+        elif not href.endswith("/fabrication/index.html"):  # which a target of its own makes
             assert href.startswith("data:") or (report / href).is_file()
 
 

@@ -168,6 +168,7 @@ def test_the_second_design_is_told_of_and_drawn(shield: Study) -> None:
     assert values(shield)["second_design"].ours == "optimised again, 6 evaluations"
     assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
     assert values(shield)["second_overlaps"].value == 1
+    assert values(shield)["jumps_second_design"].value == 0
     measure = made(shield).axes[-3]
     assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
     assert "dashed" in content.caption(shield)
