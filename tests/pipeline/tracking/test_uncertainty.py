@@ -1,0 +1,98 @@
+"""Stated uncertainties on motions that are made up, with noise that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.tracking import uncertainty
+from pipeline.tracking.arrays import Floats
+
+SIDE = 15
+PLACES = [(10.0 * i, 10.0 * j) for j in range(SIDE) for i in range(SIDE)]
+CENTRE = np.array(PLACES, np.float64)
+SIGN = 1.0 - 2.0 * (CENTRE.sum(axis=1) / 10 % 2)
+HONEST = (0.8, 1.25)
+
+
+def _made(motion: Floats, noise: Floats, told: float, seed: int) -> Floats:
+    """Errors over sigma (frames - 1, units, 3), of motions (frames, units).
+
+    The image tells the noise too small by a factor, but that of the first frame, the reference's.
+    """
+    random = np.random.default_rng(seed)
+    by_unit = random.uniform(0.7, 1.4, len(CENTRE))
+    error = noise[:, None, None] * by_unit[:, None] * random.normal(size=(*motion.shape, 3))
+    image = np.broadcast_to((by_unit / told)[:, None], error.shape) * np.median(noise)
+    error -= image[0] * random.normal(size=error[0].shape)
+    error[0] = 0.0
+    steady = np.ones(len(motion), bool)
+    sigma = uncertainty.calibrated(motion[..., None] + error, image, CENTRE, steady)
+    return np.asarray(error[1:] / sigma[1:])
+
+
+def _rough(frames: int, seed: int = 1) -> Floats:
+    """Neighbours turn against each other, and each by its own amount; several such shapes."""
+    random = np.random.default_rng(seed)
+    time = np.linspace(0.0, 1.0, frames)
+    amplitude = np.stack([40 * time, 6 * np.sin(5 * time), 1.5 * np.sin(9 * time)], axis=1)
+    shape = np.stack([SIGN * random.uniform(0.2, 1.8, SIGN.size), *random.normal(size=(2, 225))])
+    return np.asarray(amplitude @ shape)
+
+
+@pytest.mark.parametrize("told", [1.0, 2.5, 5.0])
+def test_rough_shapes_of_a_cloaked_structure_are_motion(told: float) -> None:
+    standard = _made(_rough(80), np.full(80, 0.05), told, 2)
+    spread = standard.std(axis=(0, 1))
+    assert (spread > HONEST[0]).all()
+    assert (spread < HONEST[1]).all()
+
+
+def test_smooth_shapes_are_motion_however_small() -> None:
+    smooth = np.sin(np.linspace(0, 6, 60))[:, None] * np.cos(CENTRE[:, 0] / 60) * 0.2
+    standard = _made(smooth, np.full(60, 0.05), 2.5, 3)
+    spread = standard.std(axis=(0, 1))
+    assert (spread > HONEST[0]).all()
+    assert (spread < HONEST[1]).all()
+
+
+def test_what_noise_drifts_by_at_rest_is_no_motion() -> None:
+    random = np.random.default_rng(4)
+    drift = np.cumsum(0.02 * random.normal(size=(40, len(CENTRE), 3)), axis=0)
+    image = np.full_like(drift, 0.05)
+    sigma = uncertainty.calibrated(drift, image, CENTRE, np.ones(40, bool))
+    spread = (drift / sigma).std(axis=(0, 1))
+    assert (spread > 0.7).all()
+    assert (spread < 1.5).all()
+
+
+def test_a_long_recording_at_rest_in_its_beginning_is_judged_by_parts() -> None:
+    noise = np.r_[np.full(450, 0.02), np.full(450, 0.1)]
+    motion = np.concatenate([np.zeros((450, len(CENTRE))), _rough(450)])
+    standard = _made(motion, noise, 2.0, 6)
+    for part in (standard[:440], standard[460:]):
+        assert HONEST[0] < part.std() < HONEST[1]
+
+
+@pytest.mark.parametrize("frames", [8, 12, 15])
+def test_few_frames_understate_nothing(frames: int) -> None:
+    standard = _made(_rough(frames), np.full(frames, 0.05), 2.5, 7)
+    assert 0.4 < standard.std() < HONEST[1]
+
+
+def test_too_few_frames_get_a_usual_multiple_of_the_image_s_figure() -> None:
+    image = np.full((5, len(CENTRE), 3), 0.01)
+    sigma = uncertainty.calibrated(np.zeros_like(image), image, CENTRE, np.ones(5, bool))
+    assert (sigma > 2 * image).all()
+    assert (sigma < 3 * image).all()
+
+
+def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
+    frames = 500
+    motion = _rough(frames)[..., None] + np.zeros(3)
+    error = 0.05 * np.random.default_rng(8).normal(size=motion.shape)
+    motion, image = motion + error, np.full(motion.shape, 0.02)
+    motion[250:], image[250:] = np.nan, np.nan
+    sigma = uncertainty.calibrated(motion, image, CENTRE, np.ones(frames, bool))
+    assert HONEST[0] < (error / sigma)[:250].std() < HONEST[1]
+    assert np.isnan(sigma[250:]).all()
