@@ -58,19 +58,10 @@ def recorded(recording: str, parents: Mapping[str, Path], *, synthetic: bool) ->
     return {
         "recording": recording,
         "synthetic": "yes" if synthetic else "no",
-        "parents": _json({name: path_hash(path) for name, path in parents.items()}),
+        "parents": _json({name: file_hash(path) for name, path in parents.items()}),
         "packages": _json(dict(package_versions())),
         "git_commit": git_commit(),
     }
-
-
-def path_hash(path: Path) -> str:
-    """SHA-256 of a file, or of the names and hashes of a folder's files, in hex."""
-    if not path.is_dir():
-        return file_hash(path)
-    files = (each for each in sorted(path.iterdir()) if each.is_file())
-    digests = "".join(f"{each.name} {file_hash(each)}\n" for each in files)
-    return hashlib.sha256(digests.encode()).hexdigest()
 
 
 def file_hash(path: Path) -> str:

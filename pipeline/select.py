@@ -35,12 +35,14 @@ def work(args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
 
     asked = problem.load(args.problem, args.preset)
+    methods = {
+        problem.section_hash(asked, "design", name): name for name in asked.optimiser.methods.chosen
+    }
     designs = {}
     for path in args.designs:
         design = datasets.read(path, "design_method")
-        method = path.stem.removeprefix("design_")
-        wanted = problem.section_hash(asked, "design", method)
-        if design.attrs["problem_hash"] != wanted:
+        method = methods.get(design.attrs["problem_hash"])
+        if method is None:
             raise UserError(
                 "the design is of another problem",
                 file=path,

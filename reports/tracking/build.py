@@ -53,7 +53,7 @@ def _check_origin(track: xr.Dataset, path: Path, video: Path) -> None:
     """Refuses a video that the track was not made of."""
     if not video.exists():
         raise UserError("no such video", file=video, remedy="check the path")
-    if json.loads(track.attrs["parents"]).get("video") != provenance.path_hash(video):
+    if json.loads(track.attrs["parents"]).get("video") != provenance.file_hash(video):
         remedy = "give the video that was tracked, or track this one"
         raise UserError(f"{path} was not made of this video", file=video, remedy=remedy)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import datasets, design, simulate
+from pipeline import datasets, design, select, simulate
 from pipeline.structures import present_ligaments
 from sim.arrays import Floats
 from sim.dynamics import Drive
@@ -48,6 +48,14 @@ def test_from_problem_to_response(hole: list[str], tmp_path: Path) -> None:
     work = np.trapezoid(moved["drive_force"].sel(xy="x").values, push, axis=-1)
     energy = (moved["strain_energy"] + moved["contact_energy"]).values[..., -1]
     np.testing.assert_allclose(work, energy, rtol=0.02)
+
+
+def test_a_design_is_known_whatever_its_file_is_called(hole: list[str], tmp_path: Path) -> None:
+    made = Path(hole[1]).with_name("design_sqp.nc")
+    renamed = tmp_path / "mine.nc"
+    renamed.write_bytes(made.read_bytes())
+    assert select.main([*hole, str(tmp_path / "d.nc"), "--designs", str(renamed)]) == 0
+    assert datasets.read(tmp_path / "d.nc", "design").attrs["shipped_method"] == "sqp"
 
 
 @pytest.fixture
