@@ -159,18 +159,27 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
     from pipeline.tracking import loadcell, table
     from pipeline.tracking import recording as recordings
-    from pipeline.tracking.dataset import dataset
+    from pipeline.tracking.dataset import dataset, is_driven
     from pipeline.tracking.origin import rendered
     from pipeline.tracking.specimen import as_built
 
     asked = recordings.load(path)
     video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
+    if asked.load_axis == "driven displacement" and not is_driven(design).any():
+        remedy = "write `load_axis: time`, or give the design of a study with driven units"
+        raise UserError(
+            "the design has no driven units",
+            file=path,
+            key="load_axis",
+            value=asked.load_axis,
+            remedy=remedy,
+        )
     track = followed(asked, design, video, path)
     parents, force = {"design": source, "video": video}, None
     if (cell := asked.load_cell) is not None:
         parents["load_cell"] = path.parent / cell.file
-        force = loadcell.forces(parents["load_cell"], cell, asked.window.start + track.time)
+        force = loadcell.forces(parents["load_cell"], cell, track.start + track.time)
     made = dataset(design, track, force)
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)

@@ -357,6 +357,13 @@ _TRACK: Table = {
     "load_force": Variable(
         ("time",), "N", "force of the load cell, where there was one", gaps=True
     ),
+    "drive_displacement": Variable(
+        ("time", "xy"),
+        "mm",
+        "displacement of the driven units, mean of those that are seen",
+        gaps=True,
+        coordinate=True,
+    ),
     "camera_homography": Variable(
         ("row", "column"),
         "px, mm",

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets import TABLES
-from pipeline.tracking.arrays import Floats
+from pipeline.tracking.arrays import Floats, Mask
 from pipeline.tracking.follow import Track
 
 _MOTION = ("time", "unit", "dof")
@@ -44,13 +44,28 @@ def dataset(design: xr.Dataset, track: Track, force: Floats | None = None) -> xr
 
 
 def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
-    """Variables of a track with the labels of the design's units."""
+    """Variables of a track with the labels of the design's units, and how far these are driven."""
     coordinates = {
         **{name: design[name] for name in ("unit", "i", "j", "xy")},
         "time": (("time",), time),
         "dof": (("dof",), ["ux", "uy", "theta"]),
     }
-    return xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
+    made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
+    driven = made["displacement"].values[:, is_driven(design), :2]
+    return made.assign_coords(drive_displacement=(("time", "xy"), _mean(driven)))
+
+
+def is_driven(design: xr.Dataset) -> Mask:
+    """Which units (units,) of the design are driven."""
+    flag = TABLES["design"]["support"].flags["driven"]
+    return np.asarray(design["support"].values == flag)
+
+
+def _mean(motion: Floats) -> Floats:
+    """Mean (frames, 2) over those of the units (frames, units, 2) that are seen; NaN without."""
+    seen = np.isfinite(motion[..., :1])
+    total = np.where(seen, motion, 0.0).sum(axis=1)
+    return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
 
 
 def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:

@@ -33,7 +33,8 @@ class Track(NamedTuple):
     """Motions of the units of a specimen.
 
     Attributes:
-        time: (frames,) s.
+        time: (frames,) since the first of them, s.
+        start: time of that one since the file's first frame, s.
         frame: (frames,) numbers in the file.
         displacement: (frames, units, 3) from the first frame on, mm and rad, NaN where missing.
         sigma: the standard uncertainties, likewise.
@@ -43,6 +44,7 @@ class Track(NamedTuple):
     """
 
     time: Floats
+    start: float
     frame: Ints
     displacement: Floats
     sigma: Floats
@@ -97,6 +99,7 @@ def follow(
     sigma[~np.isfinite(motion)] = np.nan
     return Track(
         time,
+        times[0],
         np.array(numbers),
         motion,
         sigma,

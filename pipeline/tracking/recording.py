@@ -54,7 +54,7 @@ class Recording(Section):
         camera_distance: from the specimen's middle; without it, thick units tell it roughly.
         frame_rate: of a folder of pictures, which have no times of their own.
         window: of time, since the file's first frame.
-        load_axis: what comparisons are drawn over.
+        load_axis: what courses are drawn over; a track holds both.
         load_cell: forces logged beside it.
         synthetic: whether the video was rendered, not filmed.
     """

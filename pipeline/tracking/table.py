@@ -8,9 +8,11 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets import TABLES
+from pipeline.tracking.arrays import Floats
 from pipeline.whole import whole
 
 _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
+_LOADS = ("load_N", "drive_x_mm", "drive_y_mm")
 
 
 def write(track: xr.Dataset, path: Path) -> None:
@@ -21,7 +23,8 @@ def write(track: xr.Dataset, path: Path) -> None:
     """
     flags = TABLES["track"]["quality"].flags
     names = {value: name for name, value in flags.items()}
-    quality, forces = track["quality"].values, track["load_force"].values
+    quality, drive = track["quality"].values, track["drive_displacement"].values
+    loads = np.column_stack([track["load_force"].values, drive])
     numbers = np.concatenate([track["displacement"].values, track["sigma"].values], axis=-1)
     labels = [
         f"{unit},{i},{j}"
@@ -31,13 +34,13 @@ def write(track: xr.Dataset, path: Path) -> None:
     with whole(path) as aside, aside.open("w", encoding="utf-8", newline="\n") as file:
         if track.attrs["synthetic"] == "yes":
             file.write("# SYNTHETIC: of a rendered video\n")
-        file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, "load_N", "quality"]) + "\n")
+        file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"]) + "\n")
         for frame, time in enumerate(track["time"].values):
+            load = _cells(loads[frame])
             for unit in there:
-                values = ",".join(_cell(value) for value in numbers[frame, unit])
-                told = f"{_cell(forces[frame])},{names[int(quality[frame, unit])]}"
-                file.write(f"{time:.9g},{labels[unit]},{values},{told}\n")
+                told = f"{load},{names[int(quality[frame, unit])]}"
+                file.write(f"{time:.9g},{labels[unit]},{_cells(numbers[frame, unit])},{told}\n")
 
 
-def _cell(value: float) -> str:
-    return "" if np.isnan(value) else f"{value:.7g}"
+def _cells(values: Floats) -> str:
+    return ",".join("" if np.isnan(value) else f"{value:.7g}" for value in values)

@@ -24,8 +24,8 @@ _REASONS = {
 _SIZE, _TOP = 50.0, 9.0
 
 
-def figure(track: xr.Dataset, found: Measures) -> Figure:
-    """Maps above, courses below."""
+def figure(track: xr.Dataset, found: Measures, load_axis: str) -> Figure:
+    """Maps above, courses below: over time, or over the displacement of the driven units."""
     drawn = style.page(132.0)
     specimen = of_track(track)
     there = np.isin(track["unit"].values, specimen.ids)
@@ -46,7 +46,7 @@ def figure(track: xr.Dataset, found: Measures) -> Figure:
         bar = style.place(drawn, left + _SIZE - 3.0, _TOP + 12.0, 1.8, _SIZE - 24.0)
         drawn.colorbar(shown, cax=bar)
     _arrows(drawn.axes[0], specimen, residual)
-    _courses(drawn, track, found, sigma * scale)
+    _courses(drawn, track, found, sigma * scale, _axis(track, load_axis))
     return drawn
 
 
@@ -82,31 +82,47 @@ def _arrows(axes: Axes, specimen: Specimen, residual: np.ndarray) -> None:
     )
 
 
-def _courses(drawn: Figure, track: xr.Dataset, found: Measures, sigma: np.ndarray) -> None:
-    time = track["time"].values
+def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:
+    """What the courses are drawn over (frames,), and its label."""
+    if load_axis == "time":
+        return track["time"].values, "time, s"
+    moved = track["drive_displacement"].values
+    far = np.nan_to_num(np.linalg.norm(moved, axis=1))
+    direction = moved[far.argmax()] / max(far.max(), 1e-9)
+    return moved @ direction, "displacement of the driven units, mm"
+
+
+def _courses(
+    drawn: Figure,
+    track: xr.Dataset,
+    found: Measures,
+    sigma: np.ndarray,
+    axis: tuple[np.ndarray, str],
+) -> None:
+    load, label = axis
     style.letter(drawn, 2.0, 66.0, "d", "Units that are lost, by reason")
     axes = style.place(drawn, 14.0, 73.0, 70.0, 47.0)
     for name, share in zip(found.reasons, found.lost.T, strict=True):
         if share.any():
-            label = name.replace("_", " ")
-            axes.plot(time, 100 * share, color=_REASONS[name], label=label, drawstyle="steps-mid")
+            reason = name.replace("_", " ")
+            axes.plot(load, 100 * share, color=_REASONS[name], label=reason, drawstyle="steps-mid")
     if found.lost.any():
         axes.legend(loc="best")
     else:
         axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
-    axes.set(xlabel="time, s", ylabel="of the units, %", ylim=(0, None))
+    axes.set(xlabel=label, ylabel="of the units, %", ylim=(0, None))
     style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
     axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)
     place = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2)
     with np.errstate(all="ignore"):
         low, middle, high = np.nanpercentile(place, [5, 50, 95], axis=1)
-    axes.fill_between(time, low, high, color=style.PALE, linewidth=0)
-    axes.plot(time, middle, color=style.INTACT)
+    axes.fill_between(load, low, high, color=style.PALE, linewidth=0)
+    axes.plot(load, middle, color=style.INTACT)
     if np.isfinite(found.floor[0]):
         floor = float(np.hypot(*found.floor[:2]) / np.sqrt(2))
-        axes.plot([time[0], time[found.resting - 1]], [floor, floor], color=style.ALTERED)
-        axes.annotate("scatter at rest", (time[found.resting - 1], floor), color=style.ALTERED)
+        axes.plot([load[0], load[found.resting - 1]], [floor, floor], color=style.ALTERED)
+        axes.annotate("scatter at rest", (load[found.resting - 1], floor), color=style.ALTERED)
     for flag, colour in ((1, style.ALTERED), (2, style.CLOAKED)):
-        for moment in time[track["timing"].values == flag]:
+        for moment in load[track["timing"].values == flag]:
             axes.axvline(moment, color=colour, linewidth=0.5)
-    axes.set(xlabel="time, s", ylabel="px", ylim=(0, None))
+    axes.set(xlabel=label, ylabel="px", ylim=(0, None))

@@ -39,14 +39,14 @@ def render(track: xr.Dataset, asked: Recording, found: Measures) -> str:
         synthetic=track.attrs["synthetic"] == "yes",
         advice=advice.advice(found),
         lines=list(_lines(track, found)),
-        svg=_drawn(track, found),
+        svg=_drawn(track, found, asked.load_axis),
         sources=sorted((key, str(value)) for key, value in track.attrs.items()),
     )
 
 
-def _drawn(track: xr.Dataset, found: Measures) -> str:
+def _drawn(track: xr.Dataset, found: Measures, load_axis: str) -> str:
     with style.styled():
-        made = figure.figure(track, found)
+        made = figure.figure(track, found, load_axis)
         held = io.StringIO()
         made.savefig(held, format="svg", metadata={"Creator": "metacloak", "Date": None})
     text = held.getvalue()

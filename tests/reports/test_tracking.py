@@ -57,6 +57,7 @@ def track() -> xr.Dataset:
         },
         {
             **{name: design[name] for name in ("unit", "i", "j", "xy")},
+            "drive_displacement": (("time", "xy"), np.full((FRAMES, 2), np.nan)),
             "time": (motion[:1], np.arange(FRAMES) / 10),
             "dof": (motion[2:], ["ux", "uy", "theta"]),
         },

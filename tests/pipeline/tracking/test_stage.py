@@ -85,3 +85,40 @@ def test_a_key_without_its_unit_is_refused(
 ) -> None:
     changed(recording, "pixel_size: 0.365 mm", "pixel_size: 0.365")
     assert "pixel_size" in refused(recording, capsys)
+
+
+def test_the_load_cell_runs_on_the_clock_of_the_file_whatever_the_window(recording: Path) -> None:
+    log = recording.with_name("load.csv")
+    log.write_text("time,force\n100,0\n101,1000\n", encoding="utf-8")
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}\n")
+    out = recording.with_name("track.nc")
+    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    made = datasets.read(out, "track")
+    assert made["frame"].values[0] == 2
+    np.testing.assert_allclose(made["load_force"], 1000 * made["frame"] / 300, atol=0.02)
+
+
+def test_a_track_holds_the_displacement_of_the_driven_units(recording: Path) -> None:
+    path = recording.with_name("f_silhouette_design.nc")
+    design = datasets.read(path, "design")
+    driven = design["support"].copy()
+    driven[[112, 113]] = 2
+    origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
+    datasets.write(design.assign(support=driven), path, "design", origin)
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("load_axis: driven displacement\n")
+    out = recording.with_name("track.nc")
+    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    made = datasets.read(out, "track")
+    mean = made["displacement"].isel(unit=[112, 113], dof=[0, 1]).mean("unit")
+    np.testing.assert_allclose(made["drive_displacement"], mean.values, atol=1e-9)
+    assert "drive_displacement" in made.coords
+
+
+def test_without_driven_units_there_is_no_such_axis(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("load_axis: driven displacement\n")
+    assert "the design has no driven units" in refused(recording, capsys)
