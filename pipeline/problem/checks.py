@@ -126,7 +126,11 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     room = margin + min(x - min(across), y - min(up), max(across) - x, max(up) - y)
     shape = "disc" if region.disc is not None else "ring"
     key = "radius" if shape == "disc" else "outer"
-    if outer > room:
+    if room < 0:
+        what = f"the centre of the {' '.join(keys)} lies outside the lattice"
+        extent = f"{max(across):g} by {max(up):g} mm"
+        yield Finding(what, (*keys, shape, "centre"), f"the outermost sites span {extent}")
+    elif outer > room:
         what = f"{keys[0]} of radius {outer:g} mm reaches beyond the lattice"
         remedy = f"keep it within {room:g} mm of its centre ({x:g}, {y:g}) mm"
         yield Finding(what, (*keys, shape, key), remedy)
@@ -140,18 +144,23 @@ def _regions(problem: Problem) -> Findings:
         yield from _region_fits(problem, problem.void, ("void",))
     if problem.inclusion is not None:
         yield from _region_fits(problem, problem.inclusion.region, ("inclusion", "region"))
+    yield from _interest(problem)  # before the cloak, which may lie around it
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"
         yield Finding(what, ("cloak",), "enlarge it, or move its centre")
+
+
+def _interest(problem: Problem) -> Findings:
     if isinstance(problem.objective.region, Region):
         yield from _region_fits(problem, problem.objective.region, ("objective", "region"))
-    if not interest_units(problem):
-        what = "no unit lies in the region of interest"
-        if problem.objective.region == "surroundings":
-            yield Finding(what, ("cloak",), "leave units outside it")
-        else:
-            yield Finding(what, ("objective", "region"), "enlarge it, or move its centre")
+    if interest_units(problem):
+        return
+    what = "no unit lies in the region of interest"
+    if problem.objective.region == "surroundings":
+        yield Finding(what, ("cloak",), "leave units outside it")
+    else:
+        yield Finding(what, ("objective", "region"), "enlarge it, or move its centre")
 
 
 def _void(problem: Problem) -> Findings:

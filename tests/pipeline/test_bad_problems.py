@@ -100,6 +100,13 @@ ROWS = "  rows: 15\n"
             "cloak.disc.radius",
             "within 17.5 mm",
         ),
+        (
+            "centre: centre",
+            "centre: [105 mm, 1 m]",
+            "the centre of the cloak lies outside the lattice",
+            "cloak.disc.centre",
+            "span 210 by 210 mm",
+        ),
         ("radius: 67.5 mm", "radius: 10 mm", "no unit lies in the cloak", "cloak", "enlarge it"),
         (
             "  disc:\n    centre: centre\n    radius: 67.5 mm",
