@@ -40,6 +40,7 @@ class Calibration(NamedTuple):
         pixel: size of a pixel at the middle of the specimen, mm.
         residual: (units, 2) where the units are seen less where they should be, px.
         depth: of thick units whose walls are of the shade of their faces.
+        bright: whether the units are brighter than what is behind them.
     """
 
     camera: Camera
@@ -48,6 +49,7 @@ class Calibration(NamedTuple):
     pixel: float
     residual: Floats
     depth: Depth | None
+    bright: bool
 
 
 class Setup(NamedTuple):
@@ -97,7 +99,7 @@ def calibrate(image: Picture, specimen: Specimen, sighting: Sighting, setup: Set
                 depth, (least, blur, grid) = thick, with_walls
     templates = outlines(grid, blur * pixel, pixel)
     camera, residual = _refined(image, specimen, sighting.camera, templates, gain)
-    return Calibration(camera, grid, blur * pixel, pixel, residual, depth)
+    return Calibration(camera, grid, blur * pixel, pixel, residual, depth, sighting.bright)
 
 
 def _furthest(specimen: Specimen, depth: Depth | None) -> float:

@@ -14,6 +14,7 @@ from pipeline.tracking.arrays import Floats, Ints, Picture
 from pipeline.tracking.calibrate import Calibration, Setup, calibrate, oriented
 from pipeline.tracking.find import Sighting, placed, sight, told
 from pipeline.tracking.fitting import Fitter
+from pipeline.tracking.recovery import Recovery
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
 from pipeline.tracking.tracker import Found, Tracker
@@ -119,7 +120,8 @@ def tracker_of(image: Picture, specimen: Specimen, calibration: Calibration, kin
     depth, walls = calibration.depth, None
     if depth is not None:
         walls = Walls(specimen, depth, grid, templates, blur, pixel, kind)
-    return Tracker(specimen, Fitter(calibration.camera, templates), walls)
+    recovery = Recovery(specimen, calibration.camera, calibration.bright)
+    return Tracker(specimen, Fitter(calibration.camera, templates), recovery, walls)
 
 
 def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:

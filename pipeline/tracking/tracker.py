@@ -11,6 +11,7 @@ from pipeline.tracking.arrays import Floats, Ints, Mask, Picture
 from pipeline.tracking.fitting import Fitter
 from pipeline.tracking.patch import Fits
 from pipeline.tracking.predict import Neighbourhood
+from pipeline.tracking.recovery import Recovery
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.walls import Walls
 
@@ -31,6 +32,8 @@ _NOISIER = 4.0
 _STRAY = 0.25
 """A unit so far from where its neighbours carry it is another one, or none, pitches."""
 _TIGHT = 6.0
+_FEW = 0.9
+"""Where so much less units are found than in the frame before, the specimen may have jumped."""
 _ROUNDS = 40
 _RETRIES = 4
 
@@ -53,11 +56,14 @@ class Tracker:
     Args:
         specimen: the units.
         fitter: the camera and the units' looks; the first frame is its reference.
+        recovery: finds the lattice where prediction fails.
         walls: of thick units.
     """
 
-    def __init__(self, specimen: Specimen, fitter: Fitter, walls: Walls | None = None) -> None:
-        self._fitter, self._walls = fitter, walls
+    def __init__(
+        self, specimen: Specimen, fitter: Fitter, recovery: Recovery, walls: Walls | None = None
+    ) -> None:
+        self._fitter, self._recovery, self._walls = fitter, recovery, walls
         self._pitch = specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre, self._radius = specimen.centre, specimen.radius
@@ -67,6 +73,7 @@ class Tracker:
         self._limit = np.empty(0)
         self._noise = np.empty(0)
         self._usual = np.zeros(specimen.count)
+        self._seen = 0
 
     def step(self, image: Picture) -> Found:
         """Finds the units in the next frame."""
@@ -79,13 +86,15 @@ class Tracker:
         if first:
             self._refer(fits)
         good = self._judged(fits, _SHARE)
-        if good.any():
-            good = self._spread(image, fits, good)
-            good = self._uncover(image, fits, good)
+        good = self._completed(image, fits, good)
+        jumped = good.sum() < _FEW * self._seen
+        if jumped:
+            fits, good = self._recovered(image, fits, good)
+        self._seen = int(good.sum())
         quality = self._reasons(fits, good)
         for values in fits:
             values[~good] = np.nan
-        self._remember(fits, good, first)
+        self._remember(fits, good, first or jumped)
         return Found(fits, quality)
 
     def _refer(self, fits: Fits) -> None:
@@ -106,6 +115,20 @@ class Tracker:
             fitting = fits.noise / np.abs(gain) < self._limit
         seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
+
+    def _completed(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+        """Looks for what is missing, where the good ones say."""
+        if not good.any():
+            return good
+        return self._uncover(image, fits, self._spread(image, fits, good))
+
+    def _recovered(self, image: Picture, fits: Fits, good: Mask) -> tuple[Fits, Mask]:
+        """Tries all units anew where the lattice is found; keeps what is more."""
+        again, new = Fits(*(values.copy() for values in fits)), np.zeros_like(good)
+        for guess in self._recovery.guesses(image, self._pose):
+            new = self._tried(image, again, new, (guess, self._photometry, None, _SHARE))
+        new = self._completed(image, again, new)
+        return (again, new) if new.sum() > good.sum() else (fits, good)
 
     def _spread(self, image: Picture, fits: Fits, good: Mask) -> Mask:
         """Tries the units that were not found where their neighbours would have carried them."""
@@ -194,16 +217,16 @@ class Tracker:
         reasons[good] = GOOD
         return reasons
 
-    def _remember(self, fits: Fits, good: Mask, first: bool) -> None:
+    def _remember(self, fits: Fits, good: Mask, still: bool) -> None:
         carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
         lost = np.where(np.isfinite(carried), carried, self._pose)
         pose = np.where(good[:, None], fits.pose, lost)
-        self._velocity = np.where(good[:, None] & (not first), pose - self._pose, 0.0)
+        self._velocity = np.where(good[:, None] & (not still), pose - self._pose, 0.0)
         self._photometry = np.where(
             good[:, None], fits.photometry, self._photometry * self._brighter(fits, good)
         )
         relative = fits.noise / np.abs(fits.photometry[:, 0])
-        if not first:
+        if not still:
             self._usual = np.where(good, relative, self._usual)
         self._pose = pose
 

@@ -84,3 +84,16 @@ def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(
     broken.write_bytes(whole[: len(whole) * 2 // 3])
     read = list(frames(broken))
     assert 0 < len(read) < 6
+
+
+def test_a_specimen_that_jumped_is_found_again(specimen: Specimen, clip: list[np.ndarray]) -> None:
+    """By half the distance of two units, where a neighbour is as near as the unit itself."""
+    moved = cv2.getRotationMatrix2D((384, 384), 21.0, 1.0) + np.array([[0, 0, -9.0], [0, 0, 17.0]])
+    jumped = cv2.warpAffine(clip[0], moved, (768, 768), borderValue=205)
+    track = follow(iter(timed([clip[0], jumped])), specimen, SCALE)
+    camera, pose = track.calibration.camera, track.displacement[1]
+    wanted = camera.project(specimen.centre) @ moved[:, :2].T + moved[:, 2]
+    seen = camera.project(specimen.centre + pose[:, :2])
+    inside = ((wanted > 20) & (wanted < 747)).all(axis=1)
+    assert (track.quality[1:, inside] == 0).all()
+    assert np.abs(seen - wanted)[inside].max() < 0.5
