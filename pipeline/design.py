@@ -135,7 +135,8 @@ def optimise(
         except InfeasibleStartError as error:
             raise failures.infeasible(error, constraints, source) from error
         except SimulationError as error:
-            raise failures.unsolved(error, scene, "initial", plan.solver.asked, None) from error
+            tried = failures.Simulated(source, scene, "initial", plan.solver.asked)
+            raise failures.unsolved(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 

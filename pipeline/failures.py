@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,21 +31,27 @@ def infeasible(error: InfeasibleStartError, constraints: Constraints, source: Pa
     )
 
 
-def unsolved(
-    error: SimulationError, scene: Scene, name: str, asked: NDArray[np.float64], kept: Path | None
-) -> UserError:
+class Simulated(NamedTuple):
+    """What was to be simulated: a structure of a problem file at solver times (n_asked,)."""
+
+    source: Path
+    scene: Scene
+    name: str
+    asked: NDArray[np.float64]
+
+
+def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> UserError:
     """A structure's motion could not be followed to its end.
 
     Args:
         error: the solver's.
-        scene: the structure's.
-        name: the structure's.
-        asked: (n_asked,) the solver's output times or load parameters.
+        tried: what was to be simulated; times of a static structure are load parameters.
         kept: the dataset that holds what was computed, if there is one.
     """
-    what = f"the {name} structure cannot be simulated"
+    scene = tried.scene
+    what = f"the {tried.name} structure cannot be simulated"
     if scene.static and error.step is not None:
-        reached = 0.0 if error.step == 0 else float(asked[error.step - 1])
+        reached = 0.0 if error.step == 0 else float(tried.asked[error.step - 1])
         driven = np.stack(
             [np.asarray(motion(np.array([reached])))[0, :2] for motion in scene.motions]
         )
@@ -58,4 +64,4 @@ def unsolved(
     remedy = "lower drive.amplitude, or ask for solver.accuracy: tight"
     if kept is not None:
         remedy += f"; all up to there is in {kept}"
-    return UserError(f"{what}: {error}", remedy=remedy)
+    return UserError(f"{what}: {error}", file=tried.source, key="drive.amplitude", remedy=remedy)

@@ -55,10 +55,9 @@ def work(args: argparse.Namespace) -> None:
         made, plans = response_dataset(asked, structures, args.threads)
     except StoppedError as stopped:
         kept = _keep(asked, structures, stopped, args)
-        where = structures[stopped.name].scene
-        raise failures.unsolved(
-            stopped.error, where, stopped.name, stopped.asked, kept
-        ) from stopped
+        scene = structures[stopped.name].scene
+        tried = failures.Simulated(args.problem, scene, stopped.name, stopped.asked)
+        raise failures.unsolved(stopped.error, tried, kept) from stopped
     origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
 

@@ -127,7 +127,7 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     shape = "disc" if region.disc is not None else "ring"
     key = "radius" if shape == "disc" else "outer"
     if room < 0:
-        what = f"the centre of the {' '.join(keys)} lies outside the lattice"
+        what = f"the centre of the {' '.join(map(str, keys))} lies outside the lattice"
         extent = f"{max(across):g} by {max(up):g} mm"
         yield Finding(what, (*keys, shape, "centre"), f"the outermost sites span {extent}")
     elif outer > room:
