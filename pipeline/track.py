@@ -232,7 +232,9 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
     try:
-        setup = Setup(asked.thickness, asked.camera_distance, asked.specimen)
+        setup = Setup(
+            asked.thickness, asked.camera_distance, asked.specimen, asked.turned, asked.mirrored
+        )
         with cli.progress(length(video), "tracking") as bar:
             track = follow(shown, of_design(design), scale, bar.update, setup)
     except UserError as error:

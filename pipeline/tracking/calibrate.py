@@ -13,7 +13,7 @@ from pipeline.tracking.camera import Camera
 from pipeline.tracking.depth import Depth, depth_of
 from pipeline.tracking.find import Sighting, refined
 from pipeline.tracking.fitting import Fitter
-from pipeline.tracking.patch import Templates
+from pipeline.tracking.patch import Fits, Templates
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Grid, outlines, plane_of
 
@@ -41,6 +41,7 @@ class Calibration(NamedTuple):
         residual: (units, 2) where the units are seen less where they should be, px.
         depth: of thick units whose walls are of the shade of their faces.
         bright: whether the units are brighter than what is behind them.
+        outlines: how these were fitted, from where the design has them.
     """
 
     camera: Camera
@@ -50,6 +51,7 @@ class Calibration(NamedTuple):
     residual: Floats
     depth: Depth | None
     bright: bool
+    outlines: Fits
 
 
 class Setup(NamedTuple):
@@ -59,11 +61,15 @@ class Setup(NamedTuple):
         thickness: of the units, mm.
         distance: of the camera, mm.
         kind: what the units show: auto, dots, speckle or bare.
+        turned: how far the specimen is turned in the picture, counter-clockwise, rad.
+        mirrored: whether it is seen from behind.
     """
 
     thickness: float = 0.0
     distance: float | None = None
     kind: str = "auto"
+    turned: float | None = None
+    mirrored: bool | None = None
 
 
 def calibrate(image: Picture, specimen: Specimen, sighting: Sighting, setup: Setup) -> Calibration:
@@ -98,8 +104,8 @@ def calibrate(image: Picture, specimen: Specimen, sighting: Sighting, setup: Set
             if with_walls[0] < least:
                 depth, (least, blur, grid) = thick, with_walls
     templates = outlines(grid, blur * pixel, pixel)
-    camera, residual = _refined(image, specimen, sighting.camera, templates, gain)
-    return Calibration(camera, grid, blur * pixel, pixel, residual, depth, sighting.bright)
+    camera, residual, fits = _refined(image, specimen, sighting.camera, templates, gain)
+    return Calibration(camera, grid, blur * pixel, pixel, residual, depth, sighting.bright, fits)
 
 
 def _furthest(specimen: Specimen, depth: Depth | None) -> float:
@@ -110,17 +116,18 @@ def _furthest(specimen: Specimen, depth: Depth | None) -> float:
     return 1.5 * float(np.linalg.norm(offset, axis=1).max())
 
 
-def oriented(image: Picture, specimen: Specimen, sightings: list[Sighting]) -> Sighting:
-    """The first of several ways to see a specimen that its outlines fit as well as any."""
+def alike(image: Picture, specimen: Specimen, sightings: list[Sighting]) -> list[Sighting]:
+    """Those of several ways to see a specimen that its outlines fit as well as any."""
     if len(sightings) == 1:
-        return sightings[0]
+        return sightings
     pixel = _pixel(specimen, sightings[0].camera)
     grid = Grid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel).of(_few(specimen))
     templates = outlines(grid, _USUAL_BLUR * pixel, pixel)
     misfits = [
         _misfit(image, Fitter(one.camera, templates), _gain(image, one)) for one in sightings
     ]
-    return sightings[int(np.argmax(np.array(misfits) <= _ALIKE * min(misfits)))]
+    least = min(misfits)
+    return [one for one, found in zip(sightings, misfits, strict=True) if found <= _ALIKE * least]
 
 
 def _few(specimen: Specimen) -> Ints:
@@ -134,9 +141,14 @@ def _gain(image: Picture, sighting: Sighting) -> float:
 
 def _misfit(image: Picture, fitter: Fitter, gain: float) -> float:
     """Median of the residuals over the gain; infinite for units that cannot be fitted."""
-    fits = fitter.fit(image, *fitter.start(gain))
+    fits = _outlined(image, fitter, gain)
     ratio = fits.noise / np.abs(fits.photometry[:, 0])
     return float(np.median(np.where(np.isfinite(ratio), ratio, np.inf)))
+
+
+def _outlined(image: Picture, fitter: Fitter, gain: float) -> Fits:
+    """Fits of all units, from where the design has them."""
+    return fitter.fit(image, *fitter.start(gain))
 
 
 def _pixel(specimen: Specimen, camera: Camera) -> float:
@@ -146,17 +158,16 @@ def _pixel(specimen: Specimen, camera: Camera) -> float:
 
 def _refined(
     image: Picture, specimen: Specimen, camera: Camera, templates: Templates, gain: float
-) -> tuple[Camera, Floats]:
-    """The camera that sees the outlines where they are, and what is left (units, 2), px."""
-    residual = np.full((specimen.count, 2), np.nan)
+) -> tuple[Camera, Floats, Fits]:
+    """The camera that sees the outlines where they are, what is left (units, 2), px, and fits."""
+    fits = _outlined(image, Fitter(camera, templates), gain)
     for _ in range(_ROUNDS):
-        fitter = Fitter(camera, templates)
-        fits = fitter.fit(image, *fitter.start(gain))
         good = np.isfinite(fits.pose[:, 0])
         seen = camera.project(specimen.centre + fits.pose[:, :2])
         camera = cameras.fit(specimen.centre[good], seen[good], camera.size, _EDGE_SIGMA, camera)
-        residual = seen - camera.project(specimen.centre)
-    return camera, residual
+        fits = _outlined(image, Fitter(camera, templates), gain)
+    seen = camera.project(specimen.centre + fits.pose[:, :2])
+    return camera, seen - camera.project(specimen.centre), fits
 
 
 def _lowest(misfit: Callable[[float], float], values: tuple[float, ...]) -> tuple[float, float]:

@@ -46,13 +46,19 @@ class Sighting:
     bright: bool
 
 
-def placed(camera: Camera) -> str:
-    """How the specimen lies in the image: upright, turned, seen from behind."""
+def lies(camera: Camera) -> tuple[float, bool]:
+    """How far the specimen is turned in the image, counter-clockwise, and if seen from behind."""
     upward = camera.homography[:2, 1]
-    turn = round(float(np.rad2deg(np.arctan2(-upward[0], -upward[1]))))
-    lies = f"turned by {turn} deg" if abs(turn) > _UPRIGHT else "upright"
-    behind = np.linalg.det(camera.homography[:2, :2]) > 0
-    return f"{lies} and mirrored, as from behind" if behind else lies
+    turn = float(np.arctan2(-upward[0], -upward[1]))
+    return turn, bool(np.linalg.det(camera.homography[:2, :2]) > 0)
+
+
+def placed(camera: Camera) -> str:
+    """The same in words: upright, turned, seen from behind."""
+    turn, behind = lies(camera)
+    degrees = round(float(np.rad2deg(turn)))
+    words = f"turned by {degrees} deg" if abs(degrees) > _UPRIGHT else "upright"
+    return f"{words} and mirrored, as from behind" if behind else words
 
 
 def told(found: Sighting, specimen: Specimen) -> str:

@@ -11,9 +11,10 @@ import numpy as np
 from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
 from pipeline.tracking.arrays import Floats, Ints, Picture
-from pipeline.tracking.calibrate import Calibration, Setup, calibrate, oriented
-from pipeline.tracking.find import Sighting, placed, sight, told
+from pipeline.tracking.calibrate import Calibration, Setup, calibrate
+from pipeline.tracking.find import placed
 from pipeline.tracking.fitting import Fitter
+from pipeline.tracking.recognition import ambiguous, check, recognised
 from pipeline.tracking.recovery import Recovery
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
@@ -24,10 +25,6 @@ from pipeline.tracking.walls import Walls
 LOG = logging.getLogger(__name__)
 
 _USUAL = Setup()
-_DARK = 8.0
-_SCALE = 0.15
-_ENOUGH = 0.6
-"""Least part of the units that a first frame must show for the design to be its own."""
 
 
 class Track(NamedTuple):
@@ -76,8 +73,12 @@ def follow(
     first = next(frames, None)
     if first is None:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
-    sighting = sighted(first.image, specimen, px_per_mm)
+    ways = recognised(first.image, specimen, px_per_mm, setup)
+    if doubt := ambiguous(ways):
+        LOG.info(doubt)
+    sighting = ways[0]
     calibration = calibrate(first.image, specimen, sighting, setup)
+    check(specimen, sighting, calibration)
     if (lies := placed(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
@@ -131,47 +132,3 @@ def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:
 
 def _image_sigma(found: Found) -> Floats:
     return uncertainty.standard_errors(found.fits.scatter, found.fits.blocks).astype(np.float32)
-
-
-def sighted(image: Picture, specimen: Specimen, px_per_mm: float | None) -> Sighting:
-    """The specimen in a first frame.
-
-    Raises:
-        UserError: it is not there, or not at this scale.
-    """
-    if float(np.ptp(image)) < _DARK:
-        raise UserError(
-            "the first frame is black or without contrast",
-            key="window.start",
-            remedy="start where the specimen is lit",
-        )
-    found = sight(image, specimen, px_per_mm)
-    if px_per_mm is not None and not _shown(found, specimen):
-        anywhere = sight(image, specimen, None)
-        if _shown(anywhere, specimen):
-            _check_scale(anywhere[0], specimen, px_per_mm)
-            found = anywhere
-    if not _shown(found, specimen):
-        raise UserError(
-            f"the first frame does not show this design: {told(found[0], specimen)}",
-            key="design",
-            remedy="give the design of the specimen, and its pixel_size",
-        )
-    return oriented(image, specimen, found)
-
-
-def _shown(found: list[Sighting], specimen: Specimen) -> bool:
-    return len(found[0].unit) >= _ENOUGH * specimen.count
-
-
-def _check_scale(found: Sighting, specimen: Specimen, px_per_mm: float) -> None:
-    """Refuses a pixel size far from that which shows the specimen."""
-    jacobian = found.camera.jacobian(specimen.centre)
-    size = float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
-    if abs(np.log(size / px_per_mm)) > _SCALE:
-        raise UserError(
-            f"the specimen is there, but pixels measure about {1 / size:.3g} mm on it",
-            key="pixel_size",
-            value=f"{1 / px_per_mm:.3g} mm",
-            remedy="correct it, or leave it out",
-        )

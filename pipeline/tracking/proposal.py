@@ -11,11 +11,11 @@ import xarray as xr
 
 from pipeline.errors import UserError
 from pipeline.tracking.arrays import Floats, Image, Picture
-from pipeline.tracking.calibrate import oriented
-from pipeline.tracking.find import Sighting, placed, sight, told
+from pipeline.tracking.calibrate import Calibration, Setup, calibrate
+from pipeline.tracking.find import Sighting
+from pipeline.tracking.recognition import agreeing, ambiguous, check, inside, recognised
 from pipeline.tracking.specimen import Specimen, as_built, of_design
 
-_ENOUGH = 0.6
 _CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
 _MARKED = 0.02  # of a face
@@ -49,32 +49,34 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
     Raises:
         UserError: none is there.
     """
-    tried = list(_structures(image, design, px_per_mm))
-    structure, specimen, ways = max(tried, key=_share)
-    share = _share((structure, specimen, ways))
-    if share < _ENOUGH:
-        raise UserError(
-            f"the first frame does not show this design: {told(ways[0], specimen)}",
-            remedy="give the design of the specimen, and the size of a pixel with --pixel-size",
-        )
-    sighting = oriented(image, specimen, ways)
-    alike = [
-        name
-        for name, units, seen in tried
-        if name != structure and _share((name, units, seen)) > share - _CLEARLY
-    ]
-    jacobian = sighting.camera.jacobian(specimen.centre[sighting.unit])
-    pixel = float(1 / np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
-    kind = _kind(image, specimen, sighting, 1 / pixel)
-    doubts = tuple(_doubts(alike, specimen.count - len(sighting.unit), sighting))
-    return Proposal(structure, specimen, sighting, kind, pixel, doubts)
+    seen, refused = [], []
+    for name, specimen in _structures(design):
+        try:
+            seen.append(_candidate(image, name, specimen, px_per_mm))
+        except UserError as error:
+            refused.append(error)
+    if not seen:
+        raise refused[0]
+    best = max(seen, key=_share)
+    specimen, sighting, calibration = best.specimen, best.ways[0], best.calibration
+    check(specimen, sighting, calibration)
+    like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
+    kind = _kind(image, specimen, sighting, 1 / calibration.pixel)
+    doubts = tuple(_doubts(best, like))
+    return Proposal(best.name, specimen, sighting, kind, calibration.pixel, doubts)
 
 
-_Tried = tuple[str, Specimen, list[Sighting]]
+class _Candidate(NamedTuple):
+    """A structure of the design, and how it is seen."""
+
+    name: str
+    specimen: Specimen
+    ways: list[Sighting]
+    calibration: Calibration
 
 
-def _structures(image: Picture, design: xr.Dataset, px_per_mm: float | None) -> Iterator[_Tried]:
-    """Every structure of the design that differs from those before, and where it is seen."""
+def _structures(design: xr.Dataset) -> Iterator[tuple[str, Specimen]]:
+    """Every structure of the design that differs from those before."""
     tried: list[Specimen] = []
     for name in ("cloaked", "altered", "intact"):
         specimen = of_design(as_built(design, name))
@@ -82,26 +84,42 @@ def _structures(image: Picture, design: xr.Dataset, px_per_mm: float | None) -> 
             np.array_equal(specimen.ids, one.ids) and _alike(specimen, one) for one in tried
         ):
             tried.append(specimen)
-            yield name, specimen, sight(image, specimen, px_per_mm)
+            yield name, specimen
+
+
+def _candidate(
+    image: Picture, name: str, specimen: Specimen, px_per_mm: float | None
+) -> _Candidate:
+    ways = recognised(image, specimen, px_per_mm, Setup())
+    return _Candidate(name, specimen, ways, calibrate(image, specimen, ways[0], Setup()))
 
 
 def _alike(one: Specimen, other: Specimen) -> bool:
     return np.array_equal(one.outline, other.outline, equal_nan=True)
 
 
-def _share(tried: _Tried) -> float:
-    """Part of the units that are in their places."""
-    return len(tried[2][0].unit) / tried[1].count
+def _share(one: _Candidate) -> float:
+    """Part of the units that are as this structure has them, less what it does not have."""
+    there = inside(one.specimen, one.calibration)
+    fitting = agreeing(one.specimen, one.calibration.outlines) & there
+    return float(fitting.sum() / max(there.sum(), 1)) - _more(one) / one.specimen.count
 
 
-def _doubts(alike: list[str], missing: int, sighting: Sighting) -> Iterator[str]:
-    if alike:
-        yield f"structure: as many units fit {' and '.join(alike)}; say which was built"
-    if missing:
+def _more(one: _Candidate) -> int:
+    """Patches of a unit's size that are none of the structure's units."""
+    return one.ways[0].blobs - len(one.ways[0].unit)
+
+
+def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
+    if like:
+        yield f"structure: as many units fit {' and '.join(like)}; say which was built"
+    if more := _more(best):
+        yield f"{more} patches of a unit's size that this structure does not have"
+    if missing := best.specimen.count - len(best.ways[0].unit):
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
-    yield f"orientation: the specimen seems {placed(sighting.camera)};"
-    yield "  where its lattice is the same turned, another turn may be the right one"
+    if doubt := ambiguous(best.ways):
+        yield f"turned, mirrored: {doubt}"
     yield "window: whether the specimen is at rest in the first frame"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from pipeline.lab.setup import Virtual
 from pipeline.problem.loading import section
-from pipeline.problem.quantities import Delay, Duration, Frequency, Gap, Length
+from pipeline.problem.quantities import Angle, Delay, Duration, Frequency, Gap, Length
 from pipeline.problem.section import Section, exactly_one
 
 
@@ -52,6 +52,9 @@ class Recording(Section):
             several sizes.
         thickness: of the units, if their side walls show: bare ones a few millimetres thick do.
         camera_distance: from the specimen's middle; without it, thick units tell it roughly.
+        turned: how far the specimen is turned in the picture, counter-clockwise, where its lattice
+            does not tell.
+        mirrored: whether it is seen from behind, likewise.
         frame_rate: of a folder of pictures, which have no times of their own.
         window: of time, since the file's first frame.
         load_axis: what courses are drawn over; a track holds both.
@@ -69,6 +72,8 @@ class Recording(Section):
     pixel_size: Length | None = None
     thickness: Gap = 0.0
     camera_distance: Length | None = None
+    turned: Angle | None = None
+    mirrored: bool | None = None
     frame_rate: Frequency | None = None
     window: Window = Window()
     load_axis: Literal["time", "driven displacement"] = "time"

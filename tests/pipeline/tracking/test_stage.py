@@ -43,17 +43,49 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     assert made.attrs["synthetic"] == "yes"
 
 
-def test_another_design_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("grid:\n- 15\n", "grid:\n- 8\n", "of 120 in their places"),
+        ("grid:\n- 15\n", "grid:\n- 14\n", "of 210 in their places, from ("),
+        ("bias_angle_deg: 20", "bias_angle_deg: 8", "225 units are hidden or not as the design"),
+    ],
+)
+def test_another_design_is_refused(
+    recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
+) -> None:
     text = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8")
     other = recording.with_name("other.yaml")
-    assert "grid:\n- 15\n- 15\n" in text
-    other.write_text(text.replace("grid:\n- 15\n", "grid:\n- 8\n"), encoding="utf-8")
+    assert old in text
+    other.write_text(text.replace(old, new), encoding="utf-8")
     video = str(CLIPS / "f_silhouette.mp4")
     folder = str(recording.parent)
     assert track.main(["import", str(other), "--video", video, "--out-dir", folder]) == 0
-    told = refused(recording, capsys)
-    assert "does not show this design" in told
-    assert "of 120 in their places" in told
+    words = refused(recording, capsys)
+    assert "does not show this design" in words
+    assert told in words
+
+
+def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(recording: Path) -> None:
+    made = []
+    for turned in ("0 deg", "180 deg"):
+        changed_to = recording.read_text(encoding="utf-8") + f"turned: {turned}\n"
+        asked = recording.with_name("turned.yaml")
+        asked.write_text(changed_to, encoding="utf-8")
+        out = recording.with_name("track.nc")
+        assert track.main([str(asked), "--out", str(out), "--no-report"]) == 0
+        made.append(datasets.read(out, "track")["displacement"].values)
+    upright, turned_by_half = made
+    assert np.abs(upright[-1, :, :2]).max() > 0.05
+    np.testing.assert_allclose(turned_by_half[:, ::-1, :2], -upright[..., :2], atol=0.01)
+
+
+def test_a_turn_that_is_not_so_is_refused(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("mirrored: true\n")
+    assert "the specimen is seen otherwise: upright" in refused(recording, capsys)
 
 
 def test_a_wrong_scale_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
