@@ -111,4 +111,4 @@ def write_json(facts: Sequence[Fact], path: Path) -> None:
 def table(facts: Sequence[Fact]) -> Table:
     """Facts as a table, one a line."""
     columns = {entry.name: [getattr(fact, entry.name) for fact in facts] for entry in fields(Fact)}
-    return Table("facts.csv", "the paper’s numbers and ours", columns)
+    return Table("facts.csv", "the numbers above", columns)

@@ -14,7 +14,7 @@ import jinja2
 import xarray as xr
 from markupsafe import Markup, escape
 
-from reports.facts import Fact
+from reports.facts import ABSENT, Fact
 from reports.tables import Table
 
 LARGEST_PAGE = 6_000_000
@@ -84,6 +84,7 @@ def render(page: Page) -> str:
     environment.filters["groupby_order"] = _in_order
     environment.filters["symbols"] = _symbols
     values = dict(vars(page))
+    values["quotes"] = any(fact.paper != ABSENT for fact in page.facts)
     values["tables"] = [_link(table) for table in page.tables]
     values["svg"] = _inline(page.svg)
     # "</" would end the script element that holds the data.

@@ -100,7 +100,15 @@ def test_page_tells_where_it_is_from(html: str, study: Study) -> None:
 def test_page_shows_paper_and_ours(html: str) -> None:
     for words in ("≈ 70 %", "88.0 %", "5.2 mm", "63 %", "&lt; 0.35"):
         assert words in html
+    assert '<th scope="col">Paper</th>' in html
     assert "DRAFT" not in html
+
+
+def test_without_a_paper_there_is_no_column_for_it(quick: Study) -> None:
+    made = kinds.of(quick.problem).page(quick, facts.collect(quick), [], "<svg/>", [])
+    html = page.render(made)
+    assert "Paper</th>" not in html
+    assert "<span>paper" not in html
 
 
 def test_a_draft_says_so(quick_report: Path) -> None:
