@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from reports import kinds, page
+from reports.facts import quoted
 from reports.fig2 import facts
 from reports.study import Study
 from reports.tables import Table
@@ -105,8 +106,8 @@ def test_page_shows_paper_and_ours(html: str) -> None:
 
 
 def test_without_a_paper_there_is_no_column_for_it(quick: Study) -> None:
-    made = kinds.of(quick.problem).page(quick, facts.collect(quick), [], "<svg/>", [])
-    html = page.render(made)
+    known = quoted(facts.collect(quick), None)
+    html = page.render(kinds.of(quick.problem).page(quick, known, [], "<svg/>", []))
     assert "Paper</th>" not in html
     assert "<span>paper" not in html
 
