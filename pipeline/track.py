@@ -61,18 +61,17 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a fault of the files, or a video that does not show the design.
     """
-    command = args.words[0] if len(args.words) == 2 else ""
-    if command == "import":
-        _import(Path(args.words[1]), args.video, args.out_dir)
-    elif command == "init" and args.design is not None:
-        _init(Path(args.words[1]), args)
-    elif command == "points" and args.out is not None:
-        _points(Path(args.words[1]), args)
-    elif len(args.words) == 1 and args.out is not None:
-        _track(Path(args.words[0]), args)
-    else:
-        remedy = "python -m pipeline.track RECORDING.yaml --out track.nc; see --help"
-        raise UserError("one recording and --out are wanted", remedy=remedy)
+    *command, file = args.words
+    known = {"": _track, "init": _init, "points": _points, "import": _import}
+    if (name := " ".join(command)) not in known:
+        remedy = "give one of init, points, import, or a recording alone; see --help"
+        raise UserError("no such command", value=name, remedy=remedy)
+    wanted = {"": "out", "points": "out", "init": "design"}.get(name)
+    if wanted is not None and getattr(args, wanted) is None:
+        usage = f"python -m pipeline.track {name} {file}".replace("  ", " ")
+        remedy = f"{usage} --{wanted} FILE.nc; see --help"
+        raise UserError(f"--{wanted} is wanted", remedy=remedy)
+    known[name](Path(file), args)
 
 
 def _points(path: Path, args: argparse.Namespace) -> None:
@@ -137,13 +136,13 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         LOG.info("not told: %s", doubt)
 
 
-def _import(path: Path, video: Path | None, folder: Path) -> None:
+def _import(path: Path, args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
     from pipeline.tracking import importing
 
     described = importing.description(path)
-    shown = importing.video_of(path) if video is None else video
-    name = shown.stem
+    shown = importing.video_of(path) if args.video is None else args.video
+    name, folder = shown.stem, args.out_dir
     origin = {
         "problem": "{}",
         "problem_hash": provenance.file_hash(path),
@@ -157,12 +156,15 @@ def _import(path: Path, video: Path | None, folder: Path) -> None:
 
 def _track(path: Path, args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
-    from pipeline.tracking import loadcell, table
+    from pipeline.tracking import importing, loadcell, table
     from pipeline.tracking import recording as recordings
     from pipeline.tracking.dataset import dataset, is_driven
     from pipeline.tracking.origin import rendered
     from pipeline.tracking.specimen import as_built
 
+    if path.is_dir() or path.suffix.lower() in importing.VIDEOS:
+        remedy = f"python -m pipeline.track init {path} --design NC proposes a recording of it"
+        raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
     asked = recordings.load(path)
     video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
@@ -175,11 +177,13 @@ def _track(path: Path, args: argparse.Namespace) -> None:
             value=asked.load_axis,
             remedy=remedy,
         )
-    track = followed(asked, design, video, path)
     parents, force = {"design": source, "video": video}, None
     if (cell := asked.load_cell) is not None:
-        parents["load_cell"] = path.parent / cell.file
-        force = loadcell.forces(parents["load_cell"], cell, track.start + track.time)
+        held = parents["load_cell"] = path.parent / cell.file
+        log = loadcell.read(held, cell)
+    track = followed(asked, design, video, path)
+    if cell is not None:
+        force = loadcell.forces(log, track.start + track.time)
     made = dataset(design, track, force)
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
@@ -187,6 +191,8 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if not args.no_report:
         _report(args.out, video)
+    if cell is not None:
+        loadcell.check(log, track.start + track.time, held, cell)
 
 
 def _report(track: Path, video: Path) -> None:

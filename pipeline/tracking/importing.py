@@ -13,7 +13,7 @@ from pipeline.problem import yamlfile
 from pipeline.tracking.arrays import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
-_VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
+VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
 
 
 def description(path: Path) -> dict[str, Any]:
@@ -34,12 +34,12 @@ def description(path: Path) -> dict[str, Any]:
 
 
 def video_of(path: Path) -> Path:
-    """The video beside its description.
+    """The video beside its description, or the folder of pictures of that name.
 
     Raises:
         UserError: there is none.
     """
-    for suffix in _VIDEOS:
+    for suffix in (*VIDEOS, ""):
         if (video := path.with_suffix(suffix)).exists():
             return video
     raise UserError("no video beside it", file=path, remedy="name it with --video")
@@ -56,6 +56,8 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
     ]
     if scale := described.get("approx_px_per_mm"):
         lines.append(f"pixel_size: {1 / scale:.4g} mm")
+    if video.is_dir() and (rate := described.get("fps")):
+        lines.append(f"frame_rate: {rate:g} Hz")
     return "\n".join(lines) + "\n"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,36 +13,60 @@ from pipeline.tracking.arrays import Floats
 from pipeline.tracking.recording import LoadCell
 
 
-def forces(path: Path, cell: LoadCell, time: Floats) -> Floats:
+class Log(NamedTuple):
+    """A load cell's log on the clock of the video's file: times (lines,) in s, forces in N."""
+
+    clock: Floats
+    force: Floats
+
+
+def read(path: Path, cell: LoadCell) -> Log:
+    """The log of a load cell.
+
+    Args:
+        path: the file.
+        cell: its columns, and the time of the video's first frame on its clock.
+
+    Raises:
+        UserError: it cannot be read, or runs backwards.
+    """
+    clock, force = columns.read(path, (cell.time, cell.force)).T
+    if (np.diff(clock) <= 0).any():
+        remedy = "sort it by time, each time once"
+        raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
+    return Log(clock - cell.offset, force)
+
+
+def forces(log: Log, time: Floats) -> Floats:
     """The force (frames,) in N at the frames, linear between the log's lines, NaN beyond them.
 
     Where the log is finer than the video, it is averaged over the frame's interval first, so that
     no noise of the load cell is folded into the frames.
 
     Args:
-        path: the log.
-        cell: its columns, and the time of the file's first frame on its clock.
+        log: of the load cell.
         time: (frames,) since the file's first frame, s.
+    """
+    inside = (time >= log.clock[0]) & (time <= log.clock[-1])
+    return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
+
+
+def check(log: Log, time: Floats, path: Path, cell: LoadCell) -> None:
+    """Refuses a log that holds nothing of the video.
 
     Raises:
-        UserError: the log cannot be read, runs backwards, or holds nothing of the video.
+        UserError: telling both spans of time.
     """
-    clock, force = columns.read(path, (cell.time, cell.force)).T
-    clock = clock - cell.offset
-    if (np.diff(clock) <= 0).any():
-        remedy = "sort it by time, each time once"
-        raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
-    if clock[-1] < time[0] or clock[0] > time[-1]:
+    if log.clock[-1] < time[0] or log.clock[0] > time[-1]:
         raise UserError(
-            f"the log (from {clock[0]:.6g} s to {clock[-1]:.6g} s of the video's time) and the"
-            f" frames (from {time[0]:.6g} s to {time[-1]:.6g} s) do not overlap",
+            f"the log (from {log.clock[0]:.6g} s to {log.clock[-1]:.6g} s of the video's time) and"
+            f" the frames (from {time[0]:.6g} s to {time[-1]:.6g} s) do not overlap: the track is"
+            " kept, without forces",
             file=path,
             key="load_cell.offset",
             value=cell.offset,
             remedy="give the time of the video's first frame on the log's clock",
         )
-    inside = (time >= clock[0]) & (time <= clock[-1])
-    return np.where(inside, _smooth(clock, force, time), np.nan)
 
 
 def _smooth(clock: Floats, force: Floats, time: Floats) -> Floats:

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from pipeline.lab.setup import Virtual
 from pipeline.problem.loading import section
-from pipeline.problem.quantities import Angle, Delay, Duration, Frequency, Gap, Length
+from pipeline.problem.quantities import Angle, Delay, Duration, Frequency, Gap, Length, fault
 from pipeline.problem.section import Section, exactly_one
 
 
@@ -19,6 +19,13 @@ class Window(Section):
 
     start: Delay = 0.0
     end: Duration | None = None
+
+    @model_validator(mode="after")
+    def _forwards(self) -> Self:
+        if self.end is not None and self.end <= self.start:
+            what = f"it ends at {self.end:g} s, where it starts at {self.start:g} s"
+            raise fault(what, "let it end after it starts")
+        return self
 
 
 class LoadCell(Section):

@@ -88,11 +88,11 @@ def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
         with av.open(str(path)) as container:
             yield from _decoded(container, path, start, end)
     except FileNotFoundError as error:
-        raise UserError("no such video", file=path, remedy="check the path") from error
+        raise UserError("no such video", file=path, key="video", remedy="check the path") from error
     except av.FFmpegError as error:
         remedy = "give a video that ffprobe can read; copy the file again if it is broken"
         raise UserError(
-            f"not a readable video: {error.strerror}", file=path, remedy=remedy
+            f"not a readable video: {error.strerror}", file=path, key="video", remedy=remedy
         ) from error
 
 

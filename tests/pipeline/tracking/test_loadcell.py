@@ -20,7 +20,7 @@ def log(folder: Path, text: str) -> Path:
 
 def test_a_coarse_log_is_read_on_the_clock_of_the_video(tmp_path: Path) -> None:
     path = log(tmp_path, "time,force\n10.0,0.0\n10.2,2.0\n10.3,2.0\n")
-    found = loadcell.forces(path, LoadCell(file="load.csv", offset=10.0), TIME)
+    found = loadcell.forces(loadcell.read(path, LoadCell(file="load.csv", offset=10.0)), TIME)
     np.testing.assert_allclose(found, [0.0, 1.0, 2.0, 2.0, np.nan])
 
 
@@ -31,7 +31,7 @@ def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
     rows = rows.replace(".", ",")
     path = log(tmp_path, f"Machine 7;\nt [s];F [N]\n{rows}\n")
     cell = LoadCell(file="load.csv", time="t [s]", force="F [N]")
-    found = loadcell.forces(path, cell, TIME)
+    found = loadcell.forces(loadcell.read(path, cell), TIME)
     np.testing.assert_allclose(found[1:4], 3.0 + TIME[1:4], atol=0.02)
 
 
@@ -45,8 +45,9 @@ def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
     ],
 )
 def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told: str) -> None:
+    path, cell = log(tmp_path, text), LoadCell(file="load.csv", offset=offset)
     with pytest.raises(UserError, match=told) as caught:
-        loadcell.forces(log(tmp_path, text), LoadCell(file="load.csv", offset=offset), TIME)
+        loadcell.check(loadcell.read(path, cell), TIME, path, cell)
     assert caught.value.remedy
 
 

@@ -154,3 +154,43 @@ def test_without_driven_units_there_is_no_such_axis(
     with recording.open("a", encoding="utf-8") as file:
         file.write("load_axis: driven displacement\n")
     assert "the design has no driven units" in refused(recording, capsys)
+
+
+def test_a_log_that_is_not_there_is_told_before_tracking(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("load_cell: {file: none.csv}\n")
+    told = refused(recording, capsys)
+    assert "none.csv" in told
+    assert "units;" not in told
+
+
+def test_a_track_is_kept_where_its_log_is_of_another_time(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+    with recording.open("a", encoding="utf-8") as file:
+        file.write("load_cell: {file: load.csv, offset: 70}\n")
+    out = recording.with_name("track.nc")
+    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 2
+    assert "do not overlap: the track is kept" in capsys.readouterr().err
+    made = datasets.read(out, "track")
+    assert np.isnan(made["load_force"]).all()
+    assert np.isfinite(made["displacement"]).all()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["frobnicate", "a.mp4"], "no such command"),
+        (["init", "a.mp4"], "--design is wanted"),
+        (["a.yaml"], "--out is wanted"),
+        (["a.mp4", "--out", "a.nc"], "pipeline.track init a.mp4"),
+    ],
+)
+def test_a_command_that_lacks_something_is_told_what(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert track.main(words) == 2
+    assert told in capsys.readouterr().err
