@@ -78,8 +78,8 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
         axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
         _bands(axes, study, course, measure, study.scatter)
-    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
-    axes.legend(loc="upper left", handlelength=1.2)
+    legend = axes.legend(loc="upper left", handlelength=1.2)
+    axes.set_ylim(0, (1.1 + 0.1 * len(legend.get_texts())) * axes.get_ylim()[1])
 
 
 def _second(axes: Axes, study: Study, measure: Measure, again: Again) -> None:
