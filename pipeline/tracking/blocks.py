@@ -12,10 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.tracking.arrays import Floats, Singles, compiled
+from pipeline.tracking.cells import Kinds
 
 UNKNOWNS = 7  # ux, uy, theta; gain, offset, slope in x, slope in y
 SIZE = 8
 _PIXELS = SIZE * SIZE
+_LANES = 16
+"""Numbers that a processor adds at once, or a multiple."""
+_FEW = [4.0 * ((column + 2 * row) % 4 == 0) for row in range(SIZE) for column in range(SIZE)]
+_COUNT = np.array([[0.0] * _PIXELS, _FEW, [1.0] * _PIXELS], np.float32)
+"""How many pixels one stands for, by the kind of its cell and its place in the block."""
 
 
 class Scene(NamedTuple):
@@ -31,12 +37,13 @@ class Scene(NamedTuple):
 
 
 class Look(NamedTuple):
-    """The template of one unit, as `unfold` makes its nodes, with its place at rest.
+    """The template of one unit, as `unfold` makes its nodes, its cells, and its place at rest.
 
     Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it.
     """
 
     nodes: Singles
+    kind: Kinds
     half: float
     step: float
     x: float
@@ -68,27 +75,6 @@ class Room(NamedTuple):
     matrix: Floats
     scores: Floats
     sums: Floats
-
-
-@compiled
-def unfold(brightness: Singles, weight: Singles, nodes: Singles) -> None:
-    """Fills nodes (rows, columns, 4): brightness, its slopes per node in x and y, and weight.
-
-    The slopes are differences of fourth order. One unit's nodes at a time fit a processor's cache,
-    which all units' do not; two nodes along the rim stay as they are.
-    """
-    size = brightness.shape[0]
-    near, far = np.float32(8 / 12), np.float32(1 / 12)
-    for row in range(2, size - 2):
-        for k in range(2, size - 2):
-            nodes[row, k, 0] = brightness[row, k]
-            nodes[row, k, 1] = near * (brightness[row, k + 1] - brightness[row, k - 1]) - far * (
-                brightness[row, k + 2] - brightness[row, k - 2]
-            )
-            nodes[row, k, 2] = near * (brightness[row + 1, k] - brightness[row - 1, k]) - far * (
-                brightness[row + 2, k] - brightness[row - 2, k]
-            )
-            nodes[row, k, 3] = weight[row, k]
 
 
 def room(blocks: int) -> Room:
@@ -123,73 +109,80 @@ def _place(scene: Scene, look: Look, state: Floats, top: int, left: int, room: R
 
 
 @compiled
-def _sample(look: Look, room: Room) -> bool:
-    """Fills weight, and rows 0, 1, 3 with slopes and value of the template; False if all is zero.
+def _sample(scene: Scene, look: Look, top: int, left: int, room: Room) -> int:
+    """Reads the template where pixels are to be compared; returns their number.
 
-    Along each direction values are Hermite's cubics, blended linearly in the other.
+    Fills weight, residual with the frame's brightness, and rows 0, 1, 3 with slopes and value of
+    the template: mixed of those that the four nodes about a pixel extrapolate to halfway, which is
+    exact for parabolas. There are pixels without weight up to the next multiple of `_LANES`.
     """
-    nodes, rows, weight = look.nodes, room.rows, room.weight
-    size = nodes.shape[0]
+    nodes, kind, rows, x, y = look.nodes, look.kind, room.rows, room.x, room.y
+    size = kind.shape[0]
     middle, most = np.float32((size - 1) // 2), np.float32(size - 1)
-    seen = False
-    one = np.float32(1)
+    one, half, next_ = np.float32(1), np.float32(0.5), np.uint32(1)
+    n = 0
     for k in range(_PIXELS):
-        u, v = room.x[k] + middle, room.y[k] + middle
-        weight[k] = 0
+        u, v = x[k] + middle, y[k] + middle
         if not (u >= 0 and v >= 0 and u < most and v < most):
             continue
         iu, iv = np.uint32(u), np.uint32(v)
+        stands = _COUNT[kind[iv, iu], k]
+        if stands == 0:
+            continue
+        ju, jv = iu + next_, iv + next_
         fu, fv = u - np.float32(iu), v - np.float32(iv)
         gu, gv = one - fu, one - fv
         wa, wb, wc, wd = gu * gv, fu * gv, gu * fv, fu * fv
-        a, b = nodes[iv, iu], nodes[iv, iu + np.uint32(1)]
-        c, d = nodes[iv + np.uint32(1), iu], nodes[iv + np.uint32(1), iu + np.uint32(1)]
-        here = wa * a[3] + wb * b[3] + wc * c[3] + wd * d[3]
-        rise_u = gv * (b[0] - a[0]) + fv * (d[0] - c[0])
-        rise_v = gu * (c[0] - a[0]) + fu * (d[0] - b[0])
-        first_u, last_u = gv * a[1] + fv * c[1] - rise_u, gv * b[1] + fv * d[1] - rise_u
-        first_v, last_v = gu * a[2] + fu * b[2] - rise_v, gu * c[2] + fu * d[2] - rise_v
-        bow_u, bow_v = gu * first_u - fu * last_u, gv * first_v - fv * last_v
-        weight[k] = here
-        rows[0, k] = rise_u + (gu - fu) * bow_u - fu * gu * (first_u + last_u)
-        rows[1, k] = rise_v + (gv - fv) * bow_v - fv * gv * (first_v + last_v)
-        linear = wa * a[0] + wb * b[0] + wc * c[0] + wd * d[0]
-        rows[3, k] = linear + fu * gu * bow_u + fv * gv * bow_v
-        seen |= here > 0
-    return seen
+        au, bu, cu, du = nodes[iv, iu, 1], nodes[iv, ju, 1], nodes[jv, iu, 1], nodes[jv, ju, 1]
+        av, bv, cv, dv = nodes[iv, iu, 2], nodes[iv, ju, 2], nodes[jv, iu, 2], nodes[jv, ju, 2]
+        flat = wa * nodes[iv, iu, 0] + wb * nodes[iv, ju, 0]
+        flat += wc * nodes[jv, iu, 0] + wd * nodes[jv, ju, 0]
+        bow_u = fu * gu * (gv * (au - bu) + fv * (cu - du))
+        bow_v = fv * gv * (gu * (av - cv) + fu * (bv - dv))
+        here = wa * nodes[iv, iu, 3] + wb * nodes[iv, ju, 3]
+        rows[0, n] = wa * au + wb * bu + wc * cu + wd * du
+        rows[1, n] = wa * av + wb * bv + wc * cv + wd * dv
+        rows[3, n] = flat + half * (bow_u + bow_v)
+        here += wc * nodes[jv, iu, 3] + wd * nodes[jv, ju, 3]
+        room.weight[n] = stands * here
+        room.residual[n] = scene.image[top + (k >> 3), left + (k & 7)]
+        x[n], y[n] = x[k], y[k]
+        n += 1
+    whole = -(-n // _LANES) * _LANES
+    for k in range(n, whole):
+        room.weight[k] = room.residual[k] = rows[0, k] = rows[1, k] = rows[3, k] = 0
+    return whole
 
 
 @compiled
-def _derive(scene: Scene, look: Look, state: Floats, top: int, left: int, room: Room) -> None:
+def _derive(look: Look, state: Floats, pixels: int, room: Room) -> None:
     """Turns slopes and value of the template into derivatives and residual of the frame."""
-    rows, residual, image = room.rows, room.residual, scene.image
+    rows, residual = room.rows, room.residual
     cos, sin = np.float32(math.cos(state[2])), np.float32(math.sin(state[2]))
     step = np.float32(look.step)
     steepness, per_half = np.float32(state[3] / look.step), np.float32(look.step / look.half)
     gain, offset = np.float32(state[3]), np.float32(state[4])
     slope_x, slope_y = np.float32(state[5]), np.float32(state[6])
-    for row in range(SIZE):
-        for column in range(SIZE):
-            k = SIZE * row + column
-            along_x, along_y = steepness * rows[0, k], steepness * rows[1, k]
-            x, y = room.x[k], room.y[k]
-            rows[0, k] = -cos * along_x + sin * along_y
-            rows[1, k] = -sin * along_x - cos * along_y
-            rows[2, k] = (along_x * y - along_y * x) * step
-            rows[4, k] = 1
-            rows[5, k] = x * per_half
-            rows[6, k] = y * per_half
-            model = gain * rows[3, k] + offset + slope_x * rows[5, k] + slope_y * rows[6, k]
-            residual[k] = image[top + row, left + column] - model
+    for k in range(pixels):
+        along_x, along_y = steepness * rows[0, k], steepness * rows[1, k]
+        x, y = room.x[k], room.y[k]
+        rows[0, k] = -cos * along_x + sin * along_y
+        rows[1, k] = -sin * along_x - cos * along_y
+        rows[2, k] = (along_x * y - along_y * x) * step
+        rows[4, k] = 1
+        rows[5, k] = x * per_half
+        rows[6, k] = y * per_half
+        model = gain * rows[3, k] + offset + slope_x * rows[5, k] + slope_y * rows[6, k]
+        residual[k] -= model
 
 
 @compiled
-def _weigh(room: Room, tight: float) -> None:
+def _weigh(room: Room, tight: float, pixels: int) -> None:
     """Robust weights of Geman and McClure, and the sums."""
     rows, residual, weight = room.rows, room.residual, room.weight
     full = left = curved = total = squares = np.float32(0)
     narrow = np.float32(tight)
-    for k in range(_PIXELS):
+    for k in range(pixels):
         here = weight[k]
         steep = rows[0, k] * rows[0, k] + rows[1, k] * rows[1, k]
         square = residual[k] * residual[k]
@@ -209,19 +202,19 @@ def _weigh(room: Room, tight: float) -> None:
 
 
 @compiled
-def _add(room: Room, scores: Floats) -> None:
+def _add(room: Room, scores: Floats, pixels: int) -> None:
     """Adds a block to the matrix and fills its scores."""
     rows, residual, weight, matrix = room.rows, room.residual, room.weight, room.matrix
     scaled = room.weighted
     for i in range(UNKNOWNS):
         score = np.float32(0)
-        for k in range(_PIXELS):
+        for k in range(pixels):
             scaled[k] = weight[k] * rows[i, k]
             score += scaled[k] * residual[k]
         scores[i] = score
         for j in range(i + 1):
             product = np.float32(0)
-            for k in range(_PIXELS):
+            for k in range(pixels):
                 product += scaled[k] * rows[j, k]
             matrix[i, j] += product
 
@@ -257,9 +250,10 @@ def gather(
             if not _within(scene, look, state, top, left):
                 continue
             _place(scene, look, state, top, left, room)
-            if _sample(look, room):
-                _derive(scene, look, state, top, left, room)
-                _weigh(room, tight)
-                _add(room, room.scores[count])
+            pixels = _sample(scene, look, top, left, room)
+            if pixels > 0:
+                _derive(look, state, pixels, room)
+                _weigh(room, tight, pixels)
+                _add(room, room.scores[count], pixels)
                 count += 1
     return count

@@ -24,6 +24,7 @@ _DISTANCES = (300.0, 400.0, 550.0, 750.0, 1000.0, 1350.0, 1800.0, 2500.0)
 """Of a camera whose distance is not told, mm."""
 _USUAL_BLUR = 1.0
 _ALIKE = 1.1
+_FOUND = 0.5
 _SOME = 40
 """Units, about, that the blur is found on."""
 _EDGE_SIGMA = 0.02
@@ -121,13 +122,21 @@ def alike(image: Picture, specimen: Specimen, sightings: list[Sighting]) -> list
     if len(sightings) == 1:
         return sightings
     pixel = _pixel(specimen, sightings[0].camera)
-    grid = Grid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel).of(_few(specimen))
+    grid = Grid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
     templates = outlines(grid, _USUAL_BLUR * pixel, pixel)
-    misfits = [
-        _misfit(image, Fitter(one.camera, templates), _gain(image, one)) for one in sightings
-    ]
-    least = min(misfits)
-    return [one for one, found in zip(sightings, misfits, strict=True) if found <= _ALIKE * least]
+    wrong = [_unlikeness(image, templates, one) for one in sightings]
+    least = min(wrong)
+    return [one for one, found in zip(sightings, wrong, strict=True) if found <= _ALIKE * least]
+
+
+def _unlikeness(image: Picture, templates: Templates, sighting: Sighting) -> float:
+    """Residuals of the outlines times their rotations: outlines of others are turned to fit."""
+    fits = _outlined(image, Fitter(sighting.camera, templates), _gain(image, sighting))
+    found = np.isfinite(fits.pose[:, 2])
+    if found.mean() < _FOUND:
+        return np.inf
+    turned = fits.pose[found, 2]
+    return _relative(fits) * float(np.mean(np.abs(turned - np.median(turned))))
 
 
 def _few(specimen: Specimen) -> Ints:
@@ -141,7 +150,10 @@ def _gain(image: Picture, sighting: Sighting) -> float:
 
 def _misfit(image: Picture, fitter: Fitter, gain: float) -> float:
     """Median of the residuals over the gain; infinite for units that cannot be fitted."""
-    fits = _outlined(image, fitter, gain)
+    return _relative(_outlined(image, fitter, gain))
+
+
+def _relative(fits: Fits) -> float:
     ratio = fits.noise / np.abs(fits.photometry[:, 0])
     return float(np.median(np.where(np.isfinite(ratio), ratio, np.inf)))
 

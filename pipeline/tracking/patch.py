@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.tracking.arrays import Floats, Mask, Singles, compiled
-from pipeline.tracking.blocks import SIZE, UNKNOWNS, Look, Room, Scene, gather, unfold
+from pipeline.tracking.blocks import SIZE, UNKNOWNS, Look, Room, Scene, gather
+from pipeline.tracking.cells import Cells, unfold
 from pipeline.tracking.dense import invert
 
 POSE = 3
@@ -40,6 +41,7 @@ class Templates(NamedTuple):
         centre: (units, 2) place at rest, mm.
         contrast: (units,) standard deviation of the brightness within the weight.
         reach: (units,) largest radius of the weight, mm.
+        cells: between the nodes.
     """
 
     brightness: Singles
@@ -49,6 +51,7 @@ class Templates(NamedTuple):
     centre: Floats
     contrast: Floats
     reach: Floats
+    cells: Cells
 
 
 class Start(NamedTuple):
@@ -169,10 +172,10 @@ def _descend(
         Length of the last step in px, negative if it failed, and number of blocks.
     """
     step, factor = np.empty(UNKNOWNS), np.zeros((UNKNOWNS, UNKNOWNS))
-    blind = aim.tight == 0.0
+    blind, new = aim.tight == 0.0, aim.tight == 0.0 and aim.noise == 0.0
     moved, count = -1.0, 0
-    scale = _UNKNOWN if blind else max(aim.contrast * abs(state[3]), aim.tight)
-    for turn in range(0 if blind else 1, aim.most + 1):
+    scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
+    for turn in range(0 if new else 1, aim.most + 1):
         every = 4 if turn == 0 else (2 if turn == 1 and blind else 1)
         count = gather(scene, look, state, box, every, 1 / (scale * scale), room)
         if turn == 0:
@@ -248,9 +251,11 @@ def fit(
         _box(scene.image.shape, start.middle[unit], start.radius[unit], box)
         if box[1] - box[0] < 4 or box[3] - box[2] < 4:
             continue
-        unfold(templates.brightness[unit], templates.weight[unit], nodes)
+        cells = templates.cells
+        unfold(templates.brightness[unit], templates.weight[unit], cells.span[unit], nodes)
         look = Look(
             nodes,
+            cells.kind[unit],
             templates.half,
             templates.step,
             templates.centre[unit, 0],

@@ -14,12 +14,13 @@ import numpy as np
 from pipeline.tracking.arrays import Floats, Ints, Picture, Singles
 from pipeline.tracking.blocks import SIZE
 from pipeline.tracking.camera import Camera
+from pipeline.tracking.cells import cells_of
 from pipeline.tracking.depth import Depth
 from pipeline.tracking.patch import Templates
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.spline import coefficients, sample
 
-NODES_PER_PIXEL = 1.6
+NODES_PER_PIXEL = 1.2
 _REACH = 2.5
 """The blurred edge is used so many standard deviations of the blur to the outside, and a pixel."""
 
@@ -108,7 +109,9 @@ def _templates(grid: Grid, brightness: Singles, weight: Singles) -> Templates:
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max() for mask in weight])
-    return Templates(brightness, weight, grid.half, grid.step, grid.centre, np.sqrt(square), reach)
+    contrast = np.sqrt(square)
+    cells = cells_of(brightness, weight, contrast)
+    return Templates(brightness, weight, grid.half, grid.step, grid.centre, contrast, reach, cells)
 
 
 def blurred(grid: Grid, inside: Singles, blur: float) -> Singles:

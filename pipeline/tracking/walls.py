@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.tracking.arrays import Floats, Singles
+from pipeline.tracking.cells import classify
 from pipeline.tracking.depth import Depth
 from pipeline.tracking.patch import Templates
 from pipeline.tracking.specimen import Specimen
@@ -57,6 +58,13 @@ class Walls:
             self._templates.brightness[unit] = self._board[unit] + drawn
             self._templates.weight[unit] = shown(
                 inside, self._grid.joint[unit], self._blur, self._pixel, self._kind
+            )
+            classify(
+                self._templates.brightness[unit],
+                self._templates.weight[unit],
+                self._templates.contrast[unit],
+                self._templates.cells.kind[unit],
+                self._templates.cells.span[unit],
             )
             self._offset[unit] = offset[unit]
 
