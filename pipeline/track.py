@@ -232,7 +232,7 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     from pipeline.tracking.calibrate import Setup
     from pipeline.tracking.follow import follow
     from pipeline.tracking.specimen import of_design
-    from pipeline.tracking.video import frames, length
+    from pipeline.tracking.video import frames, length, uneven
 
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
@@ -247,6 +247,8 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         if error.file is None:
             error.file = str(source)
         raise
+    if uneven(track.time):
+        LOG.warning("warning: the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))
     LOG.info(
         "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm, %.3f deg;"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
@@ -58,7 +59,8 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
     if not seen:
         raise refused[0]
     best = max(seen, key=_share)
-    specimen, sighting, calibration = best.specimen, best.ways[0], best.calibration
+    specimen, calibration = best.specimen, best.calibration
+    sighting = replace(best.ways[0], camera=calibration.camera)
     check(specimen, sighting, calibration)
     like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
     kind = _kind(image, specimen, sighting, 1 / calibration.pixel)

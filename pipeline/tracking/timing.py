@@ -15,9 +15,11 @@ _VISIBLE = 6.0
 """Steps must be so many standard uncertainties long before anything can be told from them."""
 _STILL = 0.25
 _WINDOW = 4
-_DEGREE = 3
+_DEGREE = 4
 _GAPS = (0, 1, 2)
 """Numbers of frames that may be missing, none first."""
+_ROUGH = 3.0
+"""What is left of smooth motion, over a standard uncertainty, where a gap may be the reason."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
@@ -48,10 +50,20 @@ def _repeated(place: Floats, noise: Floats) -> Mask:
     out = np.zeros(len(place), dtype=bool)
     for step in range(2, len(place) - 3):
         steps = np.diff(place[max(0, step - _BESIDE) : step + 2 + _BESIDE], axis=0)
-        now = min(step, _BESIDE)
-        before, after = steps[:now], steps[now + 1 :]
-        out[step + 1] = _stands(steps[now], before, after, float(noise[step : step + 2].max()))
+        now, usual = min(step, _BESIDE), float(noise[step : step + 2].max())
+        this, before, after = steps[now], steps[:now], steps[now + 1 :]
+        out[step + 1] = _stands(this, before, after, usual) or (
+            _stands(this, before[-1:], after[:1], usual)  # quick motions are alike but nearby
+            and not _rests(this, np.concatenate([before, after]))
+        )
     return out
+
+
+def _rests(step: Floats, about: Floats) -> bool:
+    """Whether others of the steps about are none either: the specimen moves by fits and starts."""
+    known = np.isfinite(step).all(axis=-1) & np.isfinite(about).all(axis=(0, 2))
+    length = np.sqrt(np.mean(about[:, known] ** 2, axis=(1, 2)))
+    return bool((length < _STILL * np.median(length)).any())
 
 
 def _stands(step: Floats, before: Floats, after: Floats, noise: float) -> bool:
@@ -84,7 +96,7 @@ def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         rough = (
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
         )
-        if rough and np.sqrt(rough[0]) > _VISIBLE * noise[shown[middle]]:
+        if rough and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
             out[shown[middle]] = min(rough[1:]) < _BETTER * rough[0]
     return out
 

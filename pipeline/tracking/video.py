@@ -11,13 +11,16 @@ import av
 import numpy as np
 
 from pipeline.errors import UserError
-from pipeline.tracking.arrays import Picture
+from pipeline.tracking.arrays import Floats, Picture
 from pipeline.tracking.pictures import brightness, images, pictures
 
 LOG = logging.getLogger(__name__)
 
 _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
 """Formats whose first plane is the brightness in 8 bit, as it is."""
+
+_ROUNDED = 0.5
+"""Part of an interval by which steady frames may differ: some containers count milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,12 @@ def length(path: Path) -> int:
             return max([1, *(stream.frames for stream in container.streams.video)])
     except (av.FFmpegError, FileNotFoundError):
         return 1
+
+
+def uneven(time: Floats) -> bool:
+    """Whether frames (frames,) s come at intervals that differ by more than stamps are rounded."""
+    interval = np.diff(time)
+    return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
 
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:

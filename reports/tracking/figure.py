@@ -9,6 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from pipeline.tracking.origin import WORD
 from pipeline.tracking.specimen import Specimen
 from reports import style
 from reports.tracking.measures import Measures
@@ -27,6 +28,8 @@ _SIZE, _TOP = 50.0, 9.0
 def figure(track: xr.Dataset, found: Measures, load_axis: str) -> Figure:
     """Maps above, courses below: over time, or over the displacement of the driven units."""
     drawn = style.page(132.0)
+    if track.attrs["synthetic"] == "yes":
+        drawn.text(0.99, 0.005, WORD, ha="right", va="bottom", color=style.ALTERED)
     specimen = of_track(track)
     there = np.isin(track["unit"].values, specimen.ids)
     residual = track["camera_residual"].values[there]
@@ -110,7 +113,8 @@ def _courses(
         axes.legend(loc="best")
     else:
         axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
-    axes.set(xlabel=label, ylabel="of the units, %", ylim=(0, None))
+    span = (np.nanmin(load), np.nanmax(load)) if len(load) > 1 else None
+    axes.set(xlabel=label, ylabel="of the units, %", xlim=span, ylim=(0, None))
     style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
     axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)
     place = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2)

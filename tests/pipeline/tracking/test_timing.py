@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.tracking import timing, uncertainty
+from pipeline.tracking import timing, uncertainty, video
 
 NOISE = 0.004
 FRAMES = 60
@@ -57,6 +57,34 @@ def test_frames_shown_again_are_found() -> None:
     assert told[25] == timing.DUPLICATE
 
 
+def wave(clock: np.ndarray) -> np.ndarray:
+    """Units over which a wave runs, of twelve frames and ten units, and noise."""
+    made = np.zeros((len(clock), len(CENTRE), 3))
+    made[..., 0] = 0.4 * np.sin(2 * np.pi * (clock[:, None] / 12 - CENTRE[:, 0] / 150))
+    return made + NOISE * np.random.default_rng(1).normal(size=made.shape)
+
+
+def test_faults_of_a_quick_wave_are_found() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[15:] += 1
+    clock[40:] -= 1
+    moved = wave(clock)
+    told = timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert {int(frame): int(told[frame]) for frame in np.flatnonzero(told)} == {
+        15: timing.DROPPED,
+        40: timing.DUPLICATE,
+    }
+
+
+@pytest.mark.parametrize("frames", [8, 12, 16])
+def test_the_turning_points_of_a_swing_are_no_faults(frames: int) -> None:
+    moved = np.zeros((FRAMES, len(CENTRE), 3))
+    moved[..., 0] = np.cos(2 * np.pi * (np.arange(FRAMES)[:, None] - 0.5) / frames)
+    moved += NOISE * np.random.default_rng(2).normal(size=moved.shape)
+    told = timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert not told.any()
+
+
 def test_stated_uncertainty_is_that_of_the_noise() -> None:
     clock = np.arange(FRAMES, dtype=float)
     moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
@@ -72,3 +100,9 @@ def test_units_that_are_seen_badly_say_so() -> None:
     moved[:, 9] += 4 * NOISE * random.normal(size=moved[:, 9].shape)
     told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE), CENTRE, steady)
     assert np.median(told[:, 9]) > 2.5 * np.median(told)
+
+
+def test_a_varying_rate_is_told_from_rounded_stamps() -> None:
+    steady = np.arange(FRAMES) / 30
+    assert not video.uneven(np.round(steady, 3))
+    assert video.uneven(np.delete(steady, [7, 30]))
