@@ -117,7 +117,6 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "video": os.path.relpath(video.resolve(), out.resolve().parent),
         "design": os.path.relpath(args.design.resolve(), out.resolve().parent),
         "structure": found.structure,
-        "specimen": found.kind,
         "pixel_size": f"{found.pixel_size:.4g} mm",
         "window": {"start": "0 s"},
         "synthetic": rendered(video) or None,

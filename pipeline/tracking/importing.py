@@ -51,7 +51,6 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
         f"title: {described.get('kind', described['name'])!r}",
         f"video: {str(video)!r}",
         f"design: {design}",
-        f"specimen: {_specimen(described)}",
         "synthetic: true",
     ]
     if scale := described.get("approx_px_per_mm"):
@@ -59,10 +58,6 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
     if video.is_dir() and (rate := described.get("fps")):
         lines.append(f"frame_rate: {rate:g} Hz")
     return "\n".join(lines) + "\n"
-
-
-def _specimen(described: dict[str, Any]) -> str:
-    return "dots" if described.get("markers", {}).get("per_unit") else "auto"
 
 
 def design(described: dict[str, Any]) -> xr.Dataset:
