@@ -40,7 +40,7 @@ def work(args: argparse.Namespace) -> None:
         UserError: sizes that make no sense, or a unit larger than a page.
     """
     from pipeline import datasets
-    from pipeline.fabrication.parts import labels
+    from pipeline.fabrication.naming import labels
     from pipeline.lab.faces import marks
     from pipeline.tracking import stickers
     from pipeline.tracking.specimen import as_built, of_design

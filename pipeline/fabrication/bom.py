@@ -104,7 +104,7 @@ def bill(
     yield from units
     yield from shims
     for file, parts in contents.items():
-        yield Row(_kind(file), file, 1, note=f"{len(parts)} parts")
+        yield Row(_kind(file), file, 1, note=_counted(len(parts), "part"))
     yield from _totals(units, shims, asked)
 
 
@@ -121,8 +121,12 @@ def _unit(unit: Unit, density: float, holders: Mapping[str, Sequence[str]]) -> R
         width=y1 - y0,
         height=unit.height,
         files=" ".join(holders.get(unit.label, ())),
-        note=f"column {unit.column + 1} row {unit.row + 1}{_slots(unit)}",
+        note=f"column {unit.column + 1} row {unit.row + 1}{_letter(unit)}{_slots(unit)}",
     )
+
+
+def _letter(unit: Unit) -> str:
+    return f"; carries {unit.letter} for its id" if unit.letter else ""
 
 
 def _slots(unit: Unit) -> str:
@@ -148,8 +152,12 @@ def _shim(shim: Shim, asked: Fabrication, holders: Mapping[str, Sequence[str]]) 
         width=shim.width,
         height=asked.shims.thickness,
         files=" ".join(holders.get(shim.id, ())),
-        note=f"{len(shim.ligaments)} ligaments and {shim.spares} spares",
+        note=f"{_counted(len(shim.ligaments), 'ligament')}, {_counted(shim.spares, 'spare')}",
     )
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _kind(file: str) -> str:

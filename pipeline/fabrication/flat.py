@@ -12,11 +12,12 @@ import shapely
 from shapely import LineString, Polygon, box
 
 from pipeline.fabrication.font import extent, text, turned
-from pipeline.fabrication.parts import Circle, Floats, Part, Specimen, Strokes
+from pipeline.fabrication.parts import Circle, Floats, Part, Shim, Specimen, Strokes
 from pipeline.problem.fabrication import Fabrication
 
 _SPECK = 0.01  # mm, shorter lines are left out
 _RIM = 10.0  # mm of the template around the specimen
+_SMALL, _RIM_OF_FOIL = 2.0, 0.4  # mm, letters on shims
 _TOOTH = 8.0  # mm, length of the comb's teeth
 _HANDLE = 12.0  # mm, back of the comb
 _MOST_TEETH = 14
@@ -24,12 +25,27 @@ _COUPON_PITCH, _COUPON_DEPTH = 11.0, 14.0  # mm
 
 
 def shim_pieces(specimen: Specimen, wanted: Fabrication) -> list[Part]:
-    """Every piece of foil, spares included, the shortest first."""
+    """Every piece of foil, the shortest first; the first of each length, a spare, tells it."""
     return [
-        Part(shim.id, box(0.0, 0.0, shim.length, shim.width), wanted.shims.thickness)
+        Part(
+            shim.id,
+            box(0.0, 0.0, shim.length, shim.width),
+            wanted.shims.thickness,
+            engraving=_length(shim) if piece == 0 else (),
+        )
         for shim in specimen.shims
-        for _ in range(shim.count)
+        for piece in range(shim.count)
     ]
+
+
+def _length(shim: Shim) -> Strokes:
+    """The length of a shim across it, or along it, if there is room."""
+    words, centre = f"{shim.length:g}", (shim.length / 2, shim.width / 2)
+    long, high = np.add(extent(words, _SMALL), 2 * _RIM_OF_FOIL)
+    for angle, room in ((np.pi / 2, centre[::-1]), (0.0, centre)):
+        if long <= 2 * room[0] and high <= 2 * room[1]:
+            return turned(text(words, _SMALL), angle, centre)
+    return ()
 
 
 def comb(specimen: Specimen, spacing: float, gap: float, wanted: Fabrication) -> Part:

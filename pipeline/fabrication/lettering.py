@@ -1,4 +1,4 @@
-"""Where the id of a unit and its arrow go."""
+"""Where the id of a unit goes."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import shapely
 from shapely import LineString, Polygon, affinity
 
 from pipeline.fabrication.boxes import box_at, room_for, spots
-from pipeline.fabrication.font import ADVANCE, STACK, extent, on_grid, text, turned
+from pipeline.fabrication.font import ADVANCE, STACK, extent, text, turned
 from pipeline.fabrication.parts import Floats, Strokes
 from pipeline.problem.fabrication import Labels
 
 LEAST_HEIGHT = 2.0  # mm
-_MARGINS = (0.4, 0.05)  # mm, wanted and least, to the rim of the part
+MARGINS = (0.4, 0.05)
+"""Wanted and least, to the rim of the part, mm."""
+
+_LEGIBLE = 0.7  # of the strokes
 _OVERHANGS = (0.25, 0.5, 0.75)  # mm, as the last resort
 _FINE_STEP = 0.2  # mm
 _ANGLES = np.deg2rad(np.arange(-90.0, 90.0, 10.0))  # tried where there is little room
 _ASIDE = 0.7  # mm that letters may be off the line of the first one
 _HAIR = 1e-6  # mm
-_LEAST_ARROW = 0.8  # mm
 _SPECK = 0.1  # mm; shorter pieces of a clipped stroke are left out
-_RING = 0.3  # mm, radius
-_ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
 
 
 class Placed(NamedTuple):
@@ -56,15 +56,16 @@ def fitted(words: str, outline: Polygon, body: Polygon, wanted: Labels) -> Place
         wanted: how large.
 
     Returns:
-        None if it has no room even so.
+        None if it has no room even so, or could not be read.
     """
     whole = next(_placements(words, outline, outline, wanted), None)
     if whole is not None:
         return whole
     for place in (body, *(body.buffer(over) for over in _OVERHANGS)):
         cut = list(_placements(words, place, outline, wanted))
-        if cut:
-            return max(cut, key=lambda placed: round(placed.kept, 2))
+        best = max(cut, key=lambda placed: round(placed.kept, 2), default=None)
+        if best is not None and best.kept > _LEGIBLE:
+            return best
     return None
 
 
@@ -92,13 +93,9 @@ def _framed(
 
 
 def _placed(top: Strokes, bottom: Strokes, box: shapely.Geometry, outline: Polygon) -> Placed:
-    strokes = _clipped(top, outline)
-    kept = _length(strokes) / _length(top)
-    return Placed(strokes, _clipped(bottom, outline), box, kept)
-
-
-def _length(strokes: Strokes) -> float:
-    return sum(LineString(stroke).length for stroke in strokes)
+    strokes = clipped(top, outline)
+    kept = total_length(strokes) / total_length(top)
+    return Placed(strokes, clipped(bottom, outline), box, kept)
 
 
 def _letter_by_letter(
@@ -106,7 +103,7 @@ def _letter_by_letter(
 ) -> Placed | None:
     """Smallest letters on a line or below each other, each where slots leave room for it."""
     size = extent(words[0], LEAST_HEIGHT)
-    box = _framed(size, LEAST_HEIGHT, _MARGINS[-1], wanted)
+    box = _framed(size, LEAST_HEIGHT, MARGINS[-1], wanted)
     for angle in (_slope(place), *_ANGLES):
         level = affinity.rotate(place, -angle, origin=(0.0, 0.0), use_radians=True)
         free = spots(box, 0.0, level, _FINE_STEP, level.centroid)[1:]
@@ -170,34 +167,14 @@ def _apart(
     )
 
 
-def mark(outline: Polygon, body: Polygon, taken: shapely.Geometry, wanted: Labels) -> Strokes:
-    """An arrow to +y, near to the place that is taken; a small ring at the upper end if no room."""
-    near = (taken.centroid.x, taken.centroid.y)
-    for place in (outline.difference(taken), body.difference(taken)):
-        for size in (0.5 * wanted.height, 0.4 * wanted.height, _LEAST_ARROW):
-            pen = min(wanted.stroke, 0.4 * size)
-            for margin in _MARGINS:
-                box = (size + pen + 2 * margin, 0.75 * size + pen + 2 * margin)
-                centre = room_for(box, 0.0, place, near)
-                if centre is not None:
-                    scaled = tuple((on_grid(line) - [2.0, 1.5]) * size / 4 for line in _ARROW)
-                    return _clipped(turned(scaled, 0.0, centre), outline)
-    return (_ring(outline),)
+def total_length(strokes: Strokes) -> float:
+    """Of strokes, mm."""
+    return sum(LineString(stroke).length for stroke in strokes)
 
 
-def _ring(outline: Polygon) -> Floats:
-    inner = outline.buffer(-_RING - _MARGINS[-1])
-    points = shapely.get_coordinates(
-        inner if not inner.is_empty else outline.representative_point()
-    )
-    turn = np.linspace(0.0, 2 * np.pi, 9)
-    top = points[np.lexsort((points[:, 0], points[:, 1]))[-1]]
-    return top + _RING * np.column_stack([np.cos(turn), np.sin(turn)])
-
-
-def _clipped(strokes: Strokes, outline: Polygon) -> Strokes:
+def clipped(strokes: Strokes, outline: Polygon) -> Strokes:
     """What of the strokes lies on the part."""
-    inner = outline.buffer(-_MARGINS[-1])
+    inner = outline.buffer(-MARGINS[-1])
     shapely.prepare(inner)
     kept: list[Floats] = []
     for stroke in strokes:
@@ -217,14 +194,14 @@ def _attempts(outline: Polygon, largest: float) -> Iterator[tuple[float, bool, f
     )
     slope = _slope(outline)
     for height in heights[::-1]:
-        for margin in _MARGINS:
+        for margin in MARGINS:
             yield float(height), False, margin, 0.0
             yield float(height), False, margin, slope
             across = slope + np.pi / 2 if slope < 0 else slope - np.pi / 2
             yield float(height), True, margin, across
     for angle in _ANGLES:
-        yield LEAST_HEIGHT, False, _MARGINS[-1], float(angle)
-        yield LEAST_HEIGHT, True, _MARGINS[-1], float(angle)
+        yield LEAST_HEIGHT, False, MARGINS[-1], float(angle)
+        yield LEAST_HEIGHT, True, MARGINS[-1], float(angle)
 
 
 def _slope(outline: Polygon) -> float:

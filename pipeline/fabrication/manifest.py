@@ -30,6 +30,7 @@ def write(folder: Path, specimen: Specimen, asked: Problem, design: Path) -> Non
         "parameters": asked.fabrication.model_dump(mode="json"),
         "parameters_note": "lengths in mm; spares is a ratio",
         "units": [unit.label for unit in specimen.units],
+        "letters_for_ids": specimen.letters,
         "shims": {shim.id: shim.count for shim in specimen.shims},
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),

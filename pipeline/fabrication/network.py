@@ -12,7 +12,8 @@ import xarray as xr
 from shapely import Polygon
 
 from pipeline.fabrication.candidates import Corner
-from pipeline.fabrication.parts import Floats, labels
+from pipeline.fabrication.naming import labels
+from pipeline.fabrication.parts import Floats
 from pipeline.fabrication.unmade import UnmadeError
 
 _HAIR = 1e-6

@@ -55,8 +55,16 @@ def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], wanted: Fabrica
 
 
 def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
-    """The body with its slots cut in, and the tips beside their mouths cut back."""
-    waste = [piece for slot in slots for piece in (_channel(slot), *_tips(body, slot, wanted))]
+    """The body with its slots cut in, and the tips beside their mouths cut back.
+
+    In front of its mouth a cut leaves the walls around the inner ends of other slots alone.
+    """
+    held = {slot.vertex: _across(slot).buffer(wanted.minimum_wall) for slot in slots}
+    waste: list[BaseGeometry] = []
+    for slot in slots:
+        walls = [area for vertex, area in held.items() if vertex != slot.vertex]
+        kept = shapely.intersection(_front(slot), shapely.union_all(walls))
+        waste += [_channel(slot).difference(kept), *_tips(body, slot, wanted)]
     # On a grid: in full precision GEOS's union may drop a piece whose edge touches another's.
     made = _largest(body.difference(shapely.union_all(waste, grid_size=GRID)))
     return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
@@ -89,6 +97,12 @@ def _rectangle(slot: Slot, start: float, stop: float, right: float, left: float)
 def _channel(slot: Slot) -> Polygon:
     """The slot, lengthened outwards until it has left the unit."""
     return _rectangle(slot, -_BACK * slot.width, slot.depth, -slot.width / 2, slot.width / 2)
+
+
+def _front(slot: Slot) -> Polygon:
+    """The part of the channel before the mouth."""
+    side = slot.width
+    return _rectangle(slot, -_BACK * slot.width, 0.0, -side, side)
 
 
 def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:

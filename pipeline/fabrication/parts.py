@@ -6,7 +6,6 @@ the right, y up, seen from the top); z = 0 is the underside.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -121,6 +120,7 @@ class Unit:
         markers: the tracking dots.
         height: in z.
         thickened: area added beside slots so that their walls are thick enough, mm^2.
+        letter: what it carries instead of its id, where there is no room for that.
     """
 
     number: int
@@ -136,6 +136,7 @@ class Unit:
     height: float
     underside: Strokes = ()
     thickened: float = 0.0
+    letter: str = ""
 
     @property
     def wall(self) -> float:
@@ -211,6 +212,11 @@ class Specimen:
     clamped: tuple[str, ...] = ()
     driven: tuple[str, ...] = field(default=())
 
+    @property
+    def letters(self) -> dict[str, str]:
+        """Letters by label, of the units that carry one instead of their id."""
+        return {unit.label: unit.letter for unit in self.units if unit.letter}
+
     @cached_property
     def by_label(self) -> dict[str, Unit]:
         """Units by label."""
@@ -220,30 +226,3 @@ class Specimen:
     def thin(self) -> dict[str, float]:
         """Thinnest walls by label, of the units that have thin ones."""
         return {unit.label: unit.wall for unit in self.units if unit.wall < THIN_WALL}
-
-
-def column_letters(column: int) -> str:
-    """A, B, ... Z, AA, AB, ... for columns from zero, as in a spreadsheet."""
-    letters = ""
-    column += 1
-    while column:
-        column, digit = divmod(column - 1, 26)
-        letters = chr(ord("A") + digit) + letters
-    return letters
-
-
-def labels(indices: Iterable[tuple[int, int]]) -> list[str]:
-    """A unique label for each lattice index (i, j): "C7" is column 2, row 6.
-
-    Units that share an index (the two triangles of a kagome cell) get a, b, ... behind it.
-    """
-    pairs = [(int(i), int(j)) for i, j in indices]
-    shared = len(set(pairs)) < len(pairs)
-    seen: dict[tuple[int, int], int] = {}
-    made = []
-    for pair in pairs:
-        nth = seen.get(pair, 0)
-        seen[pair] = nth + 1
-        suffix = chr(ord("a") + nth) if shared else ""
-        made.append(f"{column_letters(pair[0])}{pair[1] + 1}{suffix}")
-    return made

@@ -10,11 +10,13 @@ from pathlib import Path
 import shapely
 from shapely import Polygon
 
-from pipeline.fabrication import lettering, markers, outlines, slots
+from pipeline.fabrication import arrow, lettering, markers, outlines, slots
 from pipeline.fabrication.candidates import Corner, side_truncations
+from pipeline.fabrication.checks import reading
 from pipeline.fabrication.joints import ligaments, shims
+from pipeline.fabrication.naming import LETTERS
 from pipeline.fabrication.network import Network, corners, refuse_overlaps
-from pipeline.fabrication.parts import Slot, Specimen, Unit
+from pipeline.fabrication.parts import Slot, Specimen, Strokes, Unit
 from pipeline.fabrication.slots import NoRoomError
 from pipeline.fabrication.unmade import UnmadeError
 from pipeline.problem.fabrication import Fabrication
@@ -49,11 +51,12 @@ def specimen(
     bodies = dict(net.polygons)  # grows as units are thickened
     order = list(net.numbers)
     tree = shapely.STRtree([net.polygons[number] for number in order])
-    units = []
+    units, letters = [], LETTERS
     for number in order:
         near = tree.query(net.polygons[number], "dwithin", _NEAR)
         neighbours = [bodies[order[at]] for at in near if order[at] != number]
-        made, bodies[number] = unit(net, number, slotted[number], neighbours, wanted, file)
+        made, bodies[number] = unit(net, number, slotted[number], neighbours, wanted, file, letters)
+        letters = letters.replace(made.letter, "", 1)
         units.append(made)
         done()
     joined = ligaments(net, {one.number: one for one in units})
@@ -74,8 +77,18 @@ def unit(
     neighbours: Sequence[Polygon],
     wanted: Fabrication,
     file: Path,
+    letters: str = LETTERS,
 ) -> tuple[Unit, Polygon]:
     """A unit as made, and its body without slots.
+
+    Args:
+        net: the structure.
+        number: of the unit.
+        slotted: its vertices that take a slot.
+        neighbours: bodies of the units around it.
+        wanted: how it is made.
+        file: the design dataset, for messages.
+        letters: it carries one of these where there is no room for its id.
 
     Raises:
         UnmadeError: a slot or its id has no room.
@@ -83,13 +96,16 @@ def unit(
     label, design = net.labels[number], net.polygons[number]
     body, cuts = _body(design, slotted, neighbours, wanted, label, file)
     outline = outlines.cut(body, cuts, wanted)
-    written = lettering.fitted(label, outline, body, wanted.labels)
-    if written is None:
+    for words in (label, *letters):
+        written = _written(words, outline, body, wanted)
+        if written is not None:
+            break
+    else:
         what = f"no room for the id of unit {label}"
         remedy = "ask for larger units in the design (constraints.edge_length)"
         key = "fabrication.labels.height"
         raise UnmadeError(what, (design,), outline, file=file, key=key, remedy=remedy)
-    arrow = lettering.mark(outline, body, written.box, wanted.labels)
+    placed, mark = written
     dots = markers.dots(outline, wanted.markers)
     grown = body.area - outlines.filleted(design, wanted.fillet_radius).area
     made = Unit(
@@ -99,14 +115,29 @@ def unit(
         design,
         outline,
         cuts,
-        written.strokes,
-        arrow,
+        placed.strokes,
+        mark,
         dots,
         wanted.thickness,
-        written.mirrored,
+        placed.mirrored,
         float(grown) if grown > _HAIR else 0.0,
+        "" if words == label else words,
     )
     return made, body
+
+
+def _written(
+    words: str, outline: Polygon, body: Polygon, wanted: Fabrication
+) -> tuple[lettering.Placed, Strokes] | None:
+    """Letters on a unit and the mark beside them; None if there is no room to read them."""
+    placed = lettering.fitted(words, outline, body, wanted.labels)
+    if placed is None:
+        return None
+    mark = arrow.mark(outline, body, placed.box, wanted.labels)
+    cut = placed.kept < 1.0 - _HAIR
+    if cut and reading.read(words, placed.strokes + mark) is None:
+        return None
+    return placed, mark
 
 
 def _body(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pipeline.fabrication.assembly.paper import BOLD, GREY, INK, PALE, POINT, SIGNAL, Box, Sheet
 from pipeline.fabrication.assembly.tiles import OVERLAP, Tile
-from pipeline.fabrication.parts import Shim, Specimen, Unit, column_letters
+from pipeline.fabrication.naming import column_letters
+from pipeline.fabrication.parts import Shim, Specimen, Unit
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +66,7 @@ class Plan:
                     self._unit(unit, origin)
             for ligament in self._specimen.ligaments:
                 self._ligament(ligament.number, ligament.labels, origin)
-            self._names(origin)
+            self._headings(origin)
         self._joints(tile, origin)
 
     def sketch(self, pages: Sequence[Tile], corner: tuple[float, float], scale: float) -> None:
@@ -95,7 +96,7 @@ class Plan:
         self._sheet.polygon(np.asarray(unit.outline.exterior.coords)[:-1] + origin, fill)
         x, y, size = _name_place(unit)
         words = np.array([x, y - 0.12 * size]) + origin
-        self._sheet.text(words[0], words[1], unit.label, size, BOLD, at="middle")
+        self._sheet.text(words[0], words[1], _name(unit), size, BOLD, at="middle")
         for stroke in unit.mark:
             self._sheet.line(np.asarray(stroke) + origin, 0.25, SIGNAL)
 
@@ -114,7 +115,7 @@ class Plan:
         x, y = (first.mouth + second.mouth) / 2 + origin
         self._sheet.text(x + 0.4, y + 0.4, str(place), _NUMBER, colour=tone)
 
-    def _names(self, origin: Floats) -> None:
+    def _headings(self, origin: Floats) -> None:
         """Letters of the columns below and above, numbers of the rows left and right."""
         left, low, width, height = self.box
         columns: dict[int, list[Unit]] = {}
@@ -126,13 +127,13 @@ class Plan:
             name = column_letters(column)
             for nearest, y in ((min, low + 2.0), (max, low + height - 5.0)):
                 x = nearest(units, key=_row).design.centroid.x
-                self._name(np.add(origin, [x, y]), name)
+                self._heading(np.add(origin, [x, y]), name)
         for row, units in rows.items():
             for nearest, x in ((min, left + 3.5), (max, left + width - 3.5)):
                 y = nearest(units, key=_column).design.centroid.y - 1.2
-                self._name(np.add(origin, [x, y]), str(row + 1))
+                self._heading(np.add(origin, [x, y]), str(row + 1))
 
-    def _name(self, place: Floats, name: str) -> None:
+    def _heading(self, place: Floats, name: str) -> None:
         x, y = place
         self._sheet.text(x, y, name, 10, BOLD, GREY, "middle")
 
@@ -160,8 +161,13 @@ def _name_place(unit: Unit) -> tuple[float, float, float]:
     """Middle of the name of a unit, where it is widest, and the size of type that fits there."""
     circle = shapely.maximum_inscribed_circle(unit.outline, tolerance=0.05)
     (x, y), radius = circle.coords[0], float(circle.length)
-    fitting = 2.0 * radius * POINT / (_ASPECT * len(unit.label))
+    fitting = 2.0 * radius * POINT / (_ASPECT * len(_name(unit)))
     return x, y, min(_ID, max(_SMALLEST, fitting))
+
+
+def _name(unit: Unit) -> str:
+    """The id of a unit, and the letter that it carries instead if it does."""
+    return f"{unit.label}={unit.letter}" if unit.letter else unit.label
 
 
 def _row(unit: Unit) -> int:

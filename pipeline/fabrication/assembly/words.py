@@ -20,9 +20,10 @@ def steps(specimen: Specimen, asked: Fabrication, pages: Sequence[Tile]) -> list
         f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
-        "top of the plan.",
-        f"Cut and sort {pieces} shims and the spares by their length (next pages). Numbers and "
-        "colours on the plan are those of the list. A shim is as wide as a unit is high.",
+        f"top of the plan, as does a ring at the upper end.{_letters(specimen)}",
+        f"Cut and sort {pieces} shims and the spares by their length (next pages); on the sheet "
+        "the first of each length tells it in mm and is a spare. Numbers and colours on the plan "
+        "are those of the list. A shim is as wide as a unit is high.",
         f"Try a shim in the coupon first: the slots are made {asked.slot_width:.2f} mm wide for a "
         f"foil of {asked.shims.thickness:g} mm. If it is loose or stuck, change "
         "fabrication.slots.clearance and make the package again.",
@@ -33,6 +34,14 @@ def steps(specimen: Specimen, asked: Fabrication, pages: Sequence[Tile]) -> list
         "Check every gap with the comb, then glue (if at all) from the underside only.",
     ]
     return told + _fixing(specimen)
+
+
+def _letters(specimen: Specimen) -> str:
+    """What units carry that are too small for their ids."""
+    if not specimen.letters:
+        return ""
+    pairs = ", ".join(f"{letter} is {label}" for label, letter in specimen.letters.items())
+    return f" Units too small for their id carry a single letter: {pairs}."
 
 
 def _joining(pages: Sequence[Tile]) -> str:

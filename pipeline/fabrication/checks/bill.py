@@ -15,10 +15,13 @@ from pipeline.fabrication.checks import corners, sheets
 from pipeline.fabrication.checks.drawings import Drawing
 from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.placed import Shapes
+from pipeline.fabrication.checks.record import Record
 from pipeline.fabrication.checks.wanted import Wanted, every_unit
 from pipeline.problem.fabrication import Fabrication
 
 Row = Mapping[str, str]
+
+NAME = "bom.csv"
 
 _PLAY = 0.02  # mm that a shim may be longer or shorter than from slot end to slot end
 _WRITTEN = 1e-3  # mm
@@ -38,15 +41,9 @@ def rows(path: Path) -> list[dict[str, str]]:
         raise UserError(what, file=path, remedy=BUG) from error
 
 
-def check(path: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of the bill: each unit once, a shim as long as each ligament takes, and spares.
-
-    Args:
-        path: the bill.
-        wanted: units and ligaments that have to be there.
-        found: outlines of the units in the assembled specimen, whose slots are measured.
-        asked: the parameters of fabrication.
-    """
+def check(record: Record) -> Iterator[Fault]:
+    """Faults of the bill: each unit once, a shim as long as each ligament takes, and spares."""
+    path, wanted = record.folder / NAME, record.wanted
     listed = rows(path)
     units: Counter[str] = Counter()
     for row in listed:
@@ -55,7 +52,7 @@ def check(path: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> Iter
     yield from every_unit(units, wanted, path)
     shims = [row for row in listed if row["item"] == "shim"]
     left = {row["id"]: int(row["count"]) for row in shims}
-    for pair, length in _lengths(wanted, found, asked):
+    for pair, length in _lengths(wanted, record.found, record.asked):
         fits = [row["id"] for row in shims if abs(float(row["length_mm"]) - length) < _PLAY]
         if not fits:
             what = f"no shim is {length:.2f} mm long, from slot end to slot end"

@@ -12,38 +12,25 @@ from pipeline.fabrication.checks import bill, curves, drawings, sheets
 from pipeline.fabrication.checks.curves import REFERENCE
 from pipeline.fabrication.checks.drawings import Curve, Drawing
 from pipeline.fabrication.checks.faults import BUG, Fault
-from pipeline.fabrication.checks.placed import Shapes, check_outline
-from pipeline.fabrication.checks.wanted import Wanted, every_unit
+from pipeline.fabrication.checks.placed import check_outline
+from pipeline.fabrication.checks.record import Record
+from pipeline.fabrication.checks.sheets import NOMINAL
+from pipeline.fabrication.checks.wanted import every_unit
 from pipeline.problem.fabrication import Fabrication
 
-NOMINAL = "nominal"
 
-
-def check(folder: Path, wanted: Wanted, placed: Shapes, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of all drawings in a package's folder.
-
-    Args:
-        folder: that is checked.
-        wanted: the units that have to be there.
-        placed: outlines of the units in the assembled specimen.
-        asked: the parameters of fabrication.
-    """
-    paths = sorted(path for path in folder.glob("*.dxf") if not path.stem.endswith("_r12"))
-    variants: dict[tuple[str, str], list[Drawing]] = {}
-    for path in paths:
-        kind, _, variant = path.stem.split("_")
-        variants.setdefault((kind, variant), []).append(drawings.read(path))
-    yield from _units(folder, variants.get(("units", NOMINAL), []), wanted, placed)
-    yield from bill.check_pieces(folder.parent / "bom.csv", variants.get(("shims", NOMINAL), []))
+def check(record: Record) -> Iterator[Fault]:
+    """Faults of all drawings in a package."""
+    variants, asked = record.drawings, record.asked
+    yield from _units(record)
+    shims = variants.get(("shims", NOMINAL), [])
+    yield from bill.check_pieces(record.folder / bill.NAME, shims)
     for drawing in (drawing for found in variants.values() for drawing in found):
-        yield from _sheet(drawing, asked)
-        yield from _formats(drawing, folder, asked)
+        yield from curves.check(drawing)
+        material = thickness(drawing.file, asked)
+        yield from sheets.check(drawing, asked.laser, material, record.letters)
+        yield from _formats(drawing, asked)
     yield from _kerfs(variants, asked)
-
-
-def _sheet(drawing: Drawing, asked: Fabrication) -> Iterator[Fault]:
-    yield from curves.check(drawing)
-    yield from sheets.check(drawing, asked.laser, thickness(drawing.file, asked))
 
 
 def thickness(file: Path, asked: Fabrication) -> float:
@@ -53,11 +40,11 @@ def thickness(file: Path, asked: Fabrication) -> float:
     return kinds.get(file.name.partition("_")[0], asked.laser.template_thickness)
 
 
-def _formats(drawing: Drawing, folder: Path, asked: Fabrication) -> Iterator[Fault]:
+def _formats(drawing: Drawing, asked: Fabrication) -> Iterator[Fault]:
     """The same sheet as R12 and as SVG holds the same curves."""
     stem = drawing.file.stem
     for name in (f"{stem}_r12.dxf", f"{stem}.svg"):
-        other = drawings.read(folder / name)
+        other = drawings.read(drawing.file.with_name(name))
         yield from curves.check_form(other)
         yield from sheets.check_scale(other, asked.laser)
         if (what := _difference(drawing, other)) is not None:
@@ -105,10 +92,13 @@ def _kerfs(
             yield Fault("the drawings", what, "laser.kerf", BUG, nominal[0].file)
 
 
-def _units(folder: Path, units: list[Drawing], wanted: Wanted, placed: Shapes) -> Iterator[Fault]:
+def _units(record: Record) -> Iterator[Fault]:
     """Each unit once, none that is not there, each true to its design."""
+    units = record.drawings.get(("units", NOMINAL), [])
     found = [(part, shape, d.file) for d in units for part, shape in sheets.outlines(d)]
-    yield from every_unit(Counter(part for part, _, _ in found), wanted, folder)
+    yield from every_unit(
+        Counter(part for part, _, _ in found), record.wanted, record.folder / "laser"
+    )
     for label, shape, file in found:
-        if label in wanted.polygons:
-            yield from check_outline(label, file, shape, placed)
+        if label in record.wanted.polygons:
+            yield from check_outline(label, file, shape, record.found)

@@ -10,6 +10,7 @@ import xarray as xr
 
 from pipeline.fabrication.checks import bill, cutting, papers, placed, printing, solids
 from pipeline.fabrication.checks.faults import Fault, stop
+from pipeline.fabrication.checks.record import Record
 from pipeline.fabrication.checks.wanted import of_design
 from pipeline.problem.fabrication import Fabrication
 
@@ -40,14 +41,15 @@ def check_package(
     wanted = of_design(design, structure)
     assembled = solids.read_stl(folder / "print/assembled.stl")
     found = placed.shapes(assembled, wanted, asked)
+    record = Record(folder, wanted, found, asked, papers.letters(folder))
     faults: list[Fault] = []
     steps: Iterable[Iterator[Fault]] = (
         placed.check_assembled(assembled, found, wanted, asked),
-        printing.check(folder / "print", wanted, found, asked),
-        cutting.check(folder / "laser", wanted, found, asked),
-        printing.check_fixtures(folder / "fixture", asked),
-        bill.check(folder / "bom.csv", wanted, found, asked),
-        papers.check(folder, wanted),
+        printing.check(record),
+        cutting.check(record),
+        printing.check_fixtures(record),
+        bill.check(record),
+        papers.check(record),
     )
     for step in steps:
         faults += step

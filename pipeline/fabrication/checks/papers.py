@@ -3,25 +3,48 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from pipeline.fabrication.checks import pages
 from pipeline.fabrication.checks.faults import BUG, Fault
-from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.fabrication.checks.record import Record
 from pipeline.provenance import file_hash
 
 
-def check(folder: Path, wanted: Wanted) -> Iterator[Fault]:
+def letters(folder: Path) -> dict[str, str]:
+    """What the manifest says that small units carry instead of their ids, by label."""
+    return dict(_told(folder)["letters_for_ids"])
+
+
+def check(record: Record) -> Iterator[Fault]:
     """Faults of a package's papers."""
-    yield from pages.check(folder / "assembly.pdf", wanted.polygons.keys())
-    yield from _manifest(folder)
+    yield from _unique(record)
+    names = {label: f"{label}={letter}" for label, letter in record.letters.items()}
+    shown = [names.get(label, label) for label in record.wanted.polygons]
+    yield from pages.check(record.folder / "assembly.pdf", shown)
+    yield from _manifest(record.folder)
+
+
+def _unique(record: Record) -> Iterator[Fault]:
+    """No two units carry the same id or letter."""
+    carried = Counter(record.letters.get(label, label) for label in record.wanted.polygons)
+    for words, count in carried.items():
+        if count > 1:
+            where = record.folder / "manifest.json"
+            yield Fault(f"unit {words}", f"{count} units carry this", "labels", BUG, where)
+
+
+def _told(folder: Path) -> dict[str, Any]:
+    return dict(json.loads((folder / "manifest.json").read_text(encoding="utf-8")))
 
 
 def _manifest(folder: Path) -> Iterator[Fault]:
     """The hashes of all files, and of no others."""
     path = folder / "manifest.json"
-    told = json.loads(path.read_text(encoding="utf-8"))
+    told = _told(folder)
     files = {
         found.relative_to(folder).as_posix(): file_hash(found)
         for found in folder.rglob("*")

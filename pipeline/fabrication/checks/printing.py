@@ -7,34 +7,32 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from shapely import Geometry
 
-from pipeline.fabrication.checks import plates, solids
+from pipeline.fabrication.checks import plates, solids, sunk
 from pipeline.fabrication.checks.faults import BUG, Fault
-from pipeline.fabrication.checks.placed import Shapes, check_outline
+from pipeline.fabrication.checks.placed import check_outline
+from pipeline.fabrication.checks.record import Record
 from pipeline.fabrication.checks.solids import Solid, fault
-from pipeline.fabrication.checks.wanted import Wanted, every_unit
+from pipeline.fabrication.checks.wanted import every_unit
 from pipeline.problem.fabrication import Fabrication
 
 _ALIKE = 1e-3
 """Relative difference of volume that two files of one part may have."""
 
+_NEAR = 5e-3  # mm between the same vertex of two files
 
-def check(folder: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of all meshes of parts in a package's folder.
 
-    Args:
-        folder: that is checked.
-        wanted: the units that have to be there.
-        found: outlines of the units in the assembled specimen.
-        asked: the parameters of fabrication.
-    """
+def check(record: Record) -> Iterator[Fault]:
+    """Faults of all meshes of parts in a package."""
+    folder, wanted, asked = record.folder / "print", record.wanted, record.asked
     units = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("units/*.stl"))}
     yield from every_unit(Counter(units.keys()), wanted, folder / "units")
     for label, solid in units.items():
         faults = list(solids.check(solid))
         yield from faults
         if not faults and label in wanted.polygons:
-            yield from _unit(label, solid, found, asked)
+            yield from _unit(label, solid, record)
     names, faults = _plates(folder.glob("units_*.3mf"), units, asked)
     yield from faults
     yield from every_unit(Counter(names), wanted, folder)
@@ -42,36 +40,55 @@ def check(folder: Path, wanted: Wanted, found: Shapes, asked: Fabrication) -> It
         yield from plates.check_plate(solids.read_3mf(path), asked.print)
 
 
-def check_fixtures(folder: Path, asked: Fabrication) -> Iterator[Fault]:
+def check_fixtures(record: Record) -> Iterator[Fault]:
     """Faults of clamps, adapter and jig: solids, each on one plate as in its own file."""
+    folder = record.folder / "fixture"
     parts = {path.stem: solids.read_stl(path) for path in sorted(folder.glob("*.stl"))}
     for solid in parts.values():
         yield from solids.check(solid)
-    names, faults = _plates(folder.glob("*.3mf"), parts, asked)
+    names, faults = _plates(folder.glob("*.3mf"), parts, record.asked)
     yield from faults
     if sorted(names) != sorted(parts):
         what = "the plates do not hold each of the fixture's parts once"
         yield Fault("the fixture", what, "fixture", BUG, folder)
 
 
+def first_level(asked: Fabrication) -> float:
+    """Height up to which a unit may be drawn in, or zero."""
+    return min(asked.print.layer, asked.labels.depth)
+
+
 def levels(asked: Fabrication) -> list[float]:
     """Heights at which a unit's section changes, from the bed to its top."""
-    top = asked.thickness
-    first = min(asked.print.layer, asked.labels.depth)
+    top, first = asked.thickness, first_level(asked)
     recess = asked.markers.depth if asked.markers.kind != "none" else 0.0
     raised = recess if asked.markers.kind == "dots" else -recess
     return sorted({0.0, first, asked.labels.depth, top, top + raised})
 
 
-def _unit(label: str, solid: Solid, found: Shapes, asked: Fabrication) -> Iterator[Fault]:
-    """Height, volume and outline of one unit."""
+def _unit(label: str, solid: Solid, record: Record) -> Iterator[Fault]:
+    """Height, volume, outline and id of one unit."""
+    asked = record.asked
     high = solid.extent[1][2]
     tall = max(levels(asked))
     if abs(high - tall) > solids.TOLERANCE:
         yield fault(solid, f"it is {high:.3f} mm high instead of {tall:g} mm", "thickness")
     yield from solids.volume(solid, levels(asked))
     middle = solid.section(asked.thickness / 2)
-    yield from check_outline(label, solid.file, middle, found)
+    yield from check_outline(label, solid.file, middle, record.found)
+    yield from _id(label, solid, middle, record)
+
+
+def _id(label: str, solid: Solid, outline: Geometry, record: Record) -> Iterator[Fault]:
+    """The id that is sunk into the underside, where it can be read on the top."""
+    words, pose = record.letters.get(label, label), record.engraved.get(label)
+    asked = record.asked
+    low = first_level(asked) if first_level(asked) < asked.labels.depth else 0.0
+    inner = outline.buffer(-asked.print.first_layer_inset - _NEAR)
+    underside = solid.section((low + asked.labels.depth) / 2)
+    if pose is not None and not sunk.shows(words, underside, inner, pose):
+        what = f"its underside does not show {words} and how it stands"
+        yield fault(solid, what, "labels.height", "give larger letters")
 
 
 def _plates(
@@ -102,4 +119,14 @@ def _same(one: Solid, other: Solid) -> bool:
     return bool(
         np.allclose(first, second, rtol=0, atol=2 * solids.TOLERANCE)
         and abs(volumes[0] - volumes[1]) < _ALIKE * volumes[1]
+        and _astray(one, other) < _NEAR
     )
+
+
+def _astray(one: Solid, other: Solid) -> float:
+    """Largest distance from a vertex of a mesh to one of the other, both at the origin."""
+    from scipy.spatial import KDTree
+
+    ours, theirs = (solid.vertices - solid.extent[0] for solid in (one, other))
+    there, back = KDTree(theirs).query(ours)[0], KDTree(ours).query(theirs)[0]
+    return float(max(there.max(), back.max()))

@@ -6,17 +6,22 @@ letter is looked for. Slots may cut through letters, so not all of a letter has 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import product
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import LineString
+from shapely.geometry.base import BaseGeometry
 
+from pipeline.fabrication.checks.order import in_order
 from pipeline.fabrication.font import text
 
 Floats = NDArray[np.float64]
+
+LEAST = 2.0
+"""Height of letters below which they cannot be read, mm."""
 
 LEGIBLE = 0.6
 """Share of an id's strokes that has to be there."""
@@ -24,41 +29,54 @@ LEGIBLE = 0.6
 _WHOLE = 0.98  # of the strokes, with which no better reading is looked for
 _NEAR = 0.02  # mm from a stroke
 _SAMPLE = 0.1  # mm
+_SPECK = 0.15  # mm; shorter pieces are ends of letters
 _HEIGHTS = (1.9, 12.0)  # mm, of letters
 _TURNS, _SIZES = 1e-3, 2e-3  # rad and mm: votes so near to each other are one
-_BALLOTS = 20
+_TURNS_KEPT, _SIZES_KEPT = 6, 3
 _SPOTS_KEPT = 8
 _MARK = 1.8  # mm, largest mark
 
 
-def height(words: str, strokes: Sequence[Floats]) -> float | None:
-    """Height of the letters of an id, mm; None if the strokes do not show it and a mark beside it.
+class Reading(NamedTuple):
+    """How letters stand: their height in mm, and their turn in rad."""
+
+    height: float
+    turn: float
+
+
+def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
+    """How the letters of an id stand; None if the strokes do not show it and a mark beside it.
 
     Args:
         words: the id.
         strokes: polylines (n, 2), mm: the id and the mark that tells how it stands.
     """
-    drawn = _segments(strokes)
+    lines = [stroke for stroke in strokes if len(stroke) > 1]
+    if not lines:
+        return None
+    drawn = _segments(lines)
     glyphs = [text(letter, 1.0) for letter in words]
-    whole = shapely.MultiLineString([stroke for stroke in strokes if len(stroke) > 1])
+    whole = shapely.MultiLineString(lines)
     best, most = None, LEGIBLE
     for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
         found, share = _read(letters, drawn, whole, spin)
-        if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
-            best, most = size, share
+        if share > most:
+            rest = shapely.get_parts(whole.difference(found.buffer(2 * _NEAR)))
+            if is_mark([piece for piece in rest if piece.length > _SPECK], _MARK):
+                best, most = Reading(size, turn), share
         if most > _WHOLE:
             break
     return best
 
 
-def _is_mark(rest: shapely.Geometry) -> bool:
-    """Whether the strokes that belong to no letter can be one small mark."""
-    if rest.is_empty:
+def is_mark(rest: Sequence[BaseGeometry], largest: float) -> bool:
+    """Whether what belongs to no letter can be one small mark."""
+    if not rest:
         return False
-    x0, y0, x1, y1 = rest.bounds
-    return bool(max(x1 - x0, y1 - y0) < _MARK)
+    x0, y0, x1, y1 = shapely.total_bounds(rest)
+    return bool(max(x1 - x0, y1 - y0) < largest)
 
 
 def _segments(strokes: Sequence[Floats]) -> Floats:
@@ -66,39 +84,51 @@ def _segments(strokes: Sequence[Floats]) -> Floats:
     return np.concatenate([np.stack([stroke[:-1], stroke[1:]], axis=1) for stroke in strokes])
 
 
-def _ballots(drawn: Floats, known: Floats) -> list[tuple[float, float]]:
-    """Heights and turns of the text with most votes."""
+def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
+    """Heights and turns of the text, those with most votes first.
+
+    A stroke that a slot cuts votes for the right turn still, for the height only a whole one does:
+    where all are cut, letters are small.
+    """
     ours, theirs = (pair[:, 1] - pair[:, 0] for pair in (drawn, known))
     ratio = (ours[:, 0] + 1j * ours[:, 1])[:, None] / (theirs[:, 0] + 1j * theirs[:, 1])[None]
     votes = np.concatenate([ratio.ravel(), -ratio.ravel()])  # strokes may be drawn backwards
-    sizes = np.abs(votes)
-    votes = votes[(sizes > _HEIGHTS[0]) & (sizes < _HEIGHTS[1])]
-    rounded = np.column_stack([np.abs(votes) / _SIZES, np.angle(votes) / _TURNS]).round()
-    kinds, counts = np.unique(rounded, axis=0, return_counts=True)
-    best = kinds[np.argsort(-counts, kind="stable")[:_BALLOTS]]
-    return [(float(size) * _SIZES, float(turn) * _TURNS) for size, turn in best]
+    turns = np.round(np.angle(votes) / _TURNS)
+    sizes = np.round(np.abs(votes) / _SIZES)
+    possible = (np.abs(votes) > _HEIGHTS[0]) & (np.abs(votes) < _HEIGHTS[1])
+    for turn in _commonest(turns, _TURNS_KEPT):
+        for size in _commonest(sizes[possible & (turns == turn)], _SIZES_KEPT):
+            yield size * _SIZES, turn * _TURNS
+        yield LEAST, turn * _TURNS
+
+
+def _commonest(votes: Floats, count: int) -> list[float]:
+    """The values with most votes, the largest of those with as many first."""
+    kinds, counts = np.unique(votes, return_counts=True)
+    return [float(kind) for kind in kinds[np.lexsort((-kinds, -counts))[:count]]]
 
 
 def _read(
     letters: Sequence[Sequence[Floats]], drawn: Floats, whole: shapely.Geometry, spin: Floats
 ) -> tuple[shapely.Geometry, float]:
     """The letters where they stand, in reading order, and the share of them that is there."""
+    lengths = [shapely.MultiLineString(letter).length for letter in letters]
     offers = [_spots(letter, drawn, whole) for letter in letters]
-    lengths = np.array([shapely.MultiLineString(letter).length for letter in letters])
-    best, most = np.zeros((0, 2)), 0.0
-    for chosen in product(*offers):
-        share = float(np.dot([there for there, _ in chosen], lengths) / lengths.sum())
-        spots = np.array([spot for _, spot in chosen])
-        if share > most and _ordered(spots @ np.linalg.inv(spin)):
-            best, most = spots, share
-    lines = [one + at for at, letter in zip(best, letters, strict=False) for one in letter]
-    return shapely.MultiLineString(lines), most
+    upright = [places @ np.linalg.inv(spin) for places, _ in offers]
+    weights = [there * length for (_, there), length in zip(offers, lengths, strict=True)]
+    taken, weight = in_order(upright, weights)
+    lines = [
+        stroke + places[at]
+        for at, letter, (places, _) in zip(taken, letters, offers, strict=False)
+        for stroke in letter
+    ]
+    return shapely.MultiLineString(lines), weight / sum(lengths)
 
 
 def _spots(
     letter: Sequence[Floats], drawn: Floats, whole: shapely.Geometry
-) -> list[tuple[float, Floats]]:
-    """Where a letter may be, and how much of it is there; the best places.
+) -> tuple[Floats, Floats]:
+    """Where a letter may be (n, 2), and how much of it is there (n,); the best places.
 
     A stroke of the letter, or what a slot leaves of it, is drawn from its start or to its end.
     """
@@ -113,15 +143,10 @@ def _spots(
     places = np.unique(np.round(places, 2), axis=0)
     points = np.concatenate([shapely.get_coordinates(_finely(one)) for one in letter])
     near = shapely.distance(shapely.points(places[:, None] + points[None]), whole) < 2 * _NEAR
-    order = np.argsort(-near.mean(axis=1), kind="stable")[:_SPOTS_KEPT]
-    return [(float(near[at].mean()), places[at]) for at in order]
+    there = near.mean(axis=1)
+    order = np.argsort(-there, kind="stable")[:_SPOTS_KEPT]
+    return places[order], there[order]
 
 
 def _finely(stroke: Floats) -> shapely.Geometry:
     return shapely.segmentize(LineString(stroke), _SAMPLE)
-
-
-def _ordered(centres: Floats) -> bool:
-    """Whether letters follow each other to the right or downwards, in heights."""
-    steps = np.diff(centres, axis=0)
-    return bool((steps[:, 0] > 0.5).all() or (steps[:, 1] < -0.9).all())

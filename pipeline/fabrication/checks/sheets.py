@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import shapely
@@ -15,31 +15,37 @@ from pipeline.fabrication.checks.curves import CUTS, ENGRAVE, INNER, line, named
 from pipeline.fabrication.checks.curves import polygon as bounded
 from pipeline.fabrication.checks.drawings import MILLIMETRES, OUTER, Curve, Drawing
 from pipeline.fabrication.checks.faults import BUG, Fault
+from pipeline.fabrication.checks.reading import Reading
 from pipeline.problem.fabrication import Laser
+
+NOMINAL = "nominal"
+"""Ends the names of sheets without compensation for the kerf."""
 
 TOLERANCE = 1e-3
 """Lengths of a drawing are right to this, mm."""
 
-LEAST_LETTER = 2.0
 _KERF_TOLERANCE = 2e-3
 _READ = 0.1  # mm, to which the height of letters is read that slots cut
 _JOINED = 0.05  # mm; strokes so near to each other make one letter
-_HAIRLINE = 0.5  # mm; a hole that is drawn smaller for the kerf comes out larger
+_MATERIAL = "laser.template_thickness"
 _SVG = re.compile(r"<svg[^>]*>", re.DOTALL)
 
 
-def check(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fault]:
+def check(
+    drawing: Drawing, laser: Laser, thickness: float, letters: Mapping[str, str]
+) -> Iterator[Fault]:
     """Faults of a sheet: its scale, the place of its parts, its holes and its letters.
 
     Args:
         drawing: a written sheet.
         laser: what was asked for.
         thickness: of the material, mm; no hole may be smaller.
+        letters: what small units carry instead of their ids, by id.
     """
     yield from check_scale(drawing, laser)
     yield from _places(drawing, laser)
-    yield from _holes(drawing, thickness)
-    yield from _letters(drawing)
+    yield from _holes(drawing, thickness, laser)
+    yield from _letters(drawing, letters)
 
 
 def outlines(drawing: Drawing) -> list[tuple[str, Polygon]]:
@@ -96,16 +102,17 @@ def closest(shapes: np.ndarray, gap: float) -> Iterator[tuple[int, int, float]]:
         yield int(first), int(second), float(shapely.distance(shapes[first], shapes[second]))
 
 
-def _holes(drawing: Drawing, thickness: float) -> Iterator[Fault]:
-    """Holes that a laser can cut: no smaller than the material is thick."""
+def _holes(drawing: Drawing, thickness: float, laser: Laser) -> Iterator[Fault]:
+    """Holes that a laser can cut: no smaller than the material is thick, once they are cut."""
+    kerf = 0.0 if drawing.file.stem.endswith(NOMINAL) else laser.kerf
     for curve in drawing.curves:
         if curve.layer != INNER or not curve.closed:
             continue
-        width = narrowest(bounded(curve))
-        if width < thickness - _HAIRLINE:
+        width = narrowest(bounded(curve)) + kerf
+        if width < thickness - TOLERANCE:
             what = f"a hole {width:.2f} mm wide in material of {thickness:g} mm"
-            remedy = "make the hole wider or take thinner material"
-            yield _on(drawing, curve.part, what, "laser", remedy, (line(curve),))
+            remedy = "take thinner material, or ask for larger dots (fabrication.markers.diameter)"
+            yield _on(drawing, curve.part, what, _MATERIAL, remedy, (line(curve),))
 
 
 def narrowest(shape: Geometry) -> float:
@@ -124,9 +131,10 @@ def _sides(shape: Geometry) -> tuple[float, float]:
     return float(sides[0]), float(sides[1])
 
 
-def _letters(drawing: Drawing) -> Iterator[Fault]:
+def _letters(drawing: Drawing, letters: Mapping[str, str]) -> Iterator[Fault]:
     """Engraved letters of each part, inside of the part; those of a unit are its id."""
     units = drawing.file.name.startswith("units")
+    read = ids(drawing, letters) if units else {}
     for part, curves in drawing.parts().items():
         strokes = [curve for curve in curves if curve.layer == ENGRAVE and len(curve.points) > 1]
         outer = [bounded(curve) for curve in curves if curve.layer == OUTER and curve.closed]
@@ -136,17 +144,25 @@ def _letters(drawing: Drawing) -> Iterator[Fault]:
             if not shown[0].covers(written):
                 what, remedy = "engraving beyond its outline", "give smaller letters"
                 yield _on(drawing, part, what, "labels.height", remedy, shown)
-            height = _of_id(part, strokes) if units else _of_letters(written)
-            if height < LEAST_LETTER - (_READ if units else TOLERANCE):
-                what = f"letters of {height:.2f} mm, less than {LEAST_LETTER:g} mm"
+            height = _of_letters(written)
+            if units:
+                height = read[part].height if part in read else 0.0
+            if height < reading.LEAST - (_READ if units else TOLERANCE):
+                what = f"letters of {height:.2f} mm, less than {reading.LEAST:g} mm"
                 if height == 0.0:
                     what = "what is engraved does not show its id and how it stands"
                 yield _on(drawing, part, what, "labels.height", "give larger letters", shown)
 
 
-def _of_id(part: str, strokes: Sequence[Curve]) -> float:
-    """Height of the letters of a unit's id; zero if the strokes show another one, or none."""
-    return (reading.height(part, [curve.points for curve in strokes]) or 0.0) if strokes else 0.0
+def ids(drawing: Drawing, letters: Mapping[str, str]) -> dict[str, Reading]:
+    """How the ids of parts stand that can be read, by id; small ones carry `letters` instead."""
+    read = {}
+    for part, curves in drawing.parts().items():
+        strokes = [curve.points for curve in curves if curve.layer == ENGRAVE]
+        found = reading.read(letters.get(part, part), strokes)
+        if found is not None:
+            read[part] = found
+    return read
 
 
 def _of_letters(written: Geometry) -> float:

@@ -12,7 +12,7 @@ import xarray as xr
 from shapely import Polygon
 
 from pipeline.fabrication.checks.faults import BUG, Fault
-from pipeline.fabrication.parts import labels
+from pipeline.fabrication.naming import labels
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from pipeline.fabrication.parts import Circle, Ligament, Shim, Slot, Specimen, Unit, labels
+from pipeline.fabrication.naming import labels
+from pipeline.fabrication.parts import Circle, Ligament, Shim, Slot, Specimen, Unit
 from pipeline.problem.fabrication import Fabrication
 
 Floats = NDArray[np.float64]

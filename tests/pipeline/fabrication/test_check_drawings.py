@@ -25,7 +25,7 @@ Damage = Callable[[list[Curve]], list[Curve]]
 
 
 def found(drawing: Drawing) -> list[str]:
-    faults = [*curves.check(drawing), *sheets.check(drawing, LASER, THICKNESS)]
+    faults = [*curves.check(drawing), *sheets.check(drawing, LASER, THICKNESS, {})]
     return [f"{fault.part}: {fault.what}" for fault in faults]
 
 
@@ -85,7 +85,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     "off the sheet": (moved(OTHER, 38.0), "part B1: it does not lie on the sheet less its margin"),
     "sheet grown": (changed(REFERENCE, points=rectangle(0, 0, 100.1, 60, "").points), "it spans"),
     "inches": (lambda kept: [replace(c, points=c.points / 25.4) for c in kept], "it spans 0.000"),
-    "small hole": (shrunk(HOLE, 0.5), "a hole 2.00 mm wide in material of 4 mm"),
+    "small hole": (shrunk(HOLE, 0.94), "a hole 3.96 mm wide in material of 4 mm"),
     "small letters": (
         lambda kept: shrunk(LETTER + 1, 0.4)(shrunk(LETTER, 0.4)(kept)),
         "letters of 1.",

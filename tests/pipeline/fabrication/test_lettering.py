@@ -5,10 +5,11 @@ import pytest
 import shapely
 from shapely import LineString, Polygon, box
 
+from pipeline.fabrication.arrow import mark
 from pipeline.fabrication.font import extent, text
-from pipeline.fabrication.lettering import fitted, mark
+from pipeline.fabrication.lettering import fitted
 from pipeline.fabrication.markers import dots
-from pipeline.fabrication.parts import column_letters, labels
+from pipeline.fabrication.naming import column_letters, labels
 from pipeline.problem.fabrication import Labels, Markers
 
 WIDE = box(0.0, 0.0, 20.0, 12.0)

@@ -14,6 +14,7 @@ from pipeline.errors import UserError
 from pipeline.fabrication import manifest
 from pipeline.fabrication.checks import bill, placed, solids
 from pipeline.fabrication.checks.package import check_package
+from pipeline.fabrication.checks.record import Record
 from pipeline.fabrication.checks.wanted import of_design
 from pipeline.problem import Problem
 from pipeline.provenance import file_hash
@@ -153,7 +154,7 @@ def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
     edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
     wanted, asked = of_design(built.design(), "cloaked"), whole[1].fabrication
     found = placed.shapes(solids.read_stl(package / "print/assembled.stl"), wanted, asked)
-    told = [fault.what for fault in bill.check(package / "bom.csv", wanted, found, asked)]
+    told = [fault.what for fault in bill.check(Record(package, wanted, found, asked, {}))]
     assert told == ["no shim is 8.25 mm long, from slot end to slot end"] * len(wanted.joints)
 
 

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon, box
 
-from pipeline.fabrication.checks.reading import LEGIBLE, height
+from pipeline.fabrication.arrow import mark
+from pipeline.fabrication.checks.reading import LEGIBLE, read
 from pipeline.fabrication.font import text, turned
-from pipeline.fabrication.lettering import fitted, mark
-from pipeline.fabrication.parts import Strokes
+from pipeline.fabrication.lettering import fitted
+from pipeline.fabrication.parts import Floats, Strokes
 from pipeline.problem.fabrication import Labels
+
+
+def height(words: str, strokes: Sequence[Floats]) -> float | None:
+    found = read(words, strokes)
+    return None if found is None else found.height
+
 
 ARROW = (np.array([[5.0, 0.0], [5.5, 1.0], [6.0, 0.0]]),)
 ids = st.builds(
