@@ -35,7 +35,7 @@ class Found:
 
     Attributes:
         vertex: the nearest vertex of the design.
-        shape: the slot.
+        shape: the slot, from its mouth to its inner end.
         inner: its inner end, across.
         depth: from the vertex to the inner end, mm.
         width: mm.
@@ -44,7 +44,7 @@ class Found:
     """
 
     vertex: int
-    shape: Polygon
+    shape: Geometry
     inner: LineString
     depth: float
     width: float
@@ -73,9 +73,12 @@ def _found(shape: Polygon, made: Polygon, corners: Floats) -> Found:
     axis = _unit(np.mean(inner, axis=0) - np.mean(mouth, axis=0))
     depth = float((np.mean(inner, axis=0) - corners[vertex]) @ axis)
     line = LineString(inner)
+    end = np.mean(inner, axis=0)
+    reach = LineString([end, end - depth * axis]).buffer(width, cap_style="flat")
     around = shapely.union(made, shape.buffer(2e-4)).boundary
     wall = float(line.distance(around.difference(shape.buffer(0.1 * width))))
-    return Found(vertex, shape, line, depth, width, wall, _lip(made, inner, axis))
+    within = shape.intersection(reach)
+    return Found(vertex, within, line, depth, width, wall, _lip(made, inner, axis))
 
 
 def _owner(shape: Polygon, corners: Floats) -> int:

@@ -14,10 +14,13 @@ from shapely import MultiPolygon, Polygon
 from pipeline.fabrication.candidates import Corner
 from pipeline.fabrication.checks import corners, placed
 from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks.reading import read
 from pipeline.fabrication.checks.wanted import Wanted
+from pipeline.fabrication.naming import LETTERS
 from pipeline.fabrication.network import Network
 from pipeline.fabrication.parts import Unit
 from pipeline.fabrication.units import unit
+from pipeline.fabrication.unmade import UnmadeError
 from pipeline.problem.fabrication import Fabrication
 
 FILE = Path(__file__).parents[2] / "data/slender_units.json"
@@ -26,7 +29,7 @@ NAMES = [f"{found['study']} {found['label']}" for found in SLENDER]
 ASKED = Fabrication()
 
 
-def made(found: dict[str, Any]) -> Unit:
+def made(found: dict[str, Any], letters: str = LETTERS) -> Unit:
     """The unit beside its neighbours, some of which have grown."""
     net = Network(
         (0,), {0: Polygon(found["corners"])}, {0: found["label"]}, {0: (0, 0)}, (), (), ()
@@ -36,7 +39,7 @@ def made(found: dict[str, Any]) -> Unit:
         for number, (vertex, *along) in enumerate(found["slots"])
     ]
     neighbours = [Polygon(ring) for ring in found["neighbours"]]
-    return unit(net, 0, slotted, neighbours, ASKED, FILE)[0]
+    return unit(net, 0, slotted, neighbours, ASKED, FILE, letters)[0]
 
 
 @pytest.mark.parametrize("found", SLENDER, ids=NAMES)
@@ -57,3 +60,15 @@ def test_a_unit_that_grew_to_twice_its_size_is_found_in_its_place() -> None:
     found = placed.shapes(solid, Wanted({"A1": thin, "A2": beside}, {}, ()), ASKED)  # type: ignore[arg-type]
     assert found["A1"].equals(grown)
     assert found["A2"].equals(beside)
+
+
+def test_a_unit_without_room_for_its_id_carries_a_letter() -> None:
+    found = next(found for found in SLENDER if found["label"] == "AD15")
+    one = made(found)
+    assert one.letter == "A"
+    assert read("A", one.lettering + one.mark) is not None
+    assert read("AD15", one.lettering + one.mark) is None
+    taken = made(found, letters="YV")
+    assert taken.letter == "Y"
+    with pytest.raises(UnmadeError, match="no room for the id of unit AD15"):
+        made(found, letters="")
