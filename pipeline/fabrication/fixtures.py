@@ -8,12 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import Polygon, affinity, box
+from shapely import MultiPolygon, Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.flat import cuts
+from pipeline.fabrication.lettering import fitted
 from pipeline.fabrication.parts import Circle, Specimen, Unit
-from pipeline.fabrication.solids import Layer, Solid, discs, flat
+from pipeline.fabrication.solids import Layer, Solid, discs, flat, merged, pen
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.fabrication import Fixture as Asked
 
@@ -25,6 +26,7 @@ _LID = 3.0  # mm, thickness of lids
 _PRESS = 0.2  # mm by which posts are lower than the units, so that the lid presses
 _LUG = 2.5  # mm, thickness of the adapter's fingers
 _FOOT = 1.5  # mm by which the adapter's back is above the units
+_GRID = 1e-3  # mm, of letters
 _THIN = 0.4  # mm, half of the thinnest wall that a jig keeps
 
 
@@ -171,9 +173,31 @@ def _clamp(
     base = _main(kept)
     jaws = base.difference(mine.buffer(asked.clearance)).difference(corridors(specimen))
     jaws = printable(jaws).intersection(base)
-    top = asked.base + wanted.thickness - _PRESS
-    yield Solid(name, (Layer(base, 0.0, asked.base), Layer(flat(jaws), asked.base, top)))
-    yield Solid(f"{name}-LID", (Layer(base, 0.0, _LID),))
+    top, depth = asked.base + wanted.thickness - _PRESS, wanted.labels.depth
+    above, below = lettered(name, base, wanted)
+    yield Solid(
+        name,
+        (
+            Layer(below, 0.0, depth),
+            Layer(base, depth, asked.base),
+            Layer(flat(jaws), asked.base, top),
+        ),
+    )
+    yield Solid(f"{name}-LID", (Layer(base, 0.0, _LID - depth), Layer(above, _LID - depth, _LID)))
+
+
+def lettered(
+    name: str, shape: Polygon, wanted: Fabrication
+) -> tuple[Polygon | MultiPolygon, Polygon | MultiPolygon]:
+    """A shape without the strokes of a name, to be read from above and from below."""
+    placed = fitted(name, shape, shape, wanted.labels)
+    if placed is None:
+        return shape, shape
+    above, below = (
+        shapely.set_precision(merged(pen(strokes, wanted.labels.stroke)), _GRID)
+        for strokes in (placed.strokes, placed.mirrored)
+    )
+    return flat(shape.difference(above)), flat(shape.difference(below))
 
 
 def _main(shape: BaseGeometry) -> Polygon:

@@ -4,12 +4,34 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
+from pipeline.errors import UserError
 from pipeline.fabrication.parts import Specimen
 from pipeline.problem import Problem, section_hash
 from pipeline.provenance import file_hash, git_commit, package_versions
 
 NAME = "manifest.json"
+_AGAIN = "make the package again: python -m pipeline.fabricate, or snakemake --forcerun fabricate"
+_READ = ("units", "letters_for_ids", "shims", "thin_walls_mm", "files")
+
+
+def read(folder: Path) -> dict[str, Any]:
+    """What the manifest of a package tells.
+
+    Raises:
+        UserError: there is none, or it is that of another version of the exporter.
+    """
+    path = folder / NAME
+    try:
+        told = dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        what = f"the manifest cannot be read: {error}"
+        raise UserError(what, file=path, remedy=_AGAIN) from error
+    if missing := [key for key in _READ if key not in told]:
+        what = "another version of the exporter made the package: its manifest lacks a key"
+        raise UserError(what, file=path, key=missing[0], remedy=_AGAIN)
+    return told
 
 
 def write(folder: Path, specimen: Specimen, asked: Problem, design: Path) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pipeline.fabrication import manifest
 from pipeline.fabrication.checks.bill import rows
 from pipeline.fabrication.parts import THIN_WALL
 from pipeline.problem import Problem
@@ -64,14 +64,14 @@ class Package:
 
 def package(folder: Path, problem: Problem) -> Package:
     """What the page shows of a package, all of it read from the package's files."""
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    told = manifest.read(folder)
     name = folder.name
     return Package(
         name,
         TITLES.get(name, name),
-        list(_facts(folder, manifest)),
+        list(_facts(folder, told)),
         [Group(title, list(found)) for title, found in _groups(folder, problem)],
-        sorted(manifest["files"].items()),
+        sorted(told["files"].items()),
     )
 
 
@@ -85,17 +85,21 @@ def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str
             yield f"{above}{key}", ", ".join(str(item) for item in listed)
 
 
-def _facts(folder: Path, manifest: Mapping[str, Any]) -> Iterator[Fact]:
+def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[Fact]:
     bill = rows(folder / "bom.csv")
     total = {row["id"]: row for row in bill if row["item"] == "total"}
     units, shims = total["units"], total["shims"]
-    kinds = len(manifest["shims"])
-    yield Fact(units["count"], "units", f"{manifest['units'][0]} to {manifest['units'][-1]}")
-    yield Fact(shims["count"], "shims with spares", f"of {kinds} lengths")
+    kinds = len(told["shims"])
+    first, last = told["units"][0], told["units"][-1]
+    yield Fact(units["count"], "units", f"{first} to {last}")
+    yield Fact(shims["count"], "shims with spares", f"of {kinds} length{'s' * (kinds != 1)}")
     yield Fact(f"{float(units['mass_g']):.0f} g", "mass of the units", units["note"])
-    if thin := manifest["thin_walls_mm"]:
-        told = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
-        yield Fact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", told)
+    if thin := told["thin_walls_mm"]:
+        note = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
+        yield Fact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", note)
+    if letters := told["letters_for_ids"]:
+        note = ", ".join(f"{letter} is {label}" for label, letter in letters.items())
+        yield Fact(f"{len(letters)}", "units with a letter for their id", note)
     volume = float(units["volume_mm3"]) / 1000.0
     yield Fact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
     sheets = sum(row["item"] == "sheet" and "_nominal" in row["id"] for row in bill)

@@ -96,3 +96,26 @@ def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path
     words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
     assert build.main([*words, "--quiet"]) == 0
     assert out.read_text(encoding="utf-8") == page
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ('"thin_walls_mm"', '"thin_walls"', "another version of the exporter"),
+        ("{", "", "the manifest cannot be read"),
+    ],
+)
+def test_a_package_of_another_version_makes_one_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], before: str, after: str, told: str
+) -> None:
+    folder = tmp_path / "cloaked"
+    built.write(folder)
+    path = folder / "manifest.json"
+    path.write_text(path.read_text(encoding="utf-8").replace(before, after, 1), encoding="utf-8")
+    out = tmp_path / "index.html"
+    words = ["--problem", str(built.PROBLEM), "--packages", str(folder), "--out", str(out)]
+    assert build.main([*words, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert told in said
+    assert "make the package again" in said
+    assert not out.exists()

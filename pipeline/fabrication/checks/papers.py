@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
+from pipeline.fabrication import manifest
 from pipeline.fabrication.checks import pages
 from pipeline.fabrication.checks.faults import BUG, Fault
 from pipeline.fabrication.checks.record import Record
@@ -16,7 +15,7 @@ from pipeline.provenance import file_hash
 
 def letters(folder: Path) -> dict[str, str]:
     """What the manifest says that small units carry instead of their ids, by label."""
-    return dict(_told(folder)["letters_for_ids"])
+    return dict(manifest.read(folder)["letters_for_ids"])
 
 
 def check(record: Record) -> Iterator[Fault]:
@@ -33,18 +32,14 @@ def _unique(record: Record) -> Iterator[Fault]:
     carried = Counter(record.letters.get(label, label) for label in record.wanted.polygons)
     for words, count in carried.items():
         if count > 1:
-            where = record.folder / "manifest.json"
+            where = record.folder / manifest.NAME
             yield Fault(f"unit {words}", f"{count} units carry this", "labels", BUG, where)
-
-
-def _told(folder: Path) -> dict[str, Any]:
-    return dict(json.loads((folder / "manifest.json").read_text(encoding="utf-8")))
 
 
 def _manifest(folder: Path) -> Iterator[Fault]:
     """The hashes of all files, and of no others."""
-    path = folder / "manifest.json"
-    told = _told(folder)
+    path = folder / manifest.NAME
+    told = manifest.read(folder)
     files = {
         found.relative_to(folder).as_posix(): file_hash(found)
         for found in folder.rglob("*")
