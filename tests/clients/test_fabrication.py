@@ -15,6 +15,7 @@ from pipeline.fabrication.checks import drawings, solids
 from tests.clients.conftest import program
 from tests.pipeline.fabrication import built
 
+KINDS = {"units", "shims", "template", "comb", "coupon"}
 DPI = 300
 MM = 25.4 / DPI
 FOOT = 20.0  # mm of a page that hold the check bar
@@ -75,7 +76,9 @@ def test_a_unit_is_sliced_to_its_volume(package: Path, tmp_path: Path) -> None:
     assert filament(gcode) == pytest.approx(solids.read_stl(path).mesh.volume, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["print/units_plate1.3mf", "print/coupon_plate1.3mf"])
+@pytest.mark.parametrize(
+    "name", ["print/units_plate1.3mf", "print/coupon_plate1.3mf", "fixture/fixture_plate1.3mf"]
+)
 def test_a_plate_is_sliced_to_its_volume(package: Path, tmp_path: Path, name: str) -> None:
     gcode = tmp_path / "plate.gcode"
     place = ("--merge", "--dont-arrange", "--bed-shape", BED)
@@ -85,9 +88,10 @@ def test_a_plate_is_sliced_to_its_volume(package: Path, tmp_path: Path, name: st
 
 
 def test_cad_prints_every_drawing_with_ink(package: Path, tmp_path: Path) -> None:
-    for path in sorted(package.glob("laser/units_*.dxf")) + sorted(
-        package.glob("laser/comb_*.dxf")
-    ):
+    """Every kind of drawing, and one of them in all its variants."""
+    drawn = {*package.glob("laser/*_nominal.dxf"), *package.glob("laser/units_*.dxf")}
+    assert {path.name.partition("_")[0] for path in drawn} == KINDS
+    for path in sorted(drawn):
         copy = tmp_path / path.name
         copy.write_bytes(path.read_bytes())
         told("librecad", "dxf2pdf", "-a", copy, seconds=20.0)
