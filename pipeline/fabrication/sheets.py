@@ -15,6 +15,7 @@ from pipeline.problem.fabrication import Laser
 
 _MITRE = 5.0
 _SHORT = 1e-4  # mm; shorter edges are left out
+_FILLED = 0.2  # mm^2 that a kerf may fill, in narrow corners
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,11 @@ def compensated(part: Part, kerf: float, file: str) -> Part:
     if kerf == 0.0:
         return part
     grown = part.outline.buffer(kerf / 2, join_style="mitre", mitre_limit=_MITRE)
-    closed = isinstance(grown, Polygon) and len(grown.interiors) == 0
-    if not closed or any(hole.diameter <= kerf for hole in part.holes):
+    whole = isinstance(grown, Polygon) and len(grown.interiors) == 0
+    filled = grown.buffer(-kerf / 2, join_style="mitre").difference(part.outline).area
+    if not whole or filled > _FILLED or any(hole.diameter <= kerf for hole in part.holes):
         what = f"a kerf of {kerf:g} mm closes a slot or a hole of part {part.id}"
-        remedy = "lower the kerf, or raise fabrication.slots.clearance"
+        remedy = "lower it, or raise fabrication.slots.clearance and those of fabrication.coupon"
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)

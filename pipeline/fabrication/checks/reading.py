@@ -26,7 +26,8 @@ LEAST = 2.0
 LEGIBLE = 0.6
 """Share of an id's strokes that has to be there."""
 
-_WHOLE = 0.98  # of the strokes, with which no better reading is looked for
+_WHOLE = 0.98  # of the strokes, with which no better height is looked for
+_TURNED = 0.01  # rad; turns nearer to each other, or to half a turn, go together
 _NEAR = 0.02  # mm from a stroke
 _SAMPLE = 0.1  # mm
 _SPECK = 0.15  # mm; shorter pieces are ends of letters
@@ -54,11 +55,15 @@ def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
     lines = [stroke for stroke in strokes if len(stroke) > 1]
     if not lines:
         return None
+    lines = [stroke - lines[0][0] for stroke in lines]  # the same wherever the text stands
     drawn = _segments(lines)
     glyphs = [text(letter, 1.0) for letter in words]
     whole = shapely.MultiLineString(lines)
+    shapely.prepare(whole)
     best, most = None, LEGIBLE
     for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
+        if best is not None and (most > _WHOLE or abs(np.sin(turn - best.turn)) > _TURNED):
+            break  # no better one is to be expected, upright or upside down
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
         found, share = _read(letters, drawn, whole, spin)
@@ -66,8 +71,6 @@ def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
             rest = shapely.get_parts(whole.difference(found.buffer(2 * _NEAR)))
             if is_mark([piece for piece in rest if piece.length > _SPECK], _MARK):
                 best, most = Reading(size, turn), share
-        if most > _WHOLE:
-            break
     return best
 
 
@@ -142,7 +145,7 @@ def _spots(
     places = np.concatenate([(both[:, None] - own[None])[fits][:, end] for end in (0, 1)])
     places = np.unique(np.round(places, 2), axis=0)
     points = np.concatenate([shapely.get_coordinates(_finely(one)) for one in letter])
-    near = shapely.distance(shapely.points(places[:, None] + points[None]), whole) < 2 * _NEAR
+    near = shapely.dwithin(whole, shapely.points(places[:, None] + points[None]), 2 * _NEAR)
     there = near.mean(axis=1)
     order = np.argsort(-there, kind="stable")[:_SPOTS_KEPT]
     return places[order], there[order]

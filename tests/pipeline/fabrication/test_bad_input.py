@@ -52,6 +52,10 @@ MISTAKES: dict[str, tuple[Edit, tuple[str, ...]]] = {
         ("does not fit on a sheet", "fabrication.laser.sheet"),
     ),
     "negative kerf": (parameters(laser={"kerf": "-0.1 mm"}), ("fabrication.laser.kerf",)),
+    "wide kerf": (
+        parameters(laser={"kerf": "0.5 mm"}),
+        ("a kerf of 0.5 mm closes a slot", "fabrication.laser.kerf"),
+    ),
     "material": (parameters(material="wood"), ("fabrication.material", "PLA")),
     "cut short": (cut_short, ("design.nc",)),
 }

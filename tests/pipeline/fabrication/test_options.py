@@ -26,6 +26,7 @@ OPTIONS: dict[str, dict[str, object]] = {
         "fillet_radius": "0.5 mm",
         "thickness": "6 mm",
         "material": "PMMA",
+        "coupon": ["0.05 mm", "0.1 mm"],
     },
     "other foil": {
         "slots": {"clearance": "0.05 mm", "depth": "2.5 mm", "depth_max": "4 mm", "tip": "0.3 mm"},
