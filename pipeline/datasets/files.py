@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind, Variable
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind
 from pipeline.datasets.validation import faults
+from pipeline.datasets.variables import Variable
 from pipeline.errors import UserError, refusal
 
 _CHUNK = bytes(1 << 20)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
+from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind
+from pipeline.datasets.variables import Variable
 
 _KINDS = {"float64": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
 

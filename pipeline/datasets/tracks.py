@@ -1,0 +1,95 @@
+"""What datasets hold of motions that were filmed: as tracked, and as rendered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipeline.datasets.designs import SHAPE
+from pipeline.datasets.variables import LABELS, UNIT, Table, Variable, label
+
+_TRACKED = ("time", "unit", "dof")
+
+TRACK: Table = UNIT | {
+    "time": label(("time",), "s", "time of the frame since the start of the window"),
+    "dof": LABELS["dof"],
+    "vertices": replace(SHAPE["vertices"], long_name="vertices at rest, counter-clockwise"),
+    "displacement": Variable(
+        _TRACKED, "mm (ux, uy), rad (theta)", "displacement of the units", gaps=True
+    ),
+    "sigma": Variable(
+        _TRACKED,
+        "mm (ux, uy), rad (theta)",
+        "standard uncertainty of the displacement",
+        gaps=True,
+    ),
+    "quality": Variable(
+        ("time", "unit"),
+        "1",
+        "whether the unit was found, or why not",
+        "int8",
+        flags={
+            "good": 0,
+            "out_of_frame": 1,
+            "hidden": 2,
+            "glare": 3,
+            "poor_fit": 4,
+            "strayed": 5,
+            "absent": 6,
+        },
+    ),
+    "timing": Variable(
+        ("time",),
+        "1",
+        "timing of the frame: a duplicate shows the instant before, a frame is missing before",
+        "int8",
+        flags={"steady": 0, "duplicate": 1, "dropped": 2},
+    ),
+    "frame": Variable(("time",), "1", "number of the frame in the file, from zero", "int64"),
+    "load_force": Variable(
+        ("time",), "N", "force of the load cell, where there was one", gaps=True
+    ),
+    "drive_displacement": Variable(
+        ("time", "xy"),
+        "mm",
+        "displacement of the driven units, mean of those that are seen",
+        gaps=True,
+        coordinate=True,
+    ),
+    "camera_homography": Variable(
+        ("row", "column"),
+        "px, mm",
+        "homography from the specimen's plane to undistorted pixels",
+        gaps=True,
+    ),
+    "camera_centre": Variable(("xy",), "px", "centre of the distortion", gaps=True),
+    "camera_radial": Variable(
+        ("power",),
+        "1",
+        "distortion at half the image's larger side: square and fourth power",
+        gaps=True,
+    ),
+    "camera_residual": Variable(
+        ("unit", "xy"), "px", "first frame: place of the unit less that by design", gaps=True
+    ),
+    "image_size": Variable(("xy",), "px", "width and height of the image", "int64"),
+    "blur": Variable((), "px", "standard deviation of the camera's blur at edges", gaps=True),
+}
+
+_SHOWN = (
+    "time",
+    "dof",
+    "vertices",
+    "displacement",
+    "camera_homography",
+    "camera_centre",
+    "camera_radial",
+    "image_size",
+)
+
+TRUTH: Table = UNIT | {
+    **{name: TRACK[name] for name in _SHOWN},
+    "camera_eye": Variable(("xyz",), "mm", "centre of projection, z towards the camera"),
+}
+
+RECORDED = {"recording": "the recording's YAML, as read", "synthetic": "yes if rendered"}
+"""Attributes of both."""
