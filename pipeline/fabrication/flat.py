@@ -1,10 +1,9 @@
-"""The flat parts beside the units: shims, strips, template, spacer comb, coupon."""
+"""The flat parts beside the units: shims, template, spacer comb, coupon."""
 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +12,7 @@ from shapely import LineString, Polygon, box
 
 from pipeline.fabrication.font import extent, text, turned
 from pipeline.fabrication.parts import Circle, Floats, Part, Shim, Specimen, Strokes
+from pipeline.fabrication.strips import strips
 from pipeline.problem.fabrication import Fabrication
 
 _SPECK = 0.01  # mm, shorter lines are left out
@@ -150,51 +150,3 @@ def _template(number: int, specimen: Specimen, tile: Polygon, wanted: Fabricatio
     width, height = extent(name, 4.0)
     told = turned(text(name, 4.0), 0.0, (x0 + width / 2 + 3.0, y0 + height / 2 + 2.0))
     return Part(name, tile, wanted.laser.template_thickness, holes, told, tuple(lines))
-
-
-def strips(specimen: Specimen) -> Iterator[tuple[str, Floats]]:
-    """The authors' continuous paths: one strip along each row and one along each column.
-
-    A path goes from slot end to slot end: out of a unit through the mouth of its slot, along the
-    ligament, into the next unit, and across it.
-
-    Yields:
-        Name, and points (n, 2) in the specimen frame.
-    """
-    ends = _slot_ends(specimen)
-    lines: dict[str, list[tuple[float, Floats]]] = defaultdict(list)
-    for ligament in specimen.ligaments:
-        one, other = (specimen.by_label[label] for label in ligament.labels)
-        name = f"ROW{one.row + 1}" if one.row == other.row else f"COLUMN{one.column + 1}"
-        axis = 0 if one.row == other.row else 1
-        points = np.concatenate(
-            [ends[ligament.number, one.label], ends[ligament.number, other.label][::-1]]
-        )
-        lines[name].append((float(points[:, axis].mean()), points))
-    for name in sorted(lines, key=lambda name: (name.rstrip("0123456789"), len(name), name)):
-        points = np.concatenate(
-            [piece for _, piece in sorted(lines[name], key=lambda pair: pair[0])]
-        )
-        yield name, points
-
-
-def _slot_ends(specimen: Specimen) -> dict[tuple[int, str], Floats]:
-    """(2, 2) inner end and mouth of the slot of each ligament in each unit."""
-    return {
-        (slot.ligament, unit.label): np.stack([slot.end, slot.mouth])
-        for unit in specimen.units
-        for slot in unit.slots
-    }
-
-
-def strip_parts(specimen: Specimen, wanted: Fabrication) -> Sequence[Part]:
-    """The strips laid flat: their length, and lines where they enter and leave the units."""
-    made = []
-    for name, points in strips(specimen):
-        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        folds = tuple(
-            np.array([[x, 0.5], [x, wanted.thickness - 0.5]]) for x in along[1:-1].tolist()
-        )
-        outline = box(0.0, 0.0, float(along[-1]), wanted.thickness)
-        made.append(Part(name, outline, wanted.shims.thickness, scores=folds))
-    return made

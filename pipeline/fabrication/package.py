@@ -15,6 +15,7 @@ from pipeline.fabrication.parts import Part, Specimen
 from pipeline.fabrication.plates import plates
 from pipeline.fabrication.sheets import sheets
 from pipeline.fabrication.solids import Layer, Solid, pen, unit_solid
+from pipeline.fabrication.strips import strip_parts
 from pipeline.problem import Problem
 from pipeline.problem.fabrication import Fabrication
 
@@ -87,7 +88,7 @@ def _flat_parts(package: Package) -> Iterator[tuple[str, Sequence[Part]]]:
     yield "units", [unit.part for unit in specimen.units]
     yield "shims", flat.shim_pieces(specimen, wanted)
     if wanted.shims.strips:
-        yield "strips", flat.strip_parts(specimen, wanted)
+        yield "strips", strip_parts(specimen, wanted)
     yield "template", list(flat.templates(specimen, lattice.spacing, wanted))
     yield "comb", [flat.comb(specimen, lattice.spacing, lattice.ligament_length, wanted)]
     yield "coupon", [flat.coupon(wanted)]

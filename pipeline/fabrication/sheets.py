@@ -55,7 +55,7 @@ def sheets(kind: str, parts: Sequence[Part], wanted: Laser, file: str) -> Iterat
     ground = Ground("sheet", "laser", wanted.sheet, wanted.margin, wanted.gap)
     for kerf in dict.fromkeys((0.0, wanted.kerf)):
         drawn = [compensated(part, kerf, file) for part in parts]
-        variant = f"kerf{kerf:.2f}" if kerf else "nominal"
+        variant = f"kerf{kerf:g}" if kerf else "nominal"
         for number, placed in enumerate(spread(drawn, ground, file), 1):
             moved = tuple(part.moved(x, y) for part, x, y in placed)
             yield Sheet(f"{kind}_sheet{number}_{variant}", wanted.sheet, kerf, moved)

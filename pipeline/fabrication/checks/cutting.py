@@ -85,7 +85,7 @@ def _kerfs(
     for (kind, variant), nominal in variants.items():
         if variant != NOMINAL or kerf == 0.0:
             continue
-        if (kind, name := f"kerf{kerf:.2f}") in variants:
+        if (kind, name := f"kerf{kerf:g}") in variants:
             yield from sheets.compensation(variants[kind, name], nominal, kerf)
         else:
             what = f"there is no sheet of {kind} for a kerf of {kerf:g} mm"
