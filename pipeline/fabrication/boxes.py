@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely import Polygon, affinity
+from shapely import Polygon
 
 from pipeline.fabrication.font import turned
 from pipeline.fabrication.parts import Floats
@@ -42,7 +42,7 @@ def spots(
     """
     rim = np.asarray(box_at(box, angle, (0.0, 0.0)).exterior.coords)
     rim = np.concatenate([rim[:-1], (rim[:-1] + rim[1:]) / 2])
-    copies = [affinity.translate(outline, -x, -y) for x, y in rim]
+    copies = [shapely.transform(outline, lambda at, by=by: at - by) for by in rim]
     try:
         region = shapely.intersection_all(copies)
     except shapely.GEOSException:  # it gives up where copies nearly coincide
