@@ -25,6 +25,8 @@ _GATE = 0.25
 _AREA = 3.0
 """A camera that makes units so many times larger or smaller than told sees something else."""
 _BLOB_SIGMA = 0.2
+_DOT = 0.25
+"""Width of a median that a mark on a face does not survive, pitches."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,23 @@ def sight(image: Picture, specimen: Specimen, px_per_mm: float | None) -> list[S
         same turned. Upright comes first, mirrored last. Their cameras are without distortion.
     """
     scales = [px_per_mm] if px_per_mm else _likely_scales(image, specimen)
-    ways = [_ways(image, specimen, scale, bright) for scale in scales for bright in (True, False)]
-    found = max(ways, key=_most)
+    found = _best(image, specimen, scales)
+    if _most(found) < _NEARLY * specimen.count:
+        plain = [(scale, _unmarked(image, specimen.pitch * scale)) for scale in scales]
+        found = max(found, *(_best(shown, specimen, [scale]) for scale, shown in plain), key=_most)
     return [one for one in found if len(one.unit) >= _NEARLY * _most(found)]
+
+
+def _best(image: Picture, specimen: Specimen, scales: list[float]) -> list[Sighting]:
+    """The ways to see it at the scale, and of the polarity, that match the most units."""
+    ways = [_ways(image, specimen, scale, bright) for scale in scales for bright in (True, False)]
+    return max(ways, key=_most)
+
+
+def _unmarked(image: Picture, pitch: float) -> Image:
+    """The image without dots and speckle, which may stand out more than the faces themselves."""
+    width = int(_DOT * pitch) | 1
+    return np.asarray(cv2.medianBlur(np.clip(image, 0, 255).astype(np.uint8), width), np.uint8)
 
 
 def _ways(image: Picture, specimen: Specimen, scale: float, bright: bool) -> list[Sighting]:

@@ -24,6 +24,8 @@ _TURNED = np.deg2rad(8.0)
 _MISFIT = 4.0
 """An outline is another one if it lies so many pitches from where the design has it, is turned so
 far, or fits so many times worse than is usual."""
+_MARKED = 0.3
+"""Residuals over contrast that marks on a face may cause."""
 _STRANGE = 0.1
 """Most part of the units whose outlines may be others."""
 _QUARTER = np.pi / 4
@@ -75,6 +77,12 @@ def check(specimen: Specimen, sighting: Sighting, calibration: Calibration) -> N
     strange = there & ~agreeing(specimen, calibration.outlines)
     if strange.sum() > _STRANGE * there.sum():
         raise _another(f"{told(sighting, specimen)}; {_named(specimen, strange)}")
+    if not there.all():
+        LOG.warning(
+            "warning: %d units reach out of the first frame; where a whole row does, the lattice"
+            " may lie a unit aside from where it is taken to be",
+            np.count_nonzero(~there),
+        )
     if strange.any():
         LOG.warning("warning: %s in the first frame", _named(specimen, strange))
 
@@ -84,7 +92,8 @@ def agreeing(specimen: Specimen, outlines: Fits) -> Mask:
     ratio = outlines.noise / np.abs(outlines.photometry[:, 0])
     near = np.linalg.norm(outlines.pose[:, :2], axis=1) < _FAR * specimen.pitch
     upright = np.abs(outlines.pose[:, 2]) < _TURNED
-    return np.asarray(near & upright & (ratio < _MISFIT * np.nanmedian(ratio)))
+    usual = max(_MISFIT * float(np.nanmedian(ratio)), _MARKED)
+    return np.asarray(near & upright & (ratio < usual))
 
 
 def inside(specimen: Specimen, calibration: Calibration) -> Mask:
