@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import av
 import numpy as np
@@ -130,12 +131,18 @@ def _decoded(
         if time > end:
             return
         if time >= start:
-            yield Frame(index, time, _brightness(frame))
+            yield Frame(index, time, _upright(frame))
         index += 1
 
 
 def _nominal(stream: av.VideoStream, index: int) -> float:
     return index / float(stream.average_rate or 1)
+
+
+def _upright(frame: av.VideoFrame) -> Picture:
+    """The brightness as players show it: a phone tells how it was held."""
+    image, quarters = _brightness(frame), round(frame.rotation / 90)
+    return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
 
 
 def _brightness(frame: av.VideoFrame) -> Picture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import cv2
@@ -74,6 +75,17 @@ def test_pictures_without_a_rate_or_of_another_size_are_told(
         list(frames(tmp_path))
     assert len(list(frames(tmp_path, rate=1.0))) == 1
     assert "changes its size after 1 frames" in caplog.text
+
+
+def test_a_phone_s_video_is_shown_upright(tmp_path: Path, clip: list[np.ndarray]) -> None:
+    """The header of the track tells by how much players are to turn it."""
+    held = bytearray((CLIPS / "f_silhouette.mp4").read_bytes())
+    matrix = held.index(b"tkhd") + 4 + 40  # behind version, times, ids and layer
+    one = 1 << 16
+    held[matrix : matrix + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 768 * one, 0, 1 << 30)
+    phone = tmp_path / "phone.mp4"
+    phone.write_bytes(held)
+    np.testing.assert_array_equal(next(frames(phone)).image, np.rot90(clip[0], -1))
 
 
 def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(
