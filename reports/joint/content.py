@@ -15,7 +15,7 @@ from reports.joint import figure
 from reports.page import Page
 from reports.path import facts as path_facts
 from reports.path import measures, tables
-from reports.path.content import axis, fields
+from reports.path.content import axis, fields, marks
 from reports.path.course import course, display_name, structures
 from reports.player import Clip, payload
 from reports.publishing import Parts
@@ -117,11 +117,9 @@ def caption(studies: Sequence[Study]) -> str:
     names = ", ".join(figure.heading(study).lower() for study in studies)
     return (
         f"Structures ({names}) before loading and at full load, true to scale, coloured by "
-        "u<sub>y</sub>: intact, altered and cloaked. Below, for each: the mimicking error along "
-        "the load"
-        + (" with bands of 90 % of imperfect cloaks" if any(s.scatter for s in studies) else "")
-        + ", and the loss of distance between the top and the bottom row, mean over the middle "
-        "columns."
+        "u<sub>y</sub>: intact, altered and cloaked. Below, for each: the loss of distance between "
+        "the top and the bottom row, mean over the middle columns, and the mimicking error along "
+        f"the load{marks(studies)}."
     )
 
 

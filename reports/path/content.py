@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -94,11 +95,7 @@ def caption(study: Study) -> str:
         "the circle is the best feasible design.",
         "<b>c</b> Snapshots at true size, coloured by "
         f"{shade_of(problem, study.response).field.label.replace('u_y', 'u<sub>y</sub>')}.",
-        f"<b>d</b> {measures.measure_of(problem).label}"
-        + ("; the bands hold 90 % of the imperfect cloaks" if study.scatter is not None else "")
-        + ("; crosses mark jumps to another branch" if _jumps(study) else "")
-        + (_SECOND if study.again is not None and study.again.changed else "")
-        + ".",
+        f"<b>d</b> {measures.measure_of(problem).label}{marks([study])}.",
     ]
     letters = iter("efg")
     if course(problem, study.response).static and problem.objective.target != "rest":
@@ -115,5 +112,13 @@ def caption(study: Study) -> str:
     return " ".join(parts)
 
 
-def _jumps(study: Study) -> bool:
-    return bool((study.response["stability"] == JUMPED).any())
+def marks(studies: Sequence[Study]) -> str:
+    """What else is drawn with the curves of the measure, each after a semicolon."""
+    bands = any(study.scatter is not None for study in studies)
+    jumps = any((study.response["stability"] == JUMPED).any() for study in studies)
+    second = any(study.again is not None and study.again.changed for study in studies)
+    return (
+        ("; the bands hold 90 % of the imperfect cloaks" if bands else "")
+        + ("; crosses mark jumps to another branch" if jumps else "")
+        + (_SECOND if second else "")
+    )
