@@ -26,7 +26,7 @@ _LID = 3.0  # mm, thickness of lids
 _PRESS = 0.2  # mm by which posts are lower than the units, so that the lid presses
 _LUG = 2.5  # mm, thickness of the adapter's fingers
 _FOOT = 1.5  # mm by which the adapter's back is above the units
-_GRID = 1e-3  # mm, of letters
+_GRID, _PEN = 1e-3, 0.5  # mm, of letters
 _THIN = 0.4  # mm, half of the thinnest wall that a jig keeps
 
 
@@ -194,7 +194,7 @@ def lettered(
     if placed is None:
         return shape, shape
     above, below = (
-        shapely.set_precision(merged(pen(strokes, wanted.labels.stroke)), _GRID)
+        shapely.set_precision(merged(pen(strokes, min(wanted.labels.stroke, _PEN))), _GRID)
         for strokes in (placed.strokes, placed.mirrored)
     )
     return flat(shape.difference(above)), flat(shape.difference(below))

@@ -10,6 +10,9 @@ from pipeline.problem.quantities import Gap, Length, Ratio, fault
 from pipeline.problem.section import Section
 
 _LEAST_LABEL = 2.0  # mm; smaller letters can neither be engraved nor printed
+_LEAST_RIM = 2.0  # mm around a bolt's hole
+_MOST_PLAY = 1.0  # mm beside a unit in its pocket
+_WIDEST_SLOT = 8.0  # mm
 
 Clearances = Annotated[tuple[Gap, ...], Field(min_length=1, max_length=20)]
 
@@ -149,6 +152,16 @@ class Fixture(Section):
     base: Length = 4.0
     pocket: Length = 4.0
 
+    @model_validator(mode="after")
+    def _holds(self) -> Self:
+        if self.hole > self.pad - 2.0 * _LEAST_RIM:
+            what = f"a hole of {self.hole:g} mm leaves no rim on a pad of {self.pad:g} mm"
+            raise fault(what, f"give at most {self.pad - 2.0 * _LEAST_RIM:g} mm", "hole")
+        if self.clearance > _MOST_PLAY:
+            what = f"with {self.clearance:g} mm of clearance a pocket holds no unit"
+            raise fault(what, f"give at most {_MOST_PLAY:g} mm", "clearance")
+        return self
+
 
 class Fabrication(Section):
     """What is made of a design.
@@ -176,6 +189,21 @@ class Fabrication(Section):
     print: Print = Print()
     fixture: Fixture = Fixture()
     coupon: Clearances = (0.0, 0.05, 0.1, 0.15, 0.2)
+
+    @model_validator(mode="after")
+    def _sizes_fit(self) -> Self:
+        sunk = self.labels.depth + self.markers.depth * (self.markers.kind == "recess")
+        if sunk > self.thickness / 2.0:
+            what = f"letters and dots {sunk:g} mm deep take more than half of the thickness"
+            raise fault(what, f"keep them within {self.thickness / 2.0:g} mm", "labels.depth")
+        if self.print.first_layer_inset > self.minimum_wall / 2.0:
+            what = "the first layer is drawn in by more than half of the thinnest wall"
+            remedy = f"give at most {self.minimum_wall / 2.0:g} mm"
+            raise fault(what, remedy, "print.first_layer_inset")
+        if self.shims.thickness + 2.0 * max(self.coupon) > _WIDEST_SLOT:
+            what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
+            raise fault(what, "give smaller clearances", "coupon")
+        return self
 
     @property
     def slot_width(self) -> float:

@@ -56,6 +56,23 @@ MISTAKES: dict[str, tuple[Edit, tuple[str, ...]]] = {
         parameters(laser={"kerf": "0.5 mm"}),
         ("a kerf of 0.5 mm closes a slot", "fabrication.laser.kerf"),
     ),
+    "deep letters": (
+        parameters(labels={"depth": "3 mm"}, thickness="5 mm"),
+        ("more than half of the thickness", "fabrication.labels.depth", "within 2.5 mm"),
+    ),
+    "first layer": (
+        parameters(print={"first_layer_inset": "0.5 mm"}),
+        ("half of the thinnest wall", "fabrication.print.first_layer_inset"),
+    ),
+    "coupon": (parameters(coupon=["4 mm"]), ("slots wider than 8 mm", "fabrication.coupon")),
+    "bolt": (
+        parameters(fixture={"hole": "12 mm"}),
+        ("leaves no rim on a pad of 15 mm", "fabrication.fixture.hole"),
+    ),
+    "loose pocket": (
+        parameters(fixture={"clearance": "2 mm"}),
+        ("holds no unit", "fabrication.fixture.clearance"),
+    ),
     "material": (parameters(material="wood"), ("fabrication.material", "PLA")),
     "cut short": (cut_short, ("design.nc",)),
 }
