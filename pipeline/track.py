@@ -188,8 +188,13 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
     table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    if isinstance(track.ended, KeyboardInterrupt):
+        LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
+        raise track.ended
     if not args.no_report:
         _report(args.out, video)
+    if track.ended is not None:
+        raise track.ended
     if cell is not None:
         loadcell.check(log, track.start + track.time, held, cell)
 

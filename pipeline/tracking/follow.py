@@ -19,7 +19,7 @@ from pipeline.tracking.recovery import Recovery
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
 from pipeline.tracking.tracker import Found, Tracker
-from pipeline.tracking.video import Frame
+from pipeline.tracking.video import BrokenOffError, Frame
 from pipeline.tracking.walls import Walls
 
 LOG = logging.getLogger(__name__)
@@ -39,6 +39,7 @@ class Track(NamedTuple):
         quality: (frames, units) as in `tracker`.
         timing: (frames,) as in `timing`.
         calibration: of the camera.
+        ended: what ended it before the video's end, if anything did.
     """
 
     time: Floats
@@ -49,6 +50,7 @@ class Track(NamedTuple):
     quality: Ints
     timing: Ints
     calibration: Calibration
+    ended: BrokenOffError | KeyboardInterrupt | None
 
 
 def follow(
@@ -83,15 +85,23 @@ def follow(
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
     times, numbers, poses, sigmas, qualities = [], [], [], [], []
-    for frame in _all(first, frames):
-        found = tracker.step(frame.image)
-        times.append(frame.time)
-        numbers.append(frame.index)
-        poses.append(found.fits.pose.astype(np.float32))
-        sigmas.append(_image_sigma(found))
-        qualities.append(found.quality.astype(np.int8))
-        if tell is not None:
-            tell()
+    ended = None
+    try:
+        for frame in _all(first, frames):
+            found = tracker.step(frame.image)
+            times.append(frame.time)
+            numbers.append(frame.index)
+            poses.append(found.fits.pose.astype(np.float32))
+            sigmas.append(_image_sigma(found))
+            qualities.append(found.quality.astype(np.int8))
+            if tell is not None:
+                tell()
+    except (BrokenOffError, KeyboardInterrupt) as error:
+        if not qualities:
+            raise
+        ended = error
+    whole = slice(len(qualities))  # an interruption may come between two of the lists
+    times, numbers, poses, sigmas = times[whole], numbers[whole], poses[whole], sigmas[whole]
     motion = np.array(poses, float)
     motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
     time, told = np.array(times) - times[0], np.array(sigmas)
@@ -108,6 +118,7 @@ def follow(
         np.array(qualities),
         faults,
         calibration,
+        ended,
     )
 
 

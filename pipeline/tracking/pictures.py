@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,8 +11,6 @@ import numpy as np
 
 from pipeline.errors import UserError
 from pipeline.tracking.arrays import Picture
-
-LOG = logging.getLogger(__name__)
 
 _SUFFIXES = {".png", ".tif", ".tiff"}
 _WHITE = 255.0
@@ -37,18 +34,14 @@ def _numbers(path: Path) -> tuple[list[int], str]:
 
 
 def images(folder: Path) -> Iterator[Picture]:
-    """Their brightness, one after the other; one that cannot be read ends them, with a warning.
+    """Their brightness, one after the other.
 
     Raises:
-        UserError: the first cannot be read.
+        UserError: one cannot be read.
     """
-    for number, path in enumerate(pictures(folder)):
-        image = _read(path)
-        if image is None and number == 0:
+    for path in pictures(folder):
+        if (image := _read(path)) is None:
             raise UserError("not a readable picture", file=path, remedy="write the file again")
-        if image is None:
-            LOG.warning("warning: %s cannot be read: the frames end before it", path)
-            return
         yield image
 
 

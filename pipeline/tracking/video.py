@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import logging
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +15,30 @@ from pipeline.errors import UserError
 from pipeline.tracking.arrays import Floats, Picture
 from pipeline.tracking.pictures import brightness, images, pictures
 
-LOG = logging.getLogger(__name__)
-
 _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
 """Formats whose first plane is the brightness in 8 bit, as it is."""
 
 _ROUNDED = 0.5
 """Part of an interval by which steady frames may differ: some containers count milliseconds."""
+
+
+_ALL = 0.95
+"""A video with less of the frames than this that its file promises breaks off."""
+
+
+class BrokenOffError(UserError):
+    """A video that ends too early: the frames before are whole, and their track is kept."""
+
+
+def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
+    """A file that holds no more than so many frames, the last one at a time in s."""
+    until = math.floor(1000 * time) / 1000
+    return BrokenOffError(
+        f"the video breaks off after {count} frames, which are tracked: {why}",
+        file=path,
+        key="video",
+        remedy=f"copy the file again, or end there: `window: {{end: {until:g} s}}`",
+    )
 
 
 @dataclass(frozen=True)
@@ -44,8 +61,6 @@ def frames(
 ) -> Iterator[Frame]:
     """Decodes the video once, in sequence; nothing but the present frame is held.
 
-    A file that breaks off, or changes its size, ends there, with a warning.
-
     Args:
         path: the video, or a folder of pictures.
         start: of the time window, s; the first frame of the file is at zero.
@@ -54,6 +69,7 @@ def frames(
 
     Raises:
         UserError: no such file, or none that can be read; a folder without a rate.
+        BrokenOffError: after the frames that there are, if it breaks off or changes its size.
     """
     if not path.is_dir():
         yield from _even(path, _filmed(path, start, end))
@@ -61,7 +77,7 @@ def frames(
     if rate is None:
         remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
         raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
-    shown = (Frame(index, index / rate, image) for index, image in enumerate(images(path)))
+    shown = _pictured(path, rate)
     yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
 
 
@@ -84,13 +100,24 @@ def uneven(time: Floats) -> bool:
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
     """The frames as long as they are of one size."""
-    size: tuple[int, ...] | None = None
+    size, time = None, 0.0
     for frame in shown:
         size = frame.image.shape if size is None else size
         if frame.image.shape != size:
-            LOG.warning("warning: %s changes its size after %d frames", path, frame.index)
-            return
+            raise broken_off(path, "it changes its size", frame.index, time)
+        time = frame.time
         yield frame
+
+
+def _pictured(path: Path, rate: float) -> Iterator[Frame]:
+    count = 0
+    try:
+        for count, image in enumerate(images(path), start=1):
+            yield Frame(count - 1, (count - 1) / rate, image)
+    except UserError as error:
+        if count == 0:
+            raise
+        raise broken_off(path, f"{error.file} cannot be read", count, (count - 1) / rate) from error
 
 
 def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
@@ -113,17 +140,18 @@ def _decoded(
         raise UserError("the file holds no video", file=path, remedy="give a video file")
     stream = container.streams.video[0]
     first: float | None = None
-    index = 0
+    index, time = 0, 0.0
     decoded = iter(container.decode(stream))
-    while True:
+    while time < end:
         try:
             frame = next(decoded, None)
         except av.FFmpegError as error:
             if index == 0:
                 raise
-            LOG.warning("warning: %s breaks off after %d frames: %s", path, index, error.strerror)
-            return
+            raise broken_off(path, str(error.strerror), index, time) from error
         if frame is None:
+            if index < _ALL * _promised(container, stream, index / max(time, 1e-9)):
+                raise broken_off(path, "the file should go on", index, time)
             return
         stamp = _nominal(stream, index) if frame.pts is None else float(frame.time)
         first = stamp if first is None else first
@@ -133,6 +161,13 @@ def _decoded(
         if time >= start:
             yield Frame(index, time, _upright(frame))
         index += 1
+
+
+def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:
+    """How many frames there are as the file has it; zero where it does not tell."""
+    if stream.frames or len(container.streams) > 1 or not container.duration:
+        return float(stream.frames)
+    return rate * container.duration / av.time_base - 1
 
 
 def _nominal(stream: av.VideoStream, index: int) -> float:

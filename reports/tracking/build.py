@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,7 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
-    return (each for each in shown if each.index in wanted)
+    return islice((each for each in shown if each.index in wanted), len(wanted))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

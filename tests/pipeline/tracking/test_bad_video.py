@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -14,7 +15,7 @@ from pipeline.tracking import importing
 from pipeline.tracking.find import placed
 from pipeline.tracking.follow import follow
 from pipeline.tracking.specimen import Specimen, of_design
-from pipeline.tracking.video import Frame, frames
+from pipeline.tracking.video import BrokenOffError, Frame, frames
 from tests.pipeline.tracking.conftest import CLIPS
 
 SCALE = 2.74
@@ -65,7 +66,7 @@ def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[n
 
 
 def test_pictures_without_a_rate_or_of_another_size_are_told(
-    tmp_path: Path, clip: list[np.ndarray], caplog: pytest.LogCaptureFixture
+    tmp_path: Path, clip: list[np.ndarray]
 ) -> None:
     with pytest.raises(UserError, match="no pictures"):
         list(frames(tmp_path, rate=1.0))
@@ -73,8 +74,13 @@ def test_pictures_without_a_rate_or_of_another_size_are_told(
     cv2.imwrite(str(tmp_path / "a2.png"), clip[1][:50])
     with pytest.raises(UserError, match="no times"):
         list(frames(tmp_path))
-    assert len(list(frames(tmp_path, rate=1.0))) == 1
-    assert "changes its size after 1 frames" in caplog.text
+    shown = frames(tmp_path, rate=1.0)
+    next(shown)
+    with pytest.raises(BrokenOffError, match="changes its size"):
+        next(shown)
+    (tmp_path / "a2.png").write_bytes(b"nothing")
+    with pytest.raises(BrokenOffError, match=r"a2\.png cannot be read"):
+        list(frames(tmp_path, rate=1.0))
 
 
 def test_a_phone_s_video_is_shown_upright(tmp_path: Path, clip: list[np.ndarray]) -> None:
@@ -88,14 +94,30 @@ def test_a_phone_s_video_is_shown_upright(tmp_path: Path, clip: list[np.ndarray]
     np.testing.assert_array_equal(next(frames(phone)).image, np.rot90(clip[0], -1))
 
 
-def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(
-    tmp_path: Path,
-) -> None:
+def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     whole = (CLIPS / "c_rigid_lossless.mkv").read_bytes()
     broken = tmp_path / "broken.mkv"
     broken.write_bytes(whole[: len(whole) * 2 // 3])
-    read = list(frames(broken))
+    read: list[Frame] = []
+    with pytest.raises(BrokenOffError, match="which are tracked") as caught:
+        read.extend(frames(broken))
     assert 0 < len(read) < 6
+    end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
+    assert end == pytest.approx(read[-1].time, abs=0.001)
+    assert list(frames(broken, end=end))
+
+
+@pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])
+def test_what_was_tracked_before_an_end_is_kept(
+    specimen: Specimen, clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
+) -> None:
+    def shown() -> Iterator[Frame]:
+        yield from timed(clip[:2])
+        raise error
+
+    track = follow(shown(), specimen, SCALE)
+    assert track.ended is error
+    assert track.displacement.shape[0] == len(track.time) == len(track.quality) == 2
 
 
 def test_a_specimen_that_jumped_is_found_again(specimen: Specimen, clip: list[np.ndarray]) -> None:
