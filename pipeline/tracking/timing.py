@@ -20,6 +20,8 @@ _GAPS = (0, 1, 2)
 """Numbers of frames that may be missing, none first."""
 _ROUGH = 3.0
 """What is left of smooth motion, over a standard uncertainty, where a gap may be the reason."""
+_SMOOTH = 20.0
+"""The same where the gap is allowed for, at most: what is rougher is a jolt."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
@@ -97,7 +99,8 @@ def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
         )
         if rough and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
-            out[shown[middle]] = min(rough[1:]) < _BETTER * rough[0]
+            most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
+            out[shown[middle]] = min(rough[1:]) < most
     return out
 
 

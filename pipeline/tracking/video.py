@@ -87,8 +87,9 @@ def length(path: Path) -> int:
         return len(pictures(path))
     try:
         with av.open(str(path)) as container:
-            return max([1, *(stream.frames for stream in container.streams.video)])
-    except (av.FFmpegError, FileNotFoundError):
+            stream = container.streams.video[0]
+            return max(1, round(_promised(container, stream, float(stream.average_rate or 0))))
+    except (av.FFmpegError, FileNotFoundError, IndexError):
         return 1
 
 
