@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
-from pipeline.tracking.arrays import Floats, Ints, Picture
+from pipeline.tracking.arrays import Floats, Ints, Picture, Singles
 from pipeline.tracking.calibrate import Calibration, Setup, calibrate
 from pipeline.tracking.find import placed
 from pipeline.tracking.fitting import Fitter
@@ -25,6 +26,7 @@ from pipeline.tracking.walls import Walls
 LOG = logging.getLogger(__name__)
 
 _USUAL = Setup()
+_End = BrokenOffError | KeyboardInterrupt
 
 
 class Track(NamedTuple):
@@ -50,7 +52,7 @@ class Track(NamedTuple):
     quality: Ints
     timing: Ints
     calibration: Calibration
-    ended: BrokenOffError | KeyboardInterrupt | None
+    ended: _End | None
 
 
 def follow(
@@ -84,42 +86,49 @@ def follow(
     if (lies := placed(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
-    times, numbers, poses, sigmas, qualities = [], [], [], [], []
-    ended = None
+    rows, ended = _rows(_all(first, frames), tracker, tell)
+    times, numbers, poses, sigmas, qualities = (
+        np.array(values) for values in zip(*rows, strict=True)
+    )
+    del rows, tracker
+    motion = poses.astype(float)
+    motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
+    time = times - times[0]
+    faults = timing.faults(time, motion, sigmas)
+    sigma = uncertainty.calibrated(motion, sigmas, specimen.centre, faults == timing.STEADY)
+    sigma[~np.isfinite(motion)] = np.nan
+    start = float(times[0])
+    return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+class _Row(NamedTuple):
+    """What is kept of a frame."""
+
+    time: float
+    frame: int
+    pose: Singles
+    sigma: Singles
+    quality: NDArray[np.int8]
+
+
+def _rows(
+    frames: Iterator[Frame], tracker: Tracker, tell: Callable[[], None] | None
+) -> tuple[list[_Row], _End | None]:
+    """All frames tracked, or those before an end that comes too early."""
+    rows: list[_Row] = []
     try:
-        for frame in _all(first, frames):
+        for frame in frames:
             found = tracker.step(frame.image)
-            times.append(frame.time)
-            numbers.append(frame.index)
-            poses.append(found.fits.pose.astype(np.float32))
-            sigmas.append(_image_sigma(found))
-            qualities.append(found.quality.astype(np.int8))
+            pose, sigma = found.fits.pose.astype(np.float32), _image_sigma(found)
+            quality = found.quality.astype(np.int8)
+            rows.append(_Row(frame.time, frame.index, pose, sigma, quality))
             if tell is not None:
                 tell()
     except (BrokenOffError, KeyboardInterrupt) as error:
-        if not qualities:
+        if not rows:
             raise
-        ended = error
-    whole = slice(len(qualities))  # an interruption may come between two of the lists
-    times, numbers, poses, sigmas = times[whole], numbers[whole], poses[whole], sigmas[whole]
-    motion = np.array(poses, float)
-    motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
-    time, told = np.array(times) - times[0], np.array(sigmas)
-    del poses, sigmas, tracker
-    faults = timing.faults(time, motion, told)
-    sigma = uncertainty.calibrated(motion, told, specimen.centre, faults == timing.STEADY)
-    sigma[~np.isfinite(motion)] = np.nan
-    return Track(
-        time,
-        times[0],
-        np.array(numbers),
-        motion,
-        sigma,
-        np.array(qualities),
-        faults,
-        calibration,
-        ended,
-    )
+        return rows, error
+    return rows, None
 
 
 def tracker_of(image: Picture, specimen: Specimen, calibration: Calibration, kind: str) -> Tracker:
@@ -141,5 +150,6 @@ def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:
     yield from others
 
 
-def _image_sigma(found: Found) -> Floats:
-    return uncertainty.standard_errors(found.fits.scatter, found.fits.blocks).astype(np.float32)
+def _image_sigma(found: Found) -> Singles:
+    told = uncertainty.standard_errors(found.fits.scatter, found.fits.blocks)
+    return np.asarray(told, np.float32)
