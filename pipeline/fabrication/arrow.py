@@ -15,7 +15,7 @@ from pipeline.fabrication.lettering import MARGINS, clipped, total_length
 from pipeline.fabrication.parts import Floats, Strokes
 from pipeline.problem.fabrication import Labels
 
-_LEAST = 0.8  # mm
+_MOST, _LEAST = 1.5, 0.8  # mm
 _KEPT = 0.9  # of an arrow that a slot cuts
 _RING = 0.3  # mm, radius
 _ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
@@ -36,7 +36,7 @@ def _arrows(
     """Arrows that fit into the places, from the best to the last resort."""
     near = (taken.centroid.x, taken.centroid.y)
     for place in places:
-        for size in (0.5 * wanted.height, 0.4 * wanted.height, _LEAST):
+        for size in (_MOST, 0.8 * _MOST, _LEAST):
             pen = min(wanted.stroke, 0.4 * size)
             for margin in MARGINS:
                 box = (size + pen + 2 * margin, 0.75 * size + pen + 2 * margin)

@@ -34,7 +34,7 @@ class Placed(NamedTuple):
         strokes: as read from the top.
         mirrored: the same, to be read from below, seen from the top.
         box: their bounding box, turned with them.
-        kept: share of the strokes that lies on the part.
+        kept: share of the strokes that lies on the part, on the side where it is less.
     """
 
     strokes: Strokes
@@ -93,9 +93,9 @@ def _framed(
 
 
 def _placed(top: Strokes, bottom: Strokes, box: shapely.Geometry, outline: Polygon) -> Placed:
-    strokes = clipped(top, outline)
-    kept = total_length(strokes) / total_length(top)
-    return Placed(strokes, clipped(bottom, outline), box, kept)
+    strokes, mirrored = clipped(top, outline), clipped(bottom, outline)
+    kept = min(total_length(strokes), total_length(mirrored)) / total_length(top)
+    return Placed(strokes, mirrored, box, kept)
 
 
 def _letter_by_letter(

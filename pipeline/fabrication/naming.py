@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-LETTERS = "ABCDEFGJKLMPRTUVY"
+LETTERS = "ABCDEFGHJKLMNPRSTUVXY4"
 """What small units carry instead of their ids; none looks like another one that is turned."""
 
 

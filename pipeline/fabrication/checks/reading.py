@@ -67,19 +67,18 @@ def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
         found, share = _read(letters, drawn, whole, spin)
-        if share > most:
-            rest = shapely.get_parts(whole.difference(found.buffer(2 * _NEAR)))
-            if is_mark([piece for piece in rest if piece.length > _SPECK], _MARK):
-                best, most = Reading(size, turn), share
+        if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
+            best, most = Reading(size, turn), share
     return best
 
 
-def is_mark(rest: Sequence[BaseGeometry], largest: float) -> bool:
-    """Whether what belongs to no letter can be one small mark."""
-    if not rest:
+def _is_mark(rest: BaseGeometry) -> bool:
+    """Whether the strokes that belong to no letter can be one small mark."""
+    pieces = [piece for piece in shapely.get_parts(rest) if piece.length > _SPECK]
+    if not pieces:
         return False
-    x0, y0, x1, y1 = shapely.total_bounds(rest)
-    return bool(max(x1 - x0, y1 - y0) < largest)
+    x0, y0, x1, y1 = shapely.total_bounds(pieces)
+    return bool(max(x1 - x0, y1 - y0) < _MARK)
 
 
 def _segments(strokes: Sequence[Floats]) -> Floats:

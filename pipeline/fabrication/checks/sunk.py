@@ -17,7 +17,7 @@ from shapely import LineString, affinity
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.checks.order import in_order
-from pipeline.fabrication.checks.reading import LEGIBLE, Reading, is_mark
+from pipeline.fabrication.checks.reading import LEGIBLE, Reading
 from pipeline.fabrication.font import text
 
 Floats = NDArray[np.float64]
@@ -30,6 +30,7 @@ _APART = 3  # steps between two places of a letter
 _KEPT = 16  # places of a letter that are looked at
 _BLOT = 0.08  # mm^2; smaller pieces are rims of letters
 _MARK = 2.4  # mm, largest mark with its pen
+_LITTLE = 2.0  # mm^2; a mark that runs into letters, and rims of letters that slots cut
 
 
 class _Raster(NamedTuple):
@@ -41,7 +42,7 @@ class _Raster(NamedTuple):
 
 
 def shows(words: str, underside: BaseGeometry, outline: BaseGeometry, pose: Reading) -> bool:
-    """Whether an id and a mark beside it are sunk.
+    """Whether an id is sunk, and no more beside it than a mark.
 
     Args:
         words: the id.
@@ -66,8 +67,16 @@ def shows(words: str, underside: BaseGeometry, outline: BaseGeometry, pose: Read
     places = zip(letters, chosen[:, :2], strict=True)
     lines = [stroke + at for letter, at in places for stroke in letter]
     rest = sunk.difference(shapely.MultiLineString(lines).buffer(_PEN / 2 + _STEP))
+    return bool(there >= LEGIBLE and bare <= _BARE and (_is_mark(rest) or rest.area <= _LITTLE))
+
+
+def _is_mark(rest: BaseGeometry) -> bool:
+    """Whether what belongs to no letter is one small mark, or none that letters leave alone."""
     pieces = [piece for piece in shapely.get_parts(rest) if piece.area > _BLOT]
-    return bool(there >= LEGIBLE and bare <= _BARE and is_mark(pieces, _MARK))
+    if not pieces:
+        return True
+    x0, y0, x1, y1 = shapely.total_bounds(pieces)
+    return bool(max(x1 - x0, y1 - y0) < _MARK)
 
 
 def _level(area: BaseGeometry, turn: float) -> BaseGeometry:
