@@ -10,7 +10,8 @@ from sim import grid
 from sim.arrays import Floats
 from sim.dynamics import Drive
 from sim.errors import SimulationError, StrangersMeet
-from sim.esdirk import CONVERGED, march
+from sim.esdirk import march
+from sim.esdirk_stage import CONVERGED
 from sim.implicit import ImplicitSolver
 from sim.meeting import refuse_strangers
 from sim.model import Values

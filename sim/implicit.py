@@ -10,7 +10,9 @@ from sim import grid
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.errors import SimulationError
-from sim.esdirk import CONVERGED, adjoint, march
+from sim.esdirk import march
+from sim.esdirk_adjoint import adjoint
+from sim.esdirk_stage import CONVERGED
 from sim.meeting import refuse_overlap, refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of

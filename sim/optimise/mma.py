@@ -17,7 +17,7 @@ from sim.errors import SimulationError
 from sim.optimise.feasibility import feasible_start, project
 from sim.optimise.problem import Place, Point, Problem, Result
 from sim.optimise.qp import reachable
-from sim.optimise.separable import Separable, minimise_separable
+from sim.optimise.separable import Separable, UnsolvedError, minimise_separable
 
 SLOWER, FASTER = 0.7, 1.2
 """Factors of the distance to the poles after a variable has turned, or gone on."""
@@ -152,7 +152,11 @@ class _Run:
         """One accepted move, with as many corrections as it takes."""
         model = Approximation(self.point, self.distance, self.stiffness)
         while self.problem.finished is None:
-            trial = self._propose(model)
+            try:
+                trial = self._propose(model)
+            except UnsolvedError as error:
+                self.reason = str(error)
+                return
             if trial is None or self._length(trial.place) < self.options.step_min:
                 self.reason = "no further progress"
                 return

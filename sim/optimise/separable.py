@@ -19,13 +19,16 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
 
 from sim.arrays import Floats
-from sim.errors import SimulationError
 
 GROWTH = 10.0
 """Growth of the residual that a Newton step may cause; insisting on descent makes steps tiny."""
 
 WEIGHT = 1000.0
 """Price of violating a constraint, relative to the steepest slope of the objective."""
+
+
+class UnsolvedError(ArithmeticError):
+    """The interior point of a subproblem does not converge."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def minimise_separable(problem: Separable, tolerance: float = 1e-8) -> tuple[Flo
     """Solves the subproblem; returns x (n,) and the multipliers (m,) of the constraints.
 
     Raises:
-        SimulationError: no convergence, which means numbers of wildly different scales.
+        UnsolvedError: no convergence: numbers of wildly different scales, or too small a tolerance.
     """
     scale = float(np.abs(problem.slopes(problem.centre)[[0]].data).max(initial=0.0)) or 1.0
     solver = _InteriorPoint(_scaled(problem, scale))
@@ -108,7 +111,7 @@ def minimise_separable(problem: Separable, tolerance: float = 1e-8) -> tuple[Flo
                 return state.x, state.price * scale
             barrier /= 10
         state = solver.advance(state, barrier)
-    raise SimulationError("the subproblem of moving asymptotes did not converge; scale the loss")
+    raise UnsolvedError("the subproblem of moving asymptotes did not converge")
 
 
 def _scaled(problem: Separable, scale: float) -> Separable:

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from sim.errors import SimulationError
 from sim.optimise import MmaOptions, Result, minimise
-from sim.optimise.separable import Separable, minimise_separable
+from sim.optimise.separable import Separable, UnsolvedError, minimise_separable
 from tests.sim.optimise_problems import Known, cantilever, corner, many, shifted_bowl
 
 
@@ -90,6 +90,29 @@ def test_failed_evaluations_bring_the_asymptotes_closer() -> None:
     radii = [e.radius for e in failed]
     assert radii[0] > radii[1] > radii[2]
     np.testing.assert_allclose(found.x, known.optimum, atol=1e-2)
+
+
+def test_a_subproblem_without_solution_ends_the_run_with_the_best_design(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved: list[Separable] = []
+
+    def fragile(subproblem: Separable) -> tuple[np.ndarray, np.ndarray]:
+        solved.append(subproblem)
+        if len(solved) > 8:
+            raise UnsolvedError("no convergence")
+        return minimise_separable(subproblem)
+
+    monkeypatch.setattr("sim.optimise.mma.minimise_separable", fragile)
+    found = solve(cantilever())
+    assert found.reason == "no convergence"
+    assert found.loss == min(e.loss for e in found.evaluations)
+    assert found.violation == 0.0
+
+
+def test_more_digits_than_there_are_is_an_error() -> None:
+    with pytest.raises(UnsolvedError, match="asymptotes"):
+        minimise_separable(separable(5, 3), tolerance=0.0)
 
 
 def separable(size: int, count: int, seed: int = 0) -> Separable:
