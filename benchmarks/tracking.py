@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 
 from benchmarks import plain
 from pipeline.tracking import importing
-from pipeline.tracking.arrays import Floats, Mask
+from pipeline.tracking.arrays import Floats, Mask, Reals
 from pipeline.tracking.follow import Track, follow
 from pipeline.tracking.specimen import of_design
 from pipeline.tracking.video import frames
@@ -47,7 +47,7 @@ def truth(folder: Path, name: str, columns: int) -> Truth:
     return Truth(displacement, markers.sum(axis=2) >= 2 if markers.shape[2] else visible, fault)
 
 
-def accuracy(found: Floats, real: Truth, px_per_mm: float) -> str:
+def accuracy(found: Reals, real: Truth, px_per_mm: float) -> str:
     """Root mean square errors, bias, gross errors and losses of a line of the table."""
     error = found - real.displacement
     known = np.isfinite(error).all(axis=-1)

@@ -136,7 +136,7 @@ def _describe(variable: xr.Variable, table: Variable) -> xr.Variable:
         attributes["flag_meanings"] = " ".join(table.flags)
     values = variable.values
     if table.dtype != "str" and np.can_cast(values.dtype, table.dtype, "same_kind"):
-        values = values.astype(table.dtype)
+        values = values.astype(table.dtype, copy=False)
     return xr.Variable(variable.dims, values, dict(sorted(attributes.items())))
 
 

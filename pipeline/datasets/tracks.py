@@ -14,12 +14,13 @@ TRACK: Table = UNIT | {
     "dof": LABELS["dof"],
     "vertices": replace(SHAPE["vertices"], long_name="vertices at rest, counter-clockwise"),
     "displacement": Variable(
-        _TRACKED, "mm (ux, uy), rad (theta)", "displacement of the units", gaps=True
+        _TRACKED, "mm (ux, uy), rad (theta)", "displacement of the units", "float32", gaps=True
     ),
     "sigma": Variable(
         _TRACKED,
         "mm (ux, uy), rad (theta)",
         "standard uncertainty of the displacement",
+        "float32",
         gaps=True,
     ),
     "quality": Variable(
@@ -88,6 +89,7 @@ _SHOWN = (
 
 TRUTH: Table = UNIT | {
     **{name: TRACK[name] for name in _SHOWN},
+    "displacement": replace(TRACK["displacement"], dtype="float64"),
     "camera_eye": Variable(("xyz",), "mm", "centre of projection, z towards the camera"),
 }
 

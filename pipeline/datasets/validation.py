@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind
 from pipeline.datasets.variables import Variable
 
-_KINDS = {"float64": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
+_KINDS = {"float64": "f", "float32": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fa
     if table.flags and not np.isin(values, list(table.flags.values())).all():
         meanings = ", ".join(f"{value} {flag}" for flag, value in table.flags.items())
         yield Fault(f"a flag has no meaning ({meanings})", name)
-    if table.dtype == "float64":
+    if table.dtype in ("float64", "float32"):
         if np.isinf(values).any():
             yield Fault("infinite values", name)
         if not table.gaps and np.isnan(values).any():

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-Type = Literal["float64", "int64", "int8", "str"]
+Type = Literal["float64", "float32", "int64", "int8", "str"]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from pipeline.errors import UserError
 from pipeline.lab.encode import encode
 from pipeline.lab.filming import Filming, prepared
 from pipeline.lab.setup import Codec, Virtual
-from pipeline.tracking.arrays import Floats
+from pipeline.tracking.arrays import Floats, Reals
 from pipeline.tracking.calibrate import Setup
 from pipeline.tracking.follow import follow
 from pipeline.tracking.video import frames
@@ -181,7 +181,7 @@ def _clip(setup: Virtual, count: int) -> Virtual:
     return setup.model_copy(update={"still": resting / setup.rate, "duration": length})
 
 
-def _compared(film: Filming, found: Floats, sigma: Floats) -> Expected:
+def _compared(film: Filming, found: Reals, sigma: Reals) -> Expected:
     pixel = film.asked.camera.pixel_size
     scale = np.array([1 / pixel, 1 / pixel, _DEG])
     error = (found - film.motion.pose[: len(found)]) * scale

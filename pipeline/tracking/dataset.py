@@ -70,6 +70,8 @@ def _mean(motion: Floats) -> Floats:
 
 def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
     """Values (frames, present units, ...) over all units."""
+    if present.all():
+        return values
     out = np.full((values.shape[0], len(present), *values.shape[2:]), fill, values.dtype)
     out[:, present] = values
     return out

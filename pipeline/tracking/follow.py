@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
-from pipeline.tracking.arrays import Floats, Ints, Picture, Singles
+from pipeline.tracking.arrays import Floats, Ints, Picture, Reals, Singles
 from pipeline.tracking.calibrate import Calibration, Setup, calibrate
 from pipeline.tracking.find import placed
 from pipeline.tracking.fitting import Fitter
@@ -47,9 +47,9 @@ class Track(NamedTuple):
     time: Floats
     start: float
     frame: Ints
-    displacement: Floats
-    sigma: Floats
-    quality: Ints
+    displacement: Reals
+    sigma: Reals
+    quality: NDArray[np.int8]
     timing: Ints
     calibration: Calibration
     ended: _End | None
@@ -87,12 +87,11 @@ def follow(
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
     rows, ended = _rows(_all(first, frames), tracker, tell)
-    times, numbers, poses, sigmas, qualities = (
+    times, numbers, motion, sigmas, qualities = (
         np.array(values) for values in zip(*rows, strict=True)
     )
     del rows, tracker
-    motion = poses.astype(float)
-    motion -= np.where(np.isfinite(motion[0]), motion[0], 0.0)
+    motion -= np.where(np.isfinite(motion[0]), motion[0], 0)
     time = times - times[0]
     faults = timing.faults(time, motion, sigmas)
     sigma = uncertainty.calibrated(motion, sigmas, specimen.centre, faults == timing.STEADY)

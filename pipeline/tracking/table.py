@@ -25,7 +25,7 @@ def write(track: xr.Dataset, path: Path) -> None:
     names = {value: name for name, value in flags.items()}
     quality, drive = track["quality"].values, track["drive_displacement"].values
     loads = np.column_stack([track["load_force"].values, drive])
-    numbers = np.concatenate([track["displacement"].values, track["sigma"].values], axis=-1)
+    pose, sigma = track["displacement"].values, track["sigma"].values
     labels = [
         f"{unit},{i},{j}"
         for unit, i, j in zip(*(track[name].values for name in ("unit", "i", "j")), strict=True)
@@ -37,9 +37,10 @@ def write(track: xr.Dataset, path: Path) -> None:
         file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"]) + "\n")
         for frame, time in enumerate(track["time"].values):
             load = _cells(loads[frame])
+            numbers = np.concatenate([pose[frame], sigma[frame]], axis=-1)
             for unit in there:
                 told = f"{load},{names[int(quality[frame, unit])]}"
-                file.write(f"{time:.9g},{labels[unit]},{_cells(numbers[frame, unit])},{told}\n")
+                file.write(f"{time:.9g},{labels[unit]},{_cells(numbers[unit])},{told}\n")
 
 
 def _cells(values: Floats) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from pipeline.tracking import shapes
-from pipeline.tracking.arrays import Floats, Ints, Mask
+from pipeline.tracking.arrays import Floats, Ints, Mask, Reals
 
 _PARAMETERS = 7
 _LEAST_FRAMES = 8
@@ -41,7 +41,7 @@ def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
     return np.sqrt(variance)
 
 
-def calibrated(motion: Floats, sigma: Floats, centre: Floats, steady: Mask) -> Floats:
+def calibrated(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
     """The standard uncertainties, scaled so that they tell the scatter of the motions.
 
     Args:
