@@ -22,6 +22,9 @@ _ROUGH = 3.0
 """What is left of smooth motion, over a standard uncertainty, where a gap may be the reason."""
 _SMOOTH = 20.0
 """The same where the gap is allowed for, at most: what is rougher is a jolt."""
+_EVEN = 0.2
+"""Least part of the steps after a gap that those before have, and the reverse: none where motion
+sets in, ends or jumps."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
@@ -98,10 +101,18 @@ def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         rough = (
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
         )
-        if rough and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
+        if rough and _goes_on(near) and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
             most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
             out[shown[middle]] = min(rough[1:]) < most
     return out
+
+
+def _goes_on(motion: Floats) -> bool:
+    """Whether motions (frames, n) are about as quick in the second half as in the first."""
+    steps = np.sqrt(np.mean(np.diff(motion, axis=0) ** 2, axis=1))
+    half = len(motion) // 2
+    before, after = np.median(steps[: half - 1]), np.median(steps[half:])
+    return bool(min(before, after) > _EVEN * max(before, after))
 
 
 def _roughness(clock: Floats, motion: Floats) -> float:

@@ -57,6 +57,16 @@ def test_frames_shown_again_are_found() -> None:
     assert told[25] == timing.DUPLICATE
 
 
+@pytest.mark.parametrize("step", [0.05, 0.5, 5.0])
+def test_the_onset_of_motion_is_no_fault(step: float) -> None:
+    """A specimen that rests in the beginning and is then driven, or creeps and is then turned."""
+    clock = np.maximum(np.arange(FRAMES) - 20.0, 0.02 * (np.arange(FRAMES) - 20.0))
+    moved = step * clock[:, None, None] * (1 + CENTRE[:, :1] / 60) * np.array([1.0, -0.3, 0.01])
+    moved += NOISE * np.random.default_rng(1).normal(size=moved.shape)
+    told = timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert np.flatnonzero(told).tolist() == []
+
+
 def wave(clock: np.ndarray) -> np.ndarray:
     """Units over which a wave runs, of twelve frames and ten units, and noise."""
     made = np.zeros((len(clock), len(CENTRE), 3))
