@@ -124,8 +124,8 @@ def _courses(
     axes.plot(load, middle, color=style.INTACT)
     if np.isfinite(found.floor[0]):
         floor = float(np.hypot(*found.floor[:2]) / np.sqrt(2))
-        axes.plot([load[0], load[found.resting - 1]], [floor, floor], color=style.ALTERED)
-        axes.annotate("scatter at rest", (load[found.resting - 1], floor), color=style.ALTERED)
+        axes.axhline(floor, color=style.ALTERED, linestyle="--", label="scatter at rest")
+        axes.legend(loc="best")
     for flag, colour in ((1, style.ALTERED), (2, style.CLOAKED)):
         for moment in load[track["timing"].values == flag]:
             axes.axvline(moment, color=colour, linewidth=0.5)

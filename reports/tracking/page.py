@@ -72,7 +72,9 @@ def _lines(track: xr.Dataset, found: Measures) -> Iterator[Line]:
     for label, numbers in (("Repeated", found.duplicates), ("Dropped", found.dropped)):
         told = ", ".join(map(str, numbers[:12])) + (", …" if len(numbers) > 12 else "")
         yield Line(f"{label} frames", str(len(numbers)), told)
-    yield Line("Codec", found.stream.codec, f"{100 * found.stream.alone:.0f} % of the frames alone")
+    own = f"{100 * found.stream.alone:.0f} % of the frames are held whole"
+    rest = "" if found.stream.alone > 0.995 else ", the others as changes"
+    yield Line("Codec", found.stream.codec, own + rest)
 
 
 def _accuracy(of: np.ndarray, pixel: float) -> tuple[str, str]:
