@@ -135,12 +135,8 @@ def discs(circles: tuple[Circle, ...], clearance: float = 0.0) -> BaseGeometry:
 
 def unit_solid(unit: Unit, wanted: Fabrication) -> Solid:
     """A unit with its id and arrow sunk into the underside, and with its tracking dots."""
-    written = pen(unit.underside, _pen_width(unit, wanted)).union(
-        pen(unit.mark, min(wanted.labels.stroke, 0.4))
-    )
     height, outline = unit.height, unit.outline
-    rim = outline.buffer(-_RIM, join_style="mitre")  # also keeps nearly equal vertices apart
-    written = merged(shapely.set_precision(written.intersection(rim), _GRID))
+    written = sunk(unit.underside, unit.mark, outline, wanted)
     marks, dots = wanted.markers, discs(unit.markers)
     base = outline.difference(written)
     inset = wanted.print.first_layer_inset
@@ -160,8 +156,17 @@ def unit_solid(unit: Unit, wanted: Fabrication) -> Solid:
     return Solid(unit.label, tuple(layer for layer in layers if layer.top > layer.bottom))
 
 
-def _pen_width(unit: Unit, wanted: Fabrication) -> float:
+def sunk(letters: Strokes, mark: Strokes, outline: Polygon, wanted: Fabrication) -> BaseGeometry:
+    """The area of a unit's underside where letters and a mark are sunk."""
+    written = pen(letters, _pen_width(letters, wanted)).union(
+        pen(mark, min(wanted.labels.stroke, 0.4))
+    )
+    rim = outline.buffer(-_RIM, join_style="mitre")  # also keeps nearly equal vertices apart
+    return merged(shapely.set_precision(written.intersection(rim), _GRID))
+
+
+def _pen_width(letters: Strokes, wanted: Fabrication) -> float:
     """Width of the strokes: thinner for smaller letters."""
-    tall = shapely.total_bounds([LineString(stroke) for stroke in unit.underside])
+    tall = shapely.total_bounds([LineString(stroke) for stroke in letters])
     least = min(tall[2] - tall[0], tall[3] - tall[1])
     return float(min(wanted.labels.stroke, max(0.3, 0.2 * least)))

@@ -10,9 +10,9 @@ from pathlib import Path
 import shapely
 from shapely import Polygon
 
-from pipeline.fabrication import arrow, lettering, markers, outlines, slots
+from pipeline.fabrication import arrow, lettering, markers, outlines, slots, solids
 from pipeline.fabrication.candidates import Corner, side_truncations
-from pipeline.fabrication.checks import reading
+from pipeline.fabrication.checks import reading, sunk
 from pipeline.fabrication.joints import ligaments, shims
 from pipeline.fabrication.naming import LETTERS
 from pipeline.fabrication.network import Network, corners, refuse_overlaps
@@ -134,9 +134,11 @@ def _written(
     if placed is None:
         return None
     mark = arrow.mark(outline, body, placed.box, wanted.labels)
-    cut = placed.kept < 1.0 - _HAIR
-    if cut and reading.read(words, placed.strokes + mark) is None:
-        return None
+    if placed.kept < 1.0 - _HAIR:
+        pose = reading.read(words, placed.strokes + mark)
+        below = outline.difference(solids.sunk(placed.mirrored, mark, outline, wanted))
+        if pose is None or not sunk.shows(words, below, outline, pose):
+            return None
     return placed, mark
 
 
