@@ -165,7 +165,6 @@ def _described(asked: Recording, video: Path, design: Path) -> dict[str, object]
         "design": os.path.relpath(design.resolve(), video.resolve().parent),
         "structure": asked.structure,
         "case": asked.case,
-        "specimen": "bare" if asked.specimen == "auto" else asked.specimen,
         "pixel_size": f"{asked.virtual.camera.pixel_size:g} mm",
         "thickness": f"{asked.virtual.look.thickness:g} mm",
         "camera_distance": f"{asked.virtual.camera.distance:g} mm",
