@@ -22,7 +22,7 @@ _SETTLED = 0.3
 """Last Gauss-Newton step of a fit that found its place, px."""
 _SHARE = 0.35
 """Least part of a unit's information that a fit needs; less if photometry and place are known."""
-_SHARE_KNOWN = 0.12
+_SHARE_KNOWN = 0.18
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""
 _GLARE = 0.4
