@@ -73,7 +73,7 @@ def _guarded(work: Work, args: argparse.Namespace) -> int:
         LOG.error("error: %s", error)
         return 2
     except KeyboardInterrupt:
-        LOG.error("interrupted: the same command goes on from here")
+        LOG.error("interrupted: run the same command again to finish")
         return 130
     except OSError as error:
         LOG.error("error: %s", refusal(error.filename or ".", error))

@@ -69,7 +69,7 @@ def press_ctrl_c(run: Run, checkout: Checkout) -> None:
     os.killpg(run.pid, signal.SIGINT)
     told = run.communicate(timeout=60)[0]
     assert run.returncode != 0
-    assert "interrupted: the same command goes on from here" in told
+    assert "interrupted: run the same command again to finish" in told
     assert told.splitlines()[-1].startswith("make: ***")
     assert "Traceback" not in told
     assert_plain(told)

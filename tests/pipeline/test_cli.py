@@ -38,7 +38,7 @@ def run(error: BaseException | None, *options: str) -> int:
         (OSError(errno.EROFS, "ro", "/results"), 1, "error: the file system is read-only\n"),
         (FileNotFoundError(errno.ENOENT, "No such file", "/a"), 1, "error: No such file\n"),
         (OSError("odd"), 1, "error: odd\n"),
-        (KeyboardInterrupt(), 130, "interrupted: the same command goes on from here\n"),
+        (KeyboardInterrupt(), 130, "interrupted: run the same command again to finish\n"),
         (ZeroDivisionError("by 0"), 1, "error: a bug: ZeroDivisionError: by 0"),
     ],
 )
