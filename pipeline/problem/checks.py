@@ -144,7 +144,13 @@ def _regions(problem: Problem) -> Findings:
         yield from _region_fits(problem, problem.void, ("void",))
     if problem.inclusion is not None:
         yield from _region_fits(problem, problem.inclusion.region, ("inclusion", "region"))
-    yield from _interest(problem)  # before the cloak, which may lie around it
+    if isinstance(problem.objective.region, Region):  # then the cloak may lie around it
+        yield from (*_interest(problem), *_cloak(problem))
+    else:  # then it is what the cloak leaves
+        yield from (*_cloak(problem), *_interest(problem))
+
+
+def _cloak(problem: Problem) -> Findings:
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"

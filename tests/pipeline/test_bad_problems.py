@@ -101,6 +101,13 @@ ROWS = "  rows: 15\n"
             "within 17.5 mm",
         ),
         (
+            "radius: 67.5 mm",
+            "radius: 670 mm",
+            "cloak of radius 670 mm reaches beyond the lattice",
+            "cloak.disc.radius",
+            "within 112.5 mm of its centre (105, 105) mm",
+        ),
+        (
             "centre: centre",
             "centre: [105 mm, 1 m]",
             "the centre of the cloak lies outside the lattice",
