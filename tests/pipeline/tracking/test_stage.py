@@ -31,6 +31,10 @@ def changed(recording: Path, old: str, new: str) -> None:
     recording.write_text(text.replace(old, new), encoding="utf-8")
 
 
+def extended(recording: Path, line: str) -> None:
+    recording.write_text(recording.read_text(encoding="utf-8") + line + "\n", encoding="utf-8")
+
+
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     out = recording.with_name("track.nc")
     assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
@@ -54,10 +58,9 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
 def test_another_design_is_refused(
     recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
 ) -> None:
-    text = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8")
     other = recording.with_name("other.yaml")
-    assert old in text
-    other.write_text(text.replace(old, new), encoding="utf-8")
+    other.write_bytes((CLIPS / "f_silhouette.yaml").read_bytes())
+    changed(other, old, new)
     video = str(CLIPS / "f_silhouette.mp4")
     folder = str(recording.parent)
     assert track.main(["import", str(other), "--video", video, "--out-dir", folder]) == 0
@@ -83,8 +86,7 @@ def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(recording
 def test_a_turn_that_is_not_so_is_refused(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("mirrored: true\n")
+    extended(recording, "mirrored: true")
     assert "the specimen is seen otherwise: upright" in refused(recording, capsys)
 
 
@@ -122,8 +124,7 @@ def test_a_key_without_its_unit_is_refused(
 def test_the_load_cell_runs_on_the_clock_of_the_file_whatever_the_window(recording: Path) -> None:
     log = recording.with_name("load.csv")
     log.write_text("time,force\n100,0\n101,1000\n", encoding="utf-8")
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}\n")
+    extended(recording, "window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}")
     out = recording.with_name("track.nc")
     assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
@@ -138,8 +139,7 @@ def test_a_track_holds_the_displacement_of_the_driven_units(recording: Path) -> 
     driven[[112, 113]] = 2
     origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
     datasets.write(design.assign(support=driven), path, "design", origin)
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("load_axis: driven displacement\n")
+    extended(recording, "load_axis: driven displacement")
     out = recording.with_name("track.nc")
     assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
@@ -151,16 +151,14 @@ def test_a_track_holds_the_displacement_of_the_driven_units(recording: Path) -> 
 def test_without_driven_units_there_is_no_such_axis(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("load_axis: driven displacement\n")
+    extended(recording, "load_axis: driven displacement")
     assert "the design has no driven units" in refused(recording, capsys)
 
 
 def test_a_log_that_is_not_there_is_told_before_tracking(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("load_cell: {file: none.csv}\n")
+    extended(recording, "load_cell: {file: none.csv}")
     told = refused(recording, capsys)
     assert "none.csv" in told
     assert "units;" not in told
@@ -170,8 +168,7 @@ def test_a_track_is_kept_where_its_log_is_of_another_time(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-    with recording.open("a", encoding="utf-8") as file:
-        file.write("load_cell: {file: load.csv, offset: 70}\n")
+    extended(recording, "load_cell: {file: load.csv, offset: 70}")
     out = recording.with_name("track.nc")
     assert track.main([str(recording), "--out", str(out), "--no-report"]) == 2
     assert "do not overlap: the track is kept" in capsys.readouterr().err
