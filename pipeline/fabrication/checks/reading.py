@@ -75,10 +75,13 @@ def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
 def _is_mark(rest: BaseGeometry) -> bool:
     """Whether the strokes that belong to no letter can be one small mark."""
     pieces = [piece for piece in shapely.get_parts(rest) if piece.length > _SPECK]
-    if not pieces:
-        return False
+    return bool(pieces) and span(pieces) < _MARK
+
+
+def span(pieces: Sequence[BaseGeometry]) -> float:
+    """Longer side of the box about some pieces."""
     x0, y0, x1, y1 = shapely.total_bounds(pieces)
-    return bool(max(x1 - x0, y1 - y0) < _MARK)
+    return float(max(x1 - x0, y1 - y0))
 
 
 def _segments(strokes: Sequence[Floats]) -> Floats:

@@ -17,7 +17,7 @@ from shapely import LineString, affinity
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.checks.order import in_order
-from pipeline.fabrication.checks.reading import LEGIBLE, Reading
+from pipeline.fabrication.checks.reading import LEGIBLE, Reading, span
 from pipeline.fabrication.font import text
 
 Floats = NDArray[np.float64]
@@ -73,10 +73,7 @@ def shows(words: str, underside: BaseGeometry, outline: BaseGeometry, pose: Read
 def _is_mark(rest: BaseGeometry) -> bool:
     """Whether what belongs to no letter is one small mark, or none that letters leave alone."""
     pieces = [piece for piece in shapely.get_parts(rest) if piece.area > _BLOT]
-    if not pieces:
-        return True
-    x0, y0, x1, y1 = shapely.total_bounds(pieces)
-    return bool(max(x1 - x0, y1 - y0) < _MARK)
+    return not pieces or span(pieces) < _MARK
 
 
 def _level(area: BaseGeometry, turn: float) -> BaseGeometry:
