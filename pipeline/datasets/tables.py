@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
 from pipeline.datasets.responses import RESPONSE, SWEEP
 from pipeline.datasets.tracks import RECORDED, TRACK, TRUTH
@@ -14,7 +15,15 @@ from pipeline.datasets.variables import Table
 SCHEMA_VERSION = 1
 
 Kind = Literal[
-    "design", "design_method", "response", "sweep", "scatter", "verification", "track", "truth"
+    "design",
+    "design_method",
+    "response",
+    "sweep",
+    "scatter",
+    "verification",
+    "track",
+    "truth",
+    "comparison",
 ]
 
 TABLES: Mapping[Kind, Table] = {
@@ -26,6 +35,7 @@ TABLES: Mapping[Kind, Table] = {
     "verification": VERIFICATION,
     "track": TRACK,
     "truth": TRUTH,
+    "comparison": COMPARISON,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -38,5 +48,6 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "verification": {},
     "track": RECORDED,
     "truth": RECORDED,
+    "comparison": COMPARED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""

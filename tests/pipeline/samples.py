@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets import TABLES, Kind, Variable
+from pipeline.datasets.tables import ATTRIBUTES
 
 SIZES = {
     "unit": 49,
@@ -31,6 +32,9 @@ SIZES = {
     "column": 3,
     "power": 2,
     "xyz": 3,
+    "side": 2,
+    "source": 3,
+    "estimate": 3,
 }
 
 
@@ -38,6 +42,13 @@ _ATTRIBUTES: dict[str, dict[str, str]] = {
     "design": {"shipped_method": "sqp"},
     "track": {"recording": "{}", "synthetic": "no"},
     "truth": {"recording": "{}", "synthetic": "yes"},
+    "comparison": {
+        **dict.fromkeys(ATTRIBUTES["comparison"], "as told"),
+        "recording": "{}",
+        "synthetic": "yes",
+        "structure": "cloaked",
+        "case": "0",
+    },
 }
 
 
