@@ -40,9 +40,7 @@ def attributes(
     return {
         "problem": canonical_json(problem, stage, method),
         "problem_hash": section_hash(problem, stage, method),
-        "parents": _json({name: file_hash(path) for name, path in (parents or {}).items()}),
-        "packages": _json(package_versions()),
-        "git_commit": git_commit(),
+        **_made_from(parents or {}),
         "plan": _json(plan if plan is not None else {}),
     }
 
@@ -58,6 +56,13 @@ def recorded(recording: str, parents: Mapping[str, Path], *, synthetic: bool) ->
     return {
         "recording": recording,
         "synthetic": "yes" if synthetic else "no",
+        **_made_from(parents),
+    }
+
+
+def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
+    return {
+        "history": f"written by metacloak, commit {git_commit()}",
         "parents": _json({name: file_hash(path) for name, path in parents.items()}),
         "packages": _json(dict(package_versions())),
         "git_commit": git_commit(),

@@ -48,7 +48,7 @@ SHAPE: Table = {
     "constraint_units": label(("constraint",), "1", "unit of the constraint's margin", "str"),
     "constraint_margin": Variable(
         ("constraint",),
-        "as in constraint_units",
+        "constraint_units (constraint)",
         "smallest margin to the constraint's limit, negative where violated",
         gaps=True,
     ),

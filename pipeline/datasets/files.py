@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind
+from pipeline.datasets.migration import MIGRATED, migrated
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind
 from pipeline.datasets.validation import faults
 from pipeline.datasets.variables import Variable
 from pipeline.errors import UserError, refusal
@@ -81,6 +82,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     except (OSError, RuntimeError, ValueError) as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
     _check_origin(dataset, path, kind, remedy)
+    dataset = migrated(dataset, kind)
     for fault in faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
     return dataset
@@ -94,7 +96,7 @@ def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> N
     if found != kind:
         what = f"a {kind} dataset is wanted"
         raise UserError(what, file=path, key="kind", value=found, remedy=f"give a {kind} dataset")
-    if version != SCHEMA_VERSION:
+    if version not in (*MIGRATED, SCHEMA_VERSION):
         newer = version > SCHEMA_VERSION
         raise UserError(
             f"its schema version is not {SCHEMA_VERSION}",
@@ -117,6 +119,7 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
     labels = [name for name in names if name in table and table[name].coordinate]
     attributes = {
         "Conventions": "CF-1.11",
+        "title": TITLES[kind],
         "kind": kind,
         "schema_version": SCHEMA_VERSION,
         **dataset.attrs,
@@ -130,7 +133,8 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
 
 
 def _describe(variable: xr.Variable, table: Variable) -> xr.Variable:
-    attributes = {"units": table.units, "long_name": table.long_name, **variable.attrs}
+    known = {table.unit_attribute: table.units, "long_name": table.long_name}
+    attributes = {**known, **variable.attrs}
     if table.flags:
         attributes["flag_values"] = np.array(list(table.flags.values()), dtype=table.dtype)
         attributes["flag_meanings"] = " ".join(table.flags)

@@ -93,7 +93,7 @@ RESPONSE: Table = (
 _MAP = ("direction", "frequency")
 
 SWEEP: Table = {
-    "direction": label(("direction",), "deg", "direction of the drive"),
+    "direction": label(("direction",), "degree", "direction of the drive"),
     "frequency": label(("frequency",), "Hz", "frequency of the drive"),
     "loss": Variable(_MAP, "1", "loss of the cloaked structure", gaps=True),
     "loss_altered": Variable(_MAP, "1", "loss of the structure before optimisation", gaps=True),

@@ -12,7 +12,7 @@ from pipeline.datasets.tracks import RECORDED, TRACK, TRUTH
 from pipeline.datasets.trials import SCATTER, VERIFICATION
 from pipeline.datasets.variables import Table
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 Kind = Literal[
     "design",
@@ -51,3 +51,15 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "comparison": COMPARED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""
+
+TITLES: Mapping[Kind, str] = {
+    "design": "Cloak as designed, with the history of its optimisations",
+    "design_method": "Cloak as designed by one method, with the history of the optimisation",
+    "response": "Motions, forces and energies of the structures, simulated",
+    "sweep": "Loss over directions and frequencies of the drive",
+    "scatter": "Responses of imperfect copies of a design",
+    "verification": "Results with finer steps and with the other law of contact",
+    "track": "Motion of every unit in a video, with its uncertainty",
+    "truth": "Motion of every unit that a synthetic video shows",
+}
+"""What each kind holds, in a line."""

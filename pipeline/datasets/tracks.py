@@ -58,11 +58,11 @@ TRACK: Table = UNIT | {
     ),
     "camera_homography": Variable(
         ("row", "column"),
-        "px, mm",
+        "1/mm (columns 0, 1), 1 (column 2)",
         "homography from the specimen's plane to undistorted pixels",
         gaps=True,
     ),
-    "camera_centre": Variable(("xy",), "px", "centre of the distortion", gaps=True),
+    "camera_centre": Variable(("xy",), "1", "centre of the distortion, pixels", gaps=True),
     "camera_radial": Variable(
         ("power",),
         "1",
@@ -70,10 +70,12 @@ TRACK: Table = UNIT | {
         gaps=True,
     ),
     "camera_residual": Variable(
-        ("unit", "xy"), "px", "first frame: place of the unit less that by design", gaps=True
+        ("unit", "xy"), "1", "first frame: place of the unit less that by design, pixels", gaps=True
     ),
-    "image_size": Variable(("xy",), "px", "width and height of the image", "int64"),
-    "blur": Variable((), "px", "standard deviation of the camera's blur at edges", gaps=True),
+    "image_size": Variable(("xy",), "1", "width and height of the image, pixels", "int64"),
+    "blur": Variable(
+        (), "1", "standard deviation of the camera's blur at edges, pixels", gaps=True
+    ),
 }
 
 _SHOWN = (

@@ -43,10 +43,15 @@ def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator
         yield Fault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
     elif found.dtype.kind not in _KINDS[table.dtype]:
         yield Fault(f"its type is not {table.dtype}", name, str(found.dtype))
-    elif (units := found.attrs.get("units", table.units)) not in (table.units, *table.also):
+    elif (units := _units(found, table)) not in (table.units, *table.also):
         yield Fault(f"its unit is not {table.units!r}", name, units)
     else:
         yield from _value_faults(found.values, name, table)
+
+
+def _units(found: xr.Variable, table: Variable) -> object:
+    """Its unit as told; that of the table where it tells none, as before it is written."""
+    return found.attrs.get(table.unit_attribute, table.units)
 
 
 def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fault]:

@@ -19,7 +19,8 @@ class Variable:
 
     Attributes:
         dims: names of its dimensions.
-        units: its unit; "1" for names, ids and ratios.
+        units: its unit as UDUNITS spells it, "1" for names, ids, ratios and pixels; where its
+            components differ, each unit with them in brackets.
         long_name: what it is, for people and axes.
         dtype: type in the file.
         gaps: whether NaN is a value it may take (padding, free degrees of freedom, failed cases).
@@ -40,6 +41,11 @@ class Variable:
     subset: bool = False
     also: tuple[str, ...] = ()
     coordinate: bool = False
+
+    @property
+    def unit_attribute(self) -> str:
+        """Where a file tells the unit: no `units` of CF's is true of components that differ."""
+        return "component_units" if "(" in self.units else "units"
 
 
 Table = dict[str, Variable]
@@ -63,7 +69,7 @@ UNIT: Table = {
 }
 
 CASE: Table = {
-    "direction": label(("case",), "deg", "direction of the drive"),
+    "direction": label(("case",), "degree", "direction of the drive"),
 }
 
 ENERGY = ("N mm",)

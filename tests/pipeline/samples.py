@@ -75,6 +75,8 @@ def _values(name: str, variable: Variable, random: np.random.Generator) -> np.nd
         return np.array(["sqp", "mma"])
     if variable.dtype == "str":
         return np.array(["überschritten", "ok"])[random.integers(2, size=shape)]
+    if variable.dims == (name,):  # the labels of a dimension ascend
+        return np.arange(shape[0]).astype(variable.dtype)
     if variable.dtype == "float64":
         return random.normal(size=shape)
     return random.integers(2, size=shape)
