@@ -61,5 +61,6 @@ TITLES: Mapping[Kind, str] = {
     "verification": "Results with finer steps and with the other law of contact",
     "track": "Motion of every unit in a video, with its uncertainty",
     "truth": "Motion of every unit that a synthetic video shows",
+    "comparison": "Motion in a recording beside its simulation",
 }
-"""What each kind holds, in a line."""
+"""What each kind holds, in a line; a dataset may have a title of its own."""
