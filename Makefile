@@ -4,17 +4,20 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
+PAGES := all index
 PRODUCTS := $(foreach product,fabrication recordings,$(addsuffix _$(product),$(STUDIES)))
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(STUDIES) $(PRODUCTS)
+.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make fig2_fabrication   drawings, meshes and papers of what is built: results/fig2/fabrication"
 	@echo "make fig2_recordings    videos of the specimens, tracked: results/fig2/recordings"
+	@echo "make all       build every figure of the paper and the page over them: results/index.html"
+	@echo "make index     that page alone, over what is there"
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
@@ -40,7 +43,7 @@ setup: .venv/requirements.lock
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	@cp requirements.lock $@
 
-$(STUDIES): setup
+$(STUDIES) $(PAGES): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
 # what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings

@@ -1,4 +1,5 @@
 # From a problem file to a figure. `snakemake fig2` builds experiments/fig2 into results/fig2/,
+# `snakemake all` every figure of the paper and results/index.html, `snakemake index` that page alone,
 # `snakemake fig2@edge3` (or fig2_edge3) the same study with a preset. A figure.yaml in place of a
 # problem.yaml shows several studies on one page. See profiles/default.
 import sys
@@ -7,7 +8,14 @@ from snakemake.utils import min_version
 
 from pipeline.filmed import recording_pages, tracked
 from pipeline.sources import source_hash
-from pipeline.workflow import check_problems, check_room, chunks, copies, designs
+from pipeline.workflow import (
+    check_problems,
+    check_room,
+    chunks,
+    copies,
+    designs,
+    figures,
+)
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
 from pipeline.workflow import package_pages, packages, section, shown, shown_options
 from pipeline.workflow import targets
@@ -48,3 +56,4 @@ include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/report.smk"
+include: "pipeline/rules/index.smk"

@@ -8,6 +8,7 @@ imported here: this is the time one waits for "nothing to be done".
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ from pipeline.problem import (
 )
 
 FABRICATION = "_fabrication"  # ends the targets that build what a lab makes
+ALL = "all"  # the target that builds every figure of the paper
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
 
@@ -108,6 +110,11 @@ def targets() -> dict[str, str]:
     return single | {figure: figure for figure in joints()}
 
 
+def figures() -> list[str]:
+    """The studies that are figures of the paper, by their names."""
+    return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
+
+
 def members(wildcards: Wildcards) -> list[str]:
     """The datasets that a figure of several studies shows."""
     return [
@@ -152,6 +159,7 @@ def asked_for(words: Collection[str]) -> list[Study]:
     by_target = {target: study for study in studies() for target in study.targets}
     names = {study.name for study in by_target.values()}
     together = joints()
+    words = [*words, *(figures() if ALL in words else ())]
     words = [word.removesuffix(FABRICATION).removesuffix(RECORDINGS) for word in words]
     found = [study for word in words for study in together.get(word, ())]
     for word in words:

@@ -10,6 +10,7 @@ import xarray as xr
 from pipeline.problem import Problem
 from reports import measures
 from reports.facts import Fact, number, percent, share, within
+from reports.structure import Structure
 
 JUMPED = 2
 """Flag of a stable state that the path came to by a jump."""
@@ -53,6 +54,14 @@ def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
         )
 
 
+def bias_fact(initial: Structure) -> Fact:
+    """How far the units are turned at rest in the initial design."""
+    arm = initial.vertices[0, 0] - initial.site[0]
+    bias = abs(float(np.degrees(np.arctan2(arm[1], arm[0]))))
+    note = "measured on the initial design"
+    return number("bias", "Angle bias θ₀", bias, "deg", note=note)
+
+
 def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     """Margins of the constraints, gaps and overlaps of the design at rest."""
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
@@ -78,9 +87,11 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
         yield number(f"gap_{name}", f"Smallest gap, {name}", gap, "mm", digits=3, note=note)
         crossed = int(part["overlaps"].max())
         yield number(f"overlaps_{name}", f"Overlapping pairs, {name}, most", crossed, note=note)
-        touching = int(part["contact_pairs"].isel(time=-1).max())
+        touching, when = part["contact_pairs"], "at any time"
+        if problem.static:
+            touching, when = touching.isel(time=-1), "at the end of the path"
         label = f"Pairs in contact, {name}"
-        yield number(f"contact_pairs_{name}", label, touching, note="at the end of the path")
+        yield number(f"contact_pairs_{name}", label, int(touching.max()), note=when)
         yield from stability_facts(name, part)
         yield _shim_strain(problem, name, part)
 

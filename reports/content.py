@@ -11,6 +11,7 @@ from typing import Any
 import xarray as xr
 
 from pipeline.problem import canonical_json, content_hash
+from reports import claims
 from reports.facts import Fact, worded
 from reports.page import Page, Source, source
 from reports.player import quantisation_error
@@ -49,6 +50,7 @@ def page(
         caption=words.caption,
         svg=svg,
         figure_files=figure_files,
+        datasets=[f"../{name}" for name in study.files],
         headline=[by_key[key] for key in words.headline if key in by_key],
         facts=facts,
         tables=tables,
@@ -60,6 +62,7 @@ def page(
         ),
         skipped=skipped(study.response),
         draft=study.draft,
+        claims=[] if study.draft else claims.judged(study.name, facts),
     )
 
 

@@ -108,6 +108,15 @@ def write_json(facts: Sequence[Fact], path: Path) -> None:
     path.write_text(json.dumps(records, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
 
 
+def read_json(path: Path) -> list[Fact]:
+    """Facts as they were written; a value that was not finite is NaN."""
+    records = json.loads(path.read_text(encoding="utf-8"))
+    return [
+        Fact(**(record | {"value": math.nan if record["value"] is None else record["value"]}))
+        for record in records
+    ]
+
+
 def table(facts: Sequence[Fact]) -> Table:
     """Facts as a table, one a line."""
     columns = {entry.name: [getattr(fact, entry.name) for fact in facts] for entry in fields(Fact)}

@@ -4,30 +4,27 @@ from __future__ import annotations
 
 import base64
 import json
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-import jinja2
 import xarray as xr
-from markupsafe import Markup, escape
 
+from reports import citation, claims, templating
+from reports.claims import Judged
 from reports.facts import ABSENT, Fact
 from reports.tables import Table
 
 LARGEST_PAGE = 6_000_000
 """Bytes that a page may have."""
 
-_TEMPLATES = Path(__file__).parent / "templates"
-
 
 @dataclass(frozen=True)
 class Page:
     """What a page shows.
 
-    `caption` is HTML; `player` is reports.player's payload; `targets` build the studies shown.
+    `caption` is HTML; `player` is reports.player's payload; `targets` build the studies shown;
+    `datasets` are addresses of theirs, as seen from the page; `claims` are the paper's on them.
     """
 
     title: str
@@ -38,6 +35,7 @@ class Page:
     caption: str
     svg: str
     figure_files: Sequence[str]
+    datasets: Sequence[str]
     headline: Sequence[Fact]
     facts: Sequence[Fact]
     tables: Sequence[Table]
@@ -47,6 +45,7 @@ class Page:
     problem: str
     skipped: Sequence[str]
     draft: Sequence[str] = field(default_factory=tuple)
+    claims: Sequence[Judged] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True)
@@ -75,21 +74,15 @@ def _entries(key: str, value: object) -> list[tuple[str, str]]:
 
 def render(page: Page) -> str:
     """HTML of the page."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    environment.filters["groupby_order"] = _in_order
-    environment.filters["symbols"] = _symbols
     values = dict(vars(page))
     values["quotes"] = any(fact.paper != ABSENT for fact in page.facts)
     values["tables"] = [_link(table) for table in page.tables]
-    values["svg"] = _inline(page.svg)
+    values["svg"] = templating.inlined(page.svg)
+    values["verdict"] = claims.verdict(page.claims)
+    values["citations"] = citation.citations()
     # "</" would end the script element that holds the data.
     values["player"] = json.dumps(page.player, ensure_ascii=False).replace("</", "<\\/")
-    return environment.get_template("page.html.j2").render(values)
+    return templating.rendered("page.html.j2", values)
 
 
 def _link(table: Table) -> dict[str, object]:
@@ -99,23 +92,3 @@ def _link(table: Table) -> dict[str, object]:
         "rows": table.n_rows,
         "base64": base64.b64encode(table.csv).decode("ascii"),
     }
-
-
-def _inline(svg: str) -> str:
-    """The SVG element without prologue and metadata, with coordinates to 0.001 pt."""
-    element = svg[svg.index("<svg") :]
-    element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
-    return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
-
-
-def _symbols(text: str) -> Markup:
-    """Escaped text in which u_y has its index."""
-    return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
-
-
-def _in_order(items: Iterable[Fact], attribute: str) -> list[dict[str, object]]:
-    """Items grouped by an attribute, groups in the order of their first member."""
-    groups: dict[str, list[Fact]] = {}
-    for item in items:
-        groups.setdefault(getattr(item, attribute), []).append(item)
-    return [{"name": name, "members": members} for name, members in groups.items()]

@@ -24,8 +24,7 @@ def render(asked: Problem, folders: Sequence[Path], done: cli.progress | None = 
         folders: the packages, one a structure.
         done: the progress to tell of each package.
     """
-    import jinja2
-
+    from reports import templating
     from reports.fabrication import content, pictures
 
     made = []
@@ -33,19 +32,14 @@ def render(asked: Problem, folders: Sequence[Path], done: cli.progress | None = 
         made.append(content.package(folder, asked))
         if done is not None:
             done.update()
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent.parent / "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("fabrication.html.j2").render(
-        title=f"{asked.title}: what is built",
-        lead="Drawings for the laser cutter, plates for the printer, fixtures and papers.",
-        pens=[(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
-        structures=made,
-        parameters=list(content.parameters(asked.fabrication.model_dump(mode="json"))),
-    )
+    values = {
+        "title": f"{asked.title}: what is built",
+        "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
+        "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
+        "structures": made,
+        "parameters": list(content.parameters(asked.fabrication.model_dump(mode="json"))),
+    }
+    return templating.rendered("fabrication.html.j2", values)
 
 
 def _work(args: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ excitations" and the caption of its Figure 2.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -44,10 +45,7 @@ def scene_facts(scene: Scene, design: xr.Dataset) -> Iterator[Fact]:
     size = f"{scene.columns} × {scene.rows}"
     yield Fact("units", "Units", initial.n_units, "1", size, "15 × 15")
     yield number("spacing", "Spacing s", scene.spacing, "mm", paper="15 mm")
-    arm = initial.vertices[0, 0] - initial.site[0]
-    bias = abs(float(np.degrees(np.arctan2(arm[1], arm[0]))))
-    note = "measured on the initial design"
-    yield number("bias", "Angle bias θ₀", bias, "deg", paper="20°", note=note)
+    yield replace(checks.bias_fact(initial), paper="20°")
     yield number("amplitude", "Amplitude A", scene.amplitude, "mm", paper="4.5 mm")
     yield number("frequency", "Frequency f", scene.frequency, "Hz", paper="2 Hz")
     angles = ", ".join(f"{angle:g}" for angle in scene.directions) + "°"

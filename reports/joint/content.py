@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.problem import canonical_json
 from pipeline.problem.joint import Joint
-from reports import content, facts, style
+from reports import claims, content, facts, style
 from reports.facts import Fact
 from reports.joint import figure
 from reports.page import Page
@@ -33,7 +33,7 @@ def parts(name: str, asked: Joint, studies: Sequence[Study]) -> Parts:
         known,
         data,
         lambda: figure.build(studies),
-        lambda svg, files: page(asked, studies, known, data, svg, files),
+        lambda svg, files: page(name, asked, studies, known, data, svg, files),
     )
 
 
@@ -60,6 +60,7 @@ def _tables(study: Study) -> list[Table]:
 
 
 def page(
+    name: str,
     asked: Joint,
     studies: Sequence[Study],
     known: Sequence[Fact],
@@ -71,6 +72,7 @@ def page(
     by_key = {fact.key: fact for fact in known}
     player = animation(studies)
     problems = {study.name: json.loads(canonical_json(study.problem)) for study in studies}
+    draft = list(dict.fromkeys(reason for study in studies for reason in study.draft))
     headline = []
     for study in studies:
         key = f"{study.name}.{measures.measure_of(study.problem).key}_reduction"
@@ -85,6 +87,7 @@ def page(
         caption=caption(studies),
         svg=svg,
         figure_files=figure_files,
+        datasets=[f"../../{s.target}/{name}" for s in studies for name in s.files],
         headline=headline,
         facts=known,
         tables=data,
@@ -97,7 +100,8 @@ def page(
         ],
         problem=json.dumps(problems, indent=1, sort_keys=True, ensure_ascii=False),
         skipped=list(dict.fromkeys(text for s in studies for text in content.skipped(s.response))),
-        draft=list(dict.fromkeys(reason for study in studies for reason in study.draft)),
+        draft=draft,
+        claims=[] if draft else claims.judged(name, known),
     )
 
 

@@ -10,9 +10,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.problem import Problem
+from pipeline.problem.drives import Harmonic, RampHarmonic
+from pipeline.problem.lattices import Lattice, Quads
 from pipeline.problem.regions import Region
 from reports import checks
-from reports.facts import Fact, grouped, number, share
+from reports.facts import Fact, grouped, number, share, worded
 from reports.path import contact, measures, scatter
 from reports.path.course import Course, course, display_name, lattice_size, structures
 from reports.path.curves import over_cases
@@ -48,6 +50,8 @@ def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
     initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
     yield Fact("units", "Units", lattice.n_units, "1", lattice_size(lattice))
     yield number("spacing", "Spacing s", lattice.spacing, "mm")
+    if isinstance(lattice, Quads):
+        yield checks.bias_fact(initial)
     yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
     removed = initial.n_units - int(from_dataset(study.design, lattice.spacing).present.sum())
     if removed:
@@ -57,22 +61,43 @@ def scene_facts(study: Study, path: Course) -> Iterator[Fact]:
     yield from _radii(problem)
     if path.static:
         yield _displacement_fact(path)
+        yield _strain_fact(lattice, path)
         count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
+        yield from _drive_facts(problem)
         yield number("horizon", "Loss taken over", problem.horizon_time, "s")
 
 
 def _radii(problem: Problem) -> Iterator[Fact]:
     """How far round regions reach."""
+    spacing = problem.lattice.spacing
     for key, label, region in (
         ("interest_radius", "Radius of the region of interest", problem.objective.region),
+        ("void_radius", "Radius of the void", problem.void),
         ("cloak_radius", "Radius of the cloak", problem.cloak),
     ):
         bounds = region.bounds if isinstance(region, Region) else None
         if bounds is not None:
-            note = f"{bounds[2] / problem.lattice.spacing:.4g} s"
-            yield number(key, label, bounds[2], "mm", note=note)
+            yield number(key, label, bounds[2], "mm", note=f"{bounds[2] / spacing:.4g} s")
+    width = _cloak_width(problem)
+    if width is not None:
+        yield number(
+            "cloak_width", "Width of the cloak", width, "mm", note=f"{width / spacing:.4g} s"
+        )
+
+
+def _cloak_width(problem: Problem) -> float | None:
+    """Of a cloak around something round, mm."""
+    if problem.cloak.around is not None:
+        return problem.cloak.around.distance
+    cloak = problem.cloak.bounds
+    if cloak is None:
+        return None
+    within = (problem.void, problem.objective.region)
+    rounds = [region.bounds for region in within if isinstance(region, Region)]
+    inner = max([cloak[1], *(bounds[2] for bounds in rounds if bounds is not None)])
+    return cloak[2] - inner if inner > 0 else None
 
 
 def _displacement_fact(path: Course) -> Fact:
@@ -80,6 +105,20 @@ def _displacement_fact(path: Course) -> Fact:
     if path.strain is not None:
         note += f"; the paper labels it ε = {100 * path.strain:g} %"
     return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
+
+
+def _strain_fact(lattice: Lattice, path: Course) -> Fact:
+    across = [x for _, x, _ in lattice.sites()]
+    span = max(across) - min(across)
+    note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost columns"
+    return share("strain", "Compression", float(path.values[-1]) / span, note=note)
+
+
+def _drive_facts(problem: Problem) -> Iterator[Fact]:
+    """Of a harmonic drive."""
+    if isinstance(problem.drive, Harmonic | RampHarmonic):
+        yield number("amplitude", "Amplitude A", problem.drive.amplitude, "mm")
+        yield number("frequency", "Frequency f", problem.drive.frequency, "Hz")
 
 
 def measure_facts(study: Study, path: Course) -> Iterator[Fact]:

@@ -5,15 +5,13 @@ from __future__ import annotations
 import io
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import NamedTuple
 
-import jinja2
 import numpy as np
 import xarray as xr
 
 from pipeline.tracking.recording import Recording
-from reports import style
+from reports import style, templating
 from reports.tracking import advice, figure
 from reports.tracking.measures import Measures
 
@@ -28,20 +26,15 @@ class Line(NamedTuple):
 
 def render(track: xr.Dataset, asked: Recording, found: Measures) -> str:
     """HTML of the page, its figure within it."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent.parent / "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("tracking.html.j2").render(
-        title=asked.title or "Recording",
-        synthetic=track.attrs["synthetic"] == "yes",
-        advice=advice.advice(found),
-        lines=list(_lines(track, found)),
-        svg=_drawn(track, found, asked.load_axis),
-        sources=sorted((key, str(value)) for key, value in track.attrs.items()),
-    )
+    values = {
+        "title": asked.title or "Recording",
+        "synthetic": track.attrs["synthetic"] == "yes",
+        "advice": advice.advice(found),
+        "lines": list(_lines(track, found)),
+        "svg": _drawn(track, found, asked.load_axis),
+        "sources": sorted((key, str(value)) for key, value in track.attrs.items()),
+    }
+    return templating.rendered("tracking.html.j2", values)
 
 
 def _drawn(track: xr.Dataset, found: Measures, load_axis: str) -> str:

@@ -43,6 +43,14 @@ def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
     assert "report" not in planned
 
 
+def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("all")
+    assert planned["all"] == 1
+    assert planned["joint_report"] == 1
+    assert planned["report"] == 3  # none of the variants
+    assert sandbox.planned("index") == {"index": 1}
+
+
 def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
     sandbox.problem.write_text(

@@ -1,0 +1,26 @@
+# Every figure of the paper, and the page over them.
+rule all:
+    input:
+        expand("results/{figure}/report/index.html", figure=figures()),
+    output:
+        "results/index.html",
+    log:
+        "results/logs/index.log",
+    threads: 1
+    params:
+        source=source_hash("reports.index.build"),
+    message:
+        "Drawing the index of results"
+    shell:
+        "python -m reports.index.build --results results --log {log}"
+
+
+# The same page over what is there now. It has no output, so it always runs when it is asked for.
+rule index:
+    log:
+        "results/logs/index.log",
+    threads: 1
+    message:
+        "Drawing the index of what is there"
+    shell:
+        "python -m reports.index.build --results results --log {log}"

@@ -1,0 +1,77 @@
+"""The index page: figures, the paper's claims, files, provenance, how to cite."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+
+from pipeline.provenance import git_commit, package_versions
+from reports import citation, claims, templating
+from reports.claims import Judged
+from reports.index import found
+from reports.index.found import Built
+
+WIDTH = 560
+"""Of a thumbnail in pixels."""
+
+
+class Table(NamedTuple):
+    """The claims on one figure of the paper; not built: `built` is None."""
+
+    name: str
+    title: str
+    built: Built | None
+    claims: list[Judged]
+    verdict: str
+
+
+def page(results: Path) -> str:
+    """HTML of the index of a folder of results."""
+    built = found.reports(results)
+    values = {
+        "title": "Nonlinear mechanical metamaterial cloaks",
+        "figures": [(each, thumbnail(each.picture)) for each in built if each.figure],
+        "others": [(each, thumbnail(each.picture)) for each in built if not each.figure],
+        "tables": tables(built),
+        "source": claims.listed().source,
+        "benchmark": found.others(results, "benchmark", "*.*"),
+        "datasets": [each for study in built for each in study.datasets],
+        "made": _made(),
+        "citations": citation.citations(),
+    }
+    return templating.rendered("index.html.j2", values)
+
+
+def tables(built: Sequence[Built]) -> list[Table]:
+    """The claims by figure, of those that are built and of those that are not."""
+    by_name = {each.name: each for each in built}
+    made = []
+    for name in dict.fromkeys(claim.study for claim in claims.listed().claims):
+        own = by_name.get(name)
+        judged = claims.judged(name, own.facts if own else [])
+        title = f"Figure {name.removeprefix('fig')}"
+        made.append(Table(name, title, own, judged, claims.verdict(judged)))
+    return made
+
+
+def thumbnail(picture: Path) -> str:
+    """A picture made small, as base64 of a JPEG; empty where there is none."""
+    image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
+    if image is None:
+        return ""
+    rows = round(image.shape[0] * WIDTH / image.shape[1])
+    small = cv2.resize(image, (WIDTH, rows), interpolation=cv2.INTER_AREA)
+    _, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 86])
+    return base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def _made() -> list[tuple[str, Any]]:
+    """What made this page."""
+    packages = dict(package_versions()) | {name: version(name) for name in ("jinja2", "matplotlib")}
+    return [("git_commit", git_commit()), ("packages", json.dumps(packages, sort_keys=True))]

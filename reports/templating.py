@@ -1,0 +1,51 @@
+"""HTML from the templates beside the reports; text is escaped, what is not given is an error."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup, escape
+
+_TEMPLATES = Path(__file__).parent / "templates"
+
+
+def rendered(template: str, values: Mapping[str, Any]) -> str:
+    """HTML of a template.
+
+    Args:
+        template: name of its file.
+        values: what it shows, by name.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    environment.filters["groupby_order"] = _in_order
+    environment.filters["symbols"] = _symbols
+    return environment.get_template(template).render(values)
+
+
+def inlined(svg: str) -> str:
+    """The element of an SVG file without prologue and metadata, coordinates to 0.001 pt."""
+    element = svg[svg.index("<svg") :]
+    element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
+    return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
+
+
+def _symbols(text: str) -> Markup:
+    """Escaped text in which u_y has its index."""
+    return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
+
+
+def _in_order(items: Iterable[Any], attribute: str) -> list[dict[str, object]]:
+    """Items grouped by an attribute, groups in the order of their first member."""
+    groups: dict[str, list[Any]] = {}
+    for item in items:
+        groups.setdefault(getattr(item, attribute), []).append(item)
+    return [{"name": name, "members": members} for name, members in groups.items()]
