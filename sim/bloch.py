@@ -187,9 +187,9 @@ def _cell_energy(cell: Cell, loose: Ints, state: Array, gradient: Array) -> Arra
     shift = jnp.pad(cell.image @ stretch.T, ((0, 0), (0, 1)))
     ends = motion[cell.joined[:, 0]], motion[cell.joined[:, 1]] + shift
     pairs = jnp.stack(ends, axis=1)
-    return jax.vmap(_pair_energy)(
-        pairs, cell.arm, cell.vector, cell.void, cell.law, cell.contact
-    ).sum()
+    ligaments = (cell.arm, cell.vector, cell.void, cell.law, cell.contact)
+    each = jax.vmap(_pair_energy)(pairs, *(jnp.asarray(part) for part in ligaments))
+    return each.sum()
 
 
 def _pair_energy(
