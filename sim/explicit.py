@@ -17,10 +17,14 @@ from sim.modes import highest_frequency
 from sim.observables import observe
 from sim.splitting import BLANES_MOAN, Splitting
 from sim.system import as_values, empty_bars, system_of
+from sim.void_flight import Pace
 
-MAX_REFINEMENTS = 7
+MAX_REFINEMENTS = 4
 KEEP_FROM_LIMIT = 0.95
+FINER = 0.1
+"""Finer steps at a barrier, in shares of the stability limit."""
 RUNG = 1.25
+NONE = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -43,8 +47,9 @@ class ExplicitSolver:
     """Integrates one case explicitly with equal steps (``dynamics.Solver``).
 
     The step is cut to one that is stable for the structure at rest and, after a run, in the state
-    of closest contact; and halved as long as the run leaves the admissible states (a void beyond
-    its barrier, a blow-up), MAX_REFINEMENTS runs in all.
+    that stores the most energy; and halved as long as the run leaves the admissible states (a
+    blow-up, units that overlap), MAX_REFINEMENTS runs in all. Contact on void angles asks for no
+    shorter step: the voids' barriers have finer steps of their own.
 
     Attributes:
         topology: the structure.
@@ -73,25 +78,31 @@ class ExplicitSolver:
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
-        system = system_of(top, values)
+        system = system_of(top, values, NONE)
         refuse_overlap(system.contacts)
-        stable = self._steps_for(highest_frequency(top, values))
+        stable = self._steps_for(highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(values, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
-            failed = run(steps, self._outputs(steps.n_steps), system, checkpoints, u, v)
+            outputs = self._outputs(steps.n_steps)
+            failed = run(steps, outputs, system, self._watched, checkpoints, u, v)
             refuse_strangers(system.contacts)
-            needed = 2 * stable if failed >= 0 else self._steps_in_contact(values, u)
+            needed = 2 * stable if failed >= 0 else self._steps_in_motion(values, u)
             if needed <= stable:
                 return u, v, Record(steps, checkpoints, top)
             stable = needed
         raise SimulationError(
             f"the explicit run is unstable or leaves the admissible states (step {failed}) even"
-            f" with {steps.n_steps} steps (a void closed beyond its barrier); try a smaller drive"
-            " or a larger smallest edge",
+            f" with {steps.n_steps} steps; try a smaller drive or a larger smallest edge",
             step=failed,
         )
+
+    def adjoint_memory(self) -> int:
+        """Bytes that checkpoints and one segment's states take at the steps asked for."""
+        n_dofs, segment = self.topology.n_dofs, _segment(self.n_steps)
+        n_states = 2 * -(-self.n_steps // segment) + segment * (3 * len(self.splitting.kicks) + 2)
+        return np.dtype(float).itemsize * n_dofs * n_states
 
     def _steps_for(self, frequency: float) -> int:
         """Steps that are stable at an angular eigenfrequency (rad/s), on a ladder.
@@ -103,30 +114,36 @@ class ExplicitSolver:
         rung = np.ceil(np.log(max(needed / self.n_steps, 1.0)) / np.log(RUNG))
         return int(np.ceil(self.n_steps * RUNG**rung))
 
-    def _steps_in_contact(self, values: Values, states: Floats) -> int:
-        """Steps that are stable in the one of the states whose contact is closest, 0 if none is."""
-        contact = observe(self.topology, values, states.reshape(len(states), -1, 3)).contact_energy
-        if contact.max() == 0.0:
-            return 0
-        closest = states[contact.argmax()]
-        return self._steps_for(highest_frequency(self.topology, values, closest))
+    def _steps_in_motion(self, values: Values, states: Floats) -> int:
+        """Steps that are stable in the one of the states whose energy is greatest."""
+        seen = observe(self.topology, values, states.reshape(len(states), -1, 3))
+        fullest = states[(seen.strain_energy + seen.contact_energy).argmax()]
+        return self._steps_for(highest_frequency(self.topology, values, fullest, NONE))
+
+    @property
+    def _watched(self) -> Ints:
+        """Ligaments whose voids may come to contact."""
+        if self.topology.meeting is not None:
+            return NONE
+        return np.arange(len(self.topology.ligament_units))
 
     def backward(
         self, values: Values, record: Record, bar_u: Floats, bar_v: Floats
     ) -> tuple[Values, Floats, Floats]:
         """See ``dynamics.Solver``."""
         top, steps = record.topology, record.steps
-        system = system_of(top, values)
+        system = system_of(top, values, NONE)
         bars = empty_bars(system, steps.drive.shape)
         bar_decay, bar_gain = np.zeros_like(steps.decay), np.zeros_like(steps.gain)
         outputs = self._outputs(steps.n_steps)
         sweep_back(
-            steps, outputs, system, record.checkpoints, bar_u, bar_v, top.designed, bars,
-            bar_decay, bar_gain,
+            steps, outputs, system, self._watched, record.checkpoints, bar_u, bar_v, top.designed,
+            bars, bar_decay, bar_gain,
         )  # fmt: skip
         lengths = self.splitting.kicks * steps.h
         by_mass, by_damping = _kicks_transposed(values, lengths, steps, bar_decay, bar_gain)
-        bars.mass[:], bars.damping[:] = by_mass, by_damping
+        bars.mass[:] += by_mass
+        bars.damping[:] = by_damping
         by_drive = bars.drive.reshape(-1, len(top.held))
         return as_values(bars), self._kick_times(steps.n_steps), by_drive
 
@@ -136,10 +153,10 @@ class ExplicitSolver:
         return Steps(
             n_steps,
             h,
-            self.splitting.drifts,
+            Pace(self.splitting.drifts, self.splitting.kicks, FINER * self.splitting.stability),
             *_kicks(values, self.splitting.kicks * h),
             held.reshape(n_steps, n_kicks, -1),
-            max(1, int(np.sqrt(n_steps))),
+            _segment(n_steps),
         )
 
     def _kick_times(self, n_steps: int) -> Floats:
@@ -151,6 +168,11 @@ class ExplicitSolver:
     def _outputs(self, n_steps: int) -> Outputs:
         times = np.linspace(0, self.duration, n_steps + 1)
         return Outputs(*grid.hermite_stencils(times, self.asked))
+
+
+def _segment(n_steps: int) -> int:
+    """Steps between checkpoints: as many checkpoints as there are steps between two of them."""
+    return max(1, int(np.sqrt(n_steps)))
 
 
 def _kicks(values: Values, lengths: Floats) -> tuple[Floats, Floats]:

@@ -1,6 +1,7 @@
 """Compiled explicit integration of a network's motion and its exact discrete adjoint.
 
-A step alternates drifts u += a h v and kicks, which solve M v' = -dE/dq - C v exactly for frozen u:
+A step alternates flights and kicks. A flight of length a h is free but for the barriers of closed
+voids (sim/void_flight.py); a kick solves, for frozen u and the energy E of all else,
 
     v' = decay v - gain dE/dq,   decay = exp(-b h C / M),   gain = (1 - decay) / C.
 
@@ -18,6 +19,7 @@ from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.potential import gradient, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
+from sim.void_flight import Flight, Pace, flight_of, fly, fly_back
 
 
 class Steps(NamedTuple):
@@ -26,7 +28,7 @@ class Steps(NamedTuple):
     Attributes:
         n_steps: number of steps.
         h: step, s.
-        drifts: (n_kicks + 1,) coefficients.
+        pace: coefficients of the flights, and of the finer steps within them.
         decay, gain: (n_kicks, n_dofs) of the kicks.
         drive: (n_steps, n_kicks, n_held) prescribed values at the kicks.
         segment: steps between checkpoints.
@@ -34,7 +36,7 @@ class Steps(NamedTuple):
 
     n_steps: int
     h: float
-    drifts: Floats
+    pace: Pace
     decay: Floats
     gain: Floats
     drive: Floats
@@ -55,30 +57,62 @@ class Outputs(NamedTuple):
     rates: Floats
 
 
+class Trace(NamedTuple):
+    """States within some steps, for the reverse sweep.
+
+    Attributes:
+        u, v: (n, n_kicks + 1, n_dofs) where the flights start, that is at and after the kicks.
+        before: (n, n_kicks, n_dofs) velocities before the kicks.
+    """
+
+    u: Floats
+    v: Floats
+    before: Floats
+
+
+@compiled
+def _trace(n: int, steps: Steps) -> Trace:
+    n_kicks, n_dofs = steps.gain.shape
+    return Trace(
+        np.empty((n, n_kicks + 1, n_dofs)),
+        np.empty((n, n_kicks + 1, n_dofs)),
+        np.empty((n, n_kicks, n_dofs)),
+    )
+
+
+@compiled
+def _hold(n: int, m: int, u: Floats, steps: Steps, system: System) -> None:
+    """Sets the held dofs for flight ``m`` of step ``n``: between the kicks before and after it."""
+    last, following = max(m - 1, 0), min(m, len(steps.gain) - 1)
+    for i in range(len(system.held)):
+        u[system.held[i]] = 0.5 * (steps.drive[n, last, i] + steps.drive[n, following, i])
+
+
 @compiled
 def _step(
-    n: int, u: Floats, v: Floats, steps: Steps, system: System, work: Workspace, kept_u: Floats,
-    kept_v: Floats,
+    n: int, slot: int, u: Floats, v: Floats, steps: Steps, system: System, work: Workspace,
+    flight: Flight, trace: Trace,
 ) -> float:  # fmt: skip
-    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps the states just before its kicks.
+    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps its states in a slot of ``trace``.
 
     Returns:
         the sum of the energies at the kicks: not finite once a void is beyond its barrier.
     """
-    total = 0.0
-    for m in range(len(steps.gain)):
-        for d in system.dofs:
-            u[d] += steps.drifts[m] * steps.h * v[d]
-        for i in range(len(system.held)):
-            u[system.held[i]] = steps.drive[n, m, i]
-        kept_u[m] = u
-        kept_v[m] = v
-        strain, contact = gradient(u, system, work.turn, work.force)
-        total += strain + contact
-        for d in system.dofs:
-            v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
-    for d in system.dofs:
-        u[d] += steps.drifts[len(steps.gain)] * steps.h * v[d]
+    total, n_kicks = 0.0, len(steps.gain)
+    for m in range(n_kicks + 1):
+        trace.u[slot, m] = u
+        trace.v[slot, m] = v
+        _hold(n, m, u, steps, system)
+        if fly(steps.pace.drifts[m] * steps.h, u, v, steps.pace, system, flight) < 0:
+            return np.inf
+        if m < n_kicks:
+            trace.before[slot, m] = v
+            for i in range(len(system.held)):
+                u[system.held[i]] = steps.drive[n, m, i]
+            strain, contact = gradient(u, system, work.turn, work.force)
+            total += strain + contact
+            for d in system.dofs:
+                v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
     return total
 
 
@@ -87,22 +121,23 @@ def run(
     steps: Steps,
     outputs: Outputs,
     system: System,
+    watched: Ints,
     checkpoints: Floats,
     out_u: Floats,
     out_v: Floats,
 ) -> int:
     """Integrates from rest; fills outputs (n_asked, n_dofs) and checkpoints.
 
-    Checkpoints are (n_segments, 2, n_dofs) displacement and velocity.
+    Checkpoints are (n_segments, 2, n_dofs) displacement and velocity. Contact of ``watched`` voids
+    is that of the flights; the system must have none of its own.
 
     Returns:
         the step at which the motion left the admissible states, or -1.
     """
-    n_kicks, n_dofs = steps.gain.shape
-    work = workspace(system)
+    n_dofs = steps.gain.shape[1]
+    work, flight, trace = workspace(system), flight_of(watched, n_dofs // 3), _trace(1, steps)
     u, v = np.zeros(n_dofs), np.zeros(n_dofs)
     last_u, last_v = np.zeros(n_dofs), np.zeros(n_dofs)
-    kept_u, kept_v = np.empty((n_kicks, n_dofs)), np.empty((n_kicks, n_dofs))
     asked = 0
     for n in range(steps.n_steps):
         if n % steps.segment == 0:
@@ -110,7 +145,7 @@ def run(
             checkpoints[n // steps.segment, 1] = v
         last_u[:] = u
         last_v[:] = v
-        if not np.isfinite(_step(n, u, v, steps, system, work, kept_u, kept_v)):
+        if not np.isfinite(_step(n, 0, u, v, steps, system, work, flight, trace)):
             return n
         while asked < len(outputs.interval) and outputs.interval[asked] == n:
             w, r = outputs.values[asked], outputs.rates[asked]
@@ -121,45 +156,77 @@ def run(
 
 
 @compiled
-def _step_back(
-    n: int, v: Floats, bar_u: Floats, bar_v: Floats, kept_u: Floats, kept_v: Floats, steps: Steps,
+def _flight_back(
+    n: int, m: int, u: Floats, v: Floats, bar_u: Floats, bar_v: Floats, steps: Steps,
+    system: System, flight: Flight, bars: Bars,
+) -> None:  # fmt: skip
+    """Takes derivatives by the end of flight ``m`` of step ``n`` to its start ``u``, ``v``."""
+    _hold(n, m, u, steps, system)
+    fly_back(
+        steps.pace.drifts[m] * steps.h, u, v, bar_u, bar_v, steps.pace, system, flight,
+        bars.sensitivity, bars.mass,
+    )  # fmt: skip
+    last, following = max(m - 1, 0), min(m, len(steps.gain) - 1)
+    for i in range(len(system.held)):
+        unit = system.held[i] // 3
+        if system.held[i] % 3 == 2 and flight.met[unit] == 1:
+            bars.drive[n, last, i] += 0.5 * flight.pull[unit]
+            bars.drive[n, following, i] += 0.5 * flight.pull[unit]
+
+
+@compiled
+def _kick_back(
+    n: int, m: int, slot: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps,
     system: System, work: Workspace, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
 ) -> None:  # fmt: skip
-    """Takes derivatives by the end of step ``n`` to its start, and its velocity ``v`` with them."""
-    n_kicks = len(steps.gain)
-    for m in range(n_kicks - 1, -1, -1):
-        work.step[:] = 0.0
-        for d in system.dofs:
-            bar_v[d] += steps.drifts[m + 1] * steps.h * bar_u[d]
-            gain, before = steps.gain[m, d], kept_v[m, d]
-            work.step[d] = -gain * bar_v[d]
-            bar_decay[m, d] += bar_v[d] * before
-            bar_gain[m, d] -= bar_v[d] * (steps.decay[m, d] * before - v[d]) / gain
-            bar_v[d] *= steps.decay[m, d]
-            v[d] = before
-        hessian_product(kept_u[m], system, work.turn, work.step, work.product)
-        mixed(kept_u[m], system, work.turn, work.step, which, bars.sensitivity)
-        for d in system.dofs:
-            bar_u[d] += work.product[d]
-        for i in range(len(system.held)):
-            bars.drive[n, m, i] += work.product[system.held[i]]
+    """Takes derivatives by the velocities after kick ``m`` of step ``n`` to those before it."""
+    work.step[:] = 0.0
     for d in system.dofs:
-        bar_v[d] += steps.drifts[0] * steps.h * bar_u[d]
+        gain, before = steps.gain[m, d], trace.before[slot, m, d]
+        work.step[d] = -gain * bar_v[d]
+        bar_decay[m, d] += bar_v[d] * before
+        bar_gain[m, d] -= bar_v[d] * (steps.decay[m, d] * before - trace.v[slot, m + 1, d]) / gain
+        bar_v[d] *= steps.decay[m, d]
+    u = trace.u[slot, m + 1]
+    hessian_product(u, system, work.turn, work.step, work.product)
+    mixed(u, system, work.turn, work.step, which, bars.sensitivity)
+    for d in system.dofs:
+        bar_u[d] += work.product[d]
+    for i in range(len(system.held)):
+        bars.drive[n, m, i] += work.product[system.held[i]]
+
+
+@compiled
+def _step_back(
+    n: int, slot: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
+    work: Workspace, flight: Flight, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
+) -> None:  # fmt: skip
+    """Takes derivatives by the end of step ``n`` to its start."""
+    for m in range(len(steps.gain), -1, -1):
+        work.trial[:] = trace.u[slot, m]
+        work.saved[:] = trace.v[slot, m]
+        _flight_back(
+            n, m, work.trial, work.saved, bar_u, bar_v, steps, system, flight, bars
+        )  # fmt: skip
+        if m > 0:
+            _kick_back(n, m - 1, slot, bar_u, bar_v, trace, steps, system, work, which, bars,
+                       bar_decay, bar_gain)  # fmt: skip
 
 
 @compiled
 def sweep_back(
-    steps: Steps, outputs: Outputs, system: System, checkpoints: Floats, out_bar_u: Floats,
-    out_bar_v: Floats, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
+    steps: Steps, outputs: Outputs, system: System, watched: Ints, checkpoints: Floats,
+    out_bar_u: Floats, out_bar_v: Floats, which: Ints, bars: Bars, bar_decay: Floats,
+    bar_gain: Floats,
 ) -> None:  # fmt: skip
     """Reverse sweep of ``run`` from the loss derivatives by its outputs (n_asked, n_dofs).
 
-    Adds to ``bars`` but for mass and damping, which enter through ``bar_decay`` and ``bar_gain``.
+    Adds to ``bars``, but for damping and what mass does to the kicks: these enter through
+    ``bar_decay`` and ``bar_gain``.
     """
-    n_kicks, n_dofs = steps.gain.shape
-    work = workspace(system)
-    kept_u = np.empty((steps.segment, n_kicks, n_dofs))
-    kept_v = np.empty((steps.segment, n_kicks, n_dofs))
+    n_dofs = steps.gain.shape[1]
+    work, flight = workspace(system), flight_of(watched, n_dofs // 3)
+    trace = _trace(steps.segment, steps)
     u, v = np.empty(n_dofs), np.empty(n_dofs)
     bar_u, bar_v = np.zeros(n_dofs), np.zeros(n_dofs)
     left_u, left_v = np.zeros(n_dofs), np.zeros(n_dofs)
@@ -170,7 +237,7 @@ def sweep_back(
         u[:] = checkpoints[part, 0]
         v[:] = checkpoints[part, 1]
         for n in range(count):
-            _step(start + n, u, v, steps, system, work, kept_u[n], kept_v[n])
+            _step(start + n, n, u, v, steps, system, work, flight, trace)
         for n in range(count - 1, -1, -1):
             bar_u += left_u
             bar_v += left_v
@@ -183,5 +250,5 @@ def sweep_back(
                 left_v += w[2] * out_bar_u[asked] + r[2] * out_bar_v[asked]
                 bar_v += w[3] * out_bar_u[asked] + r[3] * out_bar_v[asked]
                 asked -= 1
-            _step_back(start + n, v, bar_u, bar_v, kept_u[n], kept_v[n], steps, system, work,
-                       which, bars, bar_decay, bar_gain)  # fmt: skip
+            _step_back(start + n, n, bar_u, bar_v, trace, steps, system, work, flight, which, bars,
+                       bar_decay, bar_gain)  # fmt: skip

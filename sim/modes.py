@@ -7,16 +7,21 @@ from collections.abc import Callable
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 from sim.matrix import clear, factorise, matrix, solve
 from sim.model import Topology, Values
 from sim.potential import hessian_product, tangent
 from sim.system import system_of
 
 
-def highest_frequency(topology: Topology, values: Values, motion: Floats | None = None) -> float:
-    """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration."""
-    system = system_of(topology, values)
+def highest_frequency(
+    topology: Topology, values: Values, motion: Floats | None = None, touching: Ints | None = None
+) -> float:
+    """Highest angular eigenfrequency (rad/s) about a state (default rest), by Lanczos iteration.
+
+    Contact on void angles is that of the ligaments ``touching`` (default all).
+    """
+    system = system_of(topology, values, touching)
     state = np.zeros(topology.n_dofs) if motion is None else motion.ravel()
     turn = np.empty((topology.n_units, 4))
     free, root = topology.free_dofs, _root_mass(topology, values)

@@ -16,7 +16,7 @@ from sim.network import Network, Sensitivity
 
 
 @compiled
-def _void(net: Network, k: int, side: int, turn: float) -> tuple[float, float, float]:
+def void_slopes(net: Network, k: int, side: int, turn: float) -> tuple[float, float, float]:
     """Energy of one void and its first two derivatives by the turn; infinite past the barrier."""
     sign = 1.0 - 2.0 * side
     stiffness, barrier, cutoff = net.contact[k]
@@ -39,7 +39,7 @@ def _void(net: Network, k: int, side: int, turn: float) -> tuple[float, float, f
 @compiled
 def _curvature(net: Network, k: int, turn: float) -> float:
     """Second derivative of the energy of both voids by the turn."""
-    return _void(net, k, 0, turn)[2] + _void(net, k, 1, turn)[2]
+    return void_slopes(net, k, 0, turn)[2] + void_slopes(net, k, 1, turn)[2]
 
 
 @compiled
@@ -49,7 +49,7 @@ def add_gradient(motion: Floats, net: Network, out: Floats) -> float:
     for k in net.touching:
         a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
         for side in range(2):
-            energy, slope, _ = _void(net, k, side, motion[a] - motion[b])
+            energy, slope, _ = void_slopes(net, k, side, motion[a] - motion[b])
             total += energy
             out[a] += slope
             out[b] -= slope
@@ -83,11 +83,13 @@ def add_mixed(
     motion: Floats, net: Network, direction: Floats, which: Ints, out: Sensitivity
 ) -> None:
     """Adds d/dp of (``direction`` . dE/dmotion) to ``out`` for the ligaments in ``which``."""
+    if len(net.touching) == 0:
+        return
     for k in which:
         a, b = 3 * net.unit[k, 0] + 2, 3 * net.unit[k, 1] + 2
         turning = direction[a] - direction[b]
         for side in range(2):
-            _, slope, curvature = _void(net, k, side, motion[a] - motion[b])
+            _, slope, curvature = void_slopes(net, k, side, motion[a] - motion[b])
             if curvature > 0.0:
                 out.void[k, side] += (1.0 - 2.0 * side) * curvature * turning
                 out.contact[k] += slope / net.contact[k, 0] * turning

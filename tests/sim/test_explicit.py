@@ -96,7 +96,7 @@ def test_a_step_beyond_the_stability_limit_is_cut() -> None:
     limit = 0.012 * highest_frequency(rig.topology, rig.values) / BLANES_MOAN.stability
     coarse = solver_for(rig, int(0.6 * limit))
     u, _, record = coarse.forward(rig.values, rig.drive)
-    assert limit <= record.steps.n_steps < 1.4 * limit
+    assert limit <= record.steps.n_steps < 1.6 * limit
     fine = replace(solver_for(rig, 1000), asked=coarse.asked).forward(rig.values, rig.drive)[0]
     np.testing.assert_allclose(u, fine, atol=2e-2 * np.abs(fine).max())
 
@@ -112,13 +112,15 @@ def test_every_state_stays_inside_the_barrier(splitting: Splitting) -> None:
     assert rig.topology.smallest_void_angles(rig.values.void, checked).min() > BARRIER
 
 
-def test_a_run_that_crosses_the_barrier_is_repeated_with_shorter_steps() -> None:
+def test_deep_contact_takes_no_shorter_steps() -> None:
     rig = shaken(3.0, bias_deg=45.0)
     rough = solver_for(rig, 160)
     u, _, record = rough.forward(rig.values, rig.drive)
-    assert record.steps.n_steps > rough.n_steps
-    states = u.reshape(len(u), -1, 3)
-    assert rig.topology.smallest_void_angles(rig.values.void, states).min() > BARRIER
+    assert record.steps.n_steps == rough.n_steps
+    angles = rig.topology.smallest_void_angles(rig.values.void, u.reshape(len(u), -1, 3))
+    assert BARRIER < angles.min() < np.deg2rad(-13.0)
+    fine = replace(solver_for(rig, 1280), asked=rough.asked).forward(rig.values, rig.drive)[0]
+    np.testing.assert_allclose(u, fine, atol=6e-2 * np.abs(fine).max())
 
 
 def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> None:
