@@ -52,7 +52,7 @@ class Flight(NamedTuple):
         met: (n_units,) whether a unit is among them.
         angle, rate: (n_units,) their rotations and rates at the start.
         force, pull: (n_units,) moments, and derivatives by held rotations.
-        count: (2,) numbers of voids near and of units.
+        found: (2,) numbers of voids near and of units.
     """
 
     watched: Ints
@@ -63,7 +63,7 @@ class Flight(NamedTuple):
     rate: Floats
     force: Floats
     pull: Floats
-    count: Ints
+    found: Ints
 
 
 @compiled
@@ -80,7 +80,7 @@ def flight_of(watched: Ints, n_units: int) -> Flight:
 def _find(tau: float, u: Floats, v: Floats, system: System, flight: Flight) -> None:
     """Notes the voids that may come to contact within ``tau``, and the units beside them."""
     net, n_near, n_units = system.net, 0, 0
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         flight.met[flight.units[i]] = 0
     for k in flight.watched:
         a, b = net.unit[k, 0], net.unit[k, 1]
@@ -96,7 +96,7 @@ def _find(tau: float, u: Floats, v: Floats, system: System, flight: Flight) -> N
                     flight.units[n_units] = unit
                     flight.angle[unit], flight.rate[unit] = u[3 * unit + 2], v[3 * unit + 2]
                     n_units += 1
-    flight.count[0], flight.count[1] = n_near, n_units
+    flight.found[0], flight.found[1] = n_near, n_units
 
 
 @compiled
@@ -109,7 +109,7 @@ def _agility(unit: int, system: System) -> float:
 def _finer_steps(tau: float, pace: Pace, system: System, flight: Flight) -> int:
     """How many finer steps follow the barrier where the energy of each void can carry it to."""
     net, fastest = system.net, 0.0
-    for i in range(flight.count[0]):
+    for i in range(flight.found[0]):
         k = flight.near[i]
         a, b = net.unit[k, 0], net.unit[k, 1]
         agility = _agility(a, system) + _agility(b, system)
@@ -131,9 +131,9 @@ def _finer_steps(tau: float, pace: Pace, system: System, flight: Flight) -> int:
 def _moments(u: Floats, system: System, flight: Flight) -> bool:
     """Fills the moments of the barriers on the units that meet; whether none is passed."""
     net = system.net
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         flight.force[flight.units[i]] = 0.0
-    for i in range(flight.count[0]):
+    for i in range(flight.found[0]):
         k = flight.near[i]
         a, b = net.unit[k, 0], net.unit[k, 1]
         for side in range(2):
@@ -147,14 +147,14 @@ def _moments(u: Floats, system: System, flight: Flight) -> bool:
 
 @compiled
 def _turn(tau: float, u: Floats, v: Floats, flight: Flight) -> None:
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         d = 3 * flight.units[i] + 2
         u[d] += tau * v[d]
 
 
 @compiled
 def _push(tau: float, v: Floats, system: System, flight: Flight) -> None:
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         unit = flight.units[i]
         v[3 * unit + 2] -= tau * _agility(unit, system) * flight.force[unit]
 
@@ -164,7 +164,7 @@ def _bounce(
     tau: float, n: int, u: Floats, v: Floats, pace: Pace, system: System, flight: Flight
 ) -> bool:
     """Takes the units that meet through ``n`` finer steps; whether no barrier is passed."""
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         unit = flight.units[i]
         u[3 * unit + 2], v[3 * unit + 2] = flight.angle[unit], flight.rate[unit]
     delta = tau / n
@@ -190,7 +190,7 @@ def fly(tau: float, u: Floats, v: Floats, pace: Pace, system: System, flight: Fl
     _find(tau, u, v, system, flight)
     for d in system.dofs:
         u[d] += tau * v[d]
-    if flight.count[0] == 0:
+    if flight.found[0] == 0:
         return 0
     n = _finer_steps(tau, pace, system, flight)
     while n <= MOST:
@@ -207,11 +207,11 @@ def _pull(
 ) -> None:  # fmt: skip
     """Reverse of ``_push`` at the moments held in ``flight``."""
     net = system.net
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         unit = flight.units[i]
         agility, bar = _agility(unit, system), bar_v[3 * unit + 2]
         by_mass[3 * unit + 2] += weight * agility * agility * flight.force[unit] * bar
-    for i in range(flight.count[0]):
+    for i in range(flight.found[0]):
         k = flight.near[i]
         a, b = net.unit[k, 0], net.unit[k, 1]
         turning = -weight * (
@@ -236,7 +236,7 @@ def _bounce_back(
     for _ in range(n):
         for m in range(len(pace.kicks), -1, -1):
             drift = pace.drifts[m] * delta
-            for i in range(flight.count[1]):
+            for i in range(flight.found[1]):
                 d = 3 * flight.units[i] + 2
                 if system.free[d] >= 0:
                     bar_v[d] += drift * bar_u[d]
@@ -258,7 +258,7 @@ def fly_back(
     ``flight.pull`` receives those by the rotations of held units; ``u`` and ``v`` are overwritten.
     """
     n = fly(tau, u, v, pace, system, flight)
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         unit = flight.units[i]
         if system.free[3 * unit + 2] < 0:
             bar_u[3 * unit + 2] = 0.0
@@ -267,7 +267,7 @@ def fly_back(
             bar_v[d] += tau * bar_u[d]
     if n > 0:
         _bounce_back(tau, n, u, v, bar_u, bar_v, pace, system, flight, out, by_mass)
-    for i in range(flight.count[1]):
+    for i in range(flight.found[1]):
         unit = flight.units[i]
         if system.free[3 * unit + 2] < 0:
             flight.pull[unit] = bar_u[3 * unit + 2]
