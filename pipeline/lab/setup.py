@@ -44,7 +44,12 @@ class Viewing(Section):
 
 
 class Speckle(Section):
-    """Random dots that do not touch: their diameter and the part of the face they may fill."""
+    """Random dots that do not touch.
+
+    Attributes:
+        diameter: of a dot.
+        density: the part of the face that they may fill.
+    """
 
     diameter: Length = 1.2
     density: Annotated[float, Field(gt=0.0, le=0.5)] = 0.35
@@ -107,7 +112,12 @@ class Sensor(Section):
 
 
 class Codec(Section):
-    """How the video is stored: ffv1 loses nothing; h264 by its constant rate factor."""
+    """How the video is stored.
+
+    Attributes:
+        name: ffv1 loses nothing.
+        crf: constant rate factor of h264.
+    """
 
     name: Literal["h264", "h264 intra", "ffv1"] = "h264"
     crf: Annotated[int, Field(ge=0, le=51, strict=True)] = 14
@@ -127,6 +137,11 @@ class Virtual(Section):
         start: time of the response from which it moves on.
         end: time of the response at which the video ends.
         duration: of the motion in the video; by default as long as in the response.
+        camera: where it stands, and how it sees.
+        look: of the units.
+        light: on them.
+        sensor: of the camera, with its optics.
+        codec: of the file.
         seed: of noise and speckle.
     """
 

@@ -19,7 +19,15 @@ _SUM_TOLERANCE = 1e-6
 
 
 class _Directed(Section):
-    """A drive along straight lines, one load case per direction."""
+    """A drive along straight lines, one load case per direction.
+
+    Attributes:
+        kind: which of the drives this is.
+        units: that are driven.
+        amplitude: A, of their displacement.
+        directions: of the displacement against x, counter-clockwise.
+        weights: of the load cases in the loss, adding up to 1; equal ones by default.
+    """
 
     units: Selector
     amplitude: Length
@@ -45,14 +53,24 @@ class _Directed(Section):
 
 
 class Harmonic(_Directed):
-    """A sin(2 pi f t) from the first instant, as the authors drive the shielding sample."""
+    """A sin(2 pi f t) from the first instant, as the authors drive the shielding sample.
+
+    Attributes:
+        frequency: f.
+    """
 
     kind: Literal["harmonic"]
     frequency: Frequency
 
 
 class RampHarmonic(_Directed):
-    """A (1 + tanh((t - delay)/rise_time))/2 sin(2 pi f (t - delay))."""
+    """A (1 + tanh((t - delay)/rise_time))/2 sin(2 pi f (t - delay)).
+
+    Attributes:
+        frequency: f.
+        rise_time: half the time in which it grows from 12 % to 88 %.
+        delay: until it has grown to one half.
+    """
 
     kind: Literal["ramp_harmonic"]
     frequency: Frequency
@@ -61,21 +79,36 @@ class RampHarmonic(_Directed):
 
 
 class TanhRamp(_Directed):
-    """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression."""
+    """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression.
+
+    Attributes:
+        duration: of the ramp; a static path has no time, so that it only names the loads.
+    """
 
     kind: Literal["tanh_ramp"]
     duration: Duration
 
 
 class LinearRamp(_Directed):
-    """A t/duration."""
+    """A t/duration.
+
+    Attributes:
+        duration: of the ramp; a static path has no time, so that it only names the loads.
+    """
 
     kind: Literal["linear_ramp"]
     duration: Duration
 
 
 class TimeSeries(Section):
-    """A measured motion (x, y, theta) of the driven units, read from a file beside the problem."""
+    """A measured motion (x, y, theta) of the driven units, read from a file beside the problem.
+
+    Attributes:
+        kind: which of the drives this is.
+        units: that are driven.
+        file: with the motion.
+        sha256: of the file, which is refused if it has another.
+    """
 
     kind: Literal["time_series"]
     units: Selector

@@ -63,7 +63,13 @@ class Shims(Section):
 
 
 class Labels(Section):
-    """Ids on the parts: height, width and depth of their strokes; smaller letters where needed."""
+    """Ids on the parts.
+
+    Attributes:
+        height: of the letters; smaller where there is no room.
+        stroke: width of their strokes.
+        depth: of their strokes.
+    """
 
     height: Length = 3.0
     stroke: Length = 0.5
@@ -173,6 +179,14 @@ class Fabrication(Section):
         minimum_gap: smallest distance of two units.
         fillet_radius: of the units' corners.
         paper: size of the pages of the assembly sheet.
+        slots: at the vertices, for the shims.
+        shims: that join the units.
+        labels: ids on the parts.
+        markers: dots for the tracking.
+        laser: sheets for the laser cutter.
+        print: plates for the printer.
+        fixture: what holds the specimen.
+        coupon: clearances that the test piece has, to find the one that fits.
     """
 
     material: Literal["PLA", "PETG", "ABS", "ASA", "PA12", "PMMA", "POM"] = "PLA"

@@ -15,7 +15,13 @@ _Name = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
 
 class Joint(Section):
-    """A figure of several studies: names of their folders, in the order in which they are shown."""
+    """A figure of several studies.
+
+    Attributes:
+        title: of figure and page.
+        doc: what it shows, in some sentences.
+        studies: names of their folders, in the order in which they are shown.
+    """
 
     title: str = ""
     doc: str = ""

@@ -25,7 +25,15 @@ Point = tuple[float, float]
 
 
 class _Grid(Section):
-    """Units in columns and rows: unit (i, j) has the id `i + across * j`."""
+    """Units in columns and rows: unit (i, j) has the id `i + across * j`.
+
+    Attributes:
+        kind: which of the lattices this is.
+        columns: of units, or of cells with two units each (kagome).
+        rows: likewise.
+        spacing: of the units, or of the cells.
+        ligament_length: from unit to unit, where a ligament joins them.
+    """
 
     columns: Size
     rows: Size
@@ -79,7 +87,11 @@ class _Grid(Section):
 
 
 class Quads(_Grid):
-    """Squares of alternating bias on a square lattice, joined by ligaments at their corners."""
+    """Squares of alternating bias on a square lattice, joined by ligaments at their corners.
+
+    Attributes:
+        bias_angle: by which the squares are turned, left and right by turns.
+    """
 
     kind: Literal["quads"] = "quads"
     bias_angle: Angle
@@ -118,8 +130,10 @@ class Quads(_Grid):
 class Kagome(_Grid):
     """Two triangles in every cell, (2 i, j) and (2 i + 1, j), joined at three corners.
 
-    With a `cell_angle` of 60 deg the cells are those of the regular kagome lattice; the authors
-    take 90 deg. `bias` moves the joints of even and of odd cells up and down.
+    Attributes:
+        bias: by which the joints of even and of odd cells are moved up and down.
+        cell_angle: between the sides of a cell: 60 deg in the regular kagome lattice, 90 deg as
+            the authors take it.
     """
 
     kind: Literal["kagome"]
@@ -163,16 +177,20 @@ class Kagome(_Grid):
 class ListedNetwork(Section):
     """Polygons and ligaments from a file: CSV, netCDF, or closed polylines and lines of a DXF.
 
-    Lengths in the file are mm; `spacing` is the length that makes displacements comparable with
-    rotations, about the distance of neighbouring units. Units are numbered in the order of the
-    file and listed as [number, 0].
+    Units are numbered in the order of the file and listed as [number, 0].
+
+    Attributes:
+        kind: which of the lattices this is.
+        file: as seen from the problem file; lengths in it are mm.
+        spacing: the length that makes displacements comparable with rotations, about the distance
+            of neighbouring units.
     """
 
     kind: Literal["file"]
     file: Annotated[str, StringConstraints(min_length=1)]
     spacing: Length
-    polygons: tuple[tuple[Point, ...], ...] | SkipJsonSchema[None] = None
-    ligaments: tuple[tuple[Point, Point], ...] | SkipJsonSchema[None] = None
+    polygons: SkipJsonSchema[tuple[tuple[Point, ...], ...] | None] = None
+    ligaments: SkipJsonSchema[tuple[tuple[Point, Point], ...] | None] = None
 
     @model_validator(mode="after")
     def _with_content(self, info: ValidationInfo) -> Self:

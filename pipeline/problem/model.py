@@ -38,7 +38,13 @@ _UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the autho
 
 
 class DampingLaw(Section):
-    """Viscous damping to ground per unit: the authors' ratio, or the two coefficients."""
+    """Viscous damping to ground per unit: the authors' ratio, or the two coefficients.
+
+    Attributes:
+        ratio: over the critical damping of one unit on one ligament.
+        translation: force over velocity; together with `rotation`.
+        rotation: torque over angular velocity.
+    """
 
     ratio: Ratio | None = None
     translation: Damping | None = None
@@ -53,7 +59,15 @@ class DampingLaw(Section):
 
 
 class Material(Section):
-    """Units (mass per area) and ligaments (three stiffnesses), with the damping."""
+    """Units and ligaments.
+
+    Attributes:
+        density: mass of the units over their area, in the plane.
+        axial_stiffness: force over elongation of a ligament.
+        shear_stiffness: force over lateral displacement of its ends.
+        bending_stiffness: torque over relative rotation of its ends.
+        damping: of the units.
+    """
 
     density: Density
     axial_stiffness: Stiffness
@@ -85,6 +99,14 @@ class Contact(Section):
 
     On angles there is none above the cut-off and no bound at the barrier; on distances none beyond
     `distance` and no bound at a touch. Designs are judged by both.
+
+    Attributes:
+        law: by which the design is optimised.
+        stiffness: of the contact, torque over angle squared.
+        barrier_angle: void angle at which the energy is infinite.
+        cutoff_angle: void angle above which there is no contact.
+        distance: of two units beyond which there is none; by default a twelfth of the ligaments'
+            length, or the gap that the constraints ask for if that is smaller.
     """
 
     law: Literal["angle", "geometric"]
@@ -95,7 +117,12 @@ class Contact(Section):
 
 
 class Support(Section):
-    """Units with some of their degrees of freedom held at zero."""
+    """Units with some of their degrees of freedom held at zero.
+
+    Attributes:
+        units: by side, or listed.
+        clamp: the degrees of freedom.
+    """
 
     units: Selector
     clamp: Annotated[tuple[Literal["ux", "uy", "theta"], ...], Field(min_length=1)] = (
@@ -106,7 +133,12 @@ class Support(Section):
 
 
 class Inclusion(Section):
-    """Units made rigid: every ligament that touches one is so many times stiffer."""
+    """Units made rigid.
+
+    Attributes:
+        region: where they are.
+        stiffness_factor: how many times stiffer every ligament is that touches one of them.
+    """
 
     region: Region
     stiffness_factor: Annotated[float, Field(gt=1.0, allow_inf_nan=False)] = 200.0
@@ -115,8 +147,11 @@ class Inclusion(Section):
 class Horizon(Section):
     """How long the loss looks, in periods of the drive or in time, and at how many instants.
 
-    `samples` are spread over a motion in time, both ends included; `steps` are the equal load steps
-    of a static path, the unloaded start left out.
+    Attributes:
+        periods: of the drive; or `duration`.
+        duration: in time; or `periods`.
+        samples: instants spread over a motion in time, both ends included.
+        steps: equal load steps of a static path, the unloaded start left out.
     """
 
     periods: Positive | None = None
@@ -131,7 +166,13 @@ class Horizon(Section):
 
 
 class Objective(Section):
-    """What the surroundings or a region should do: rest, or move as in the intact lattice."""
+    """What the surroundings or a region should do.
+
+    Attributes:
+        kind: what is compared: displacements and rotations, or the strain energy.
+        target: stay at rest, or do as in the intact lattice.
+        region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
+    """
 
     kind: Literal["displacement", "strain_energy"]
     target: Literal["rest", "intact"]
@@ -139,7 +180,15 @@ class Objective(Section):
 
 
 class Constraints(Section):
-    """What can be made: lower bounds at every unit, none where a key is left out."""
+    """What can be made: lower bounds at every unit, none where a key is left out.
+
+    Attributes:
+        edge_length: of the units.
+        block_angle: between two edges of a unit.
+        void_angle: between the edges of neighbouring units, at either side of a ligament.
+        gap: between two units.
+        convex: whether units must be convex.
+    """
 
     edge_length: Length | None = None
     block_angle: Angle | None = None
@@ -149,13 +198,22 @@ class Constraints(Section):
 
 
 class Method(Section):
-    """The budget of one optimisation method."""
+    """The budget of one optimisation method.
+
+    Attributes:
+        evaluations: of loss and gradient, at most.
+    """
 
     evaluations: Count
 
 
 class Methods(Section):
-    """The optimisation methods to run; the better design is shipped."""
+    """The optimisation methods to run; the better design is shipped.
+
+    Attributes:
+        sqp: sequential quadratic programming in a trust region.
+        mma: method of moving asymptotes, as the authors do.
+    """
 
     sqp: Method | None = None
     mma: Method | None = None
@@ -170,8 +228,16 @@ class Methods(Section):
 class Optimiser(Section):
     """How to look for the design; lengths are shifts of vertices.
 
-    `geometric` is the budget with which a design by the angle law of contact is optimised again
-    with contact on distance, where its loss depends on the law.
+    Attributes:
+        methods: one or both.
+        geometric: the budget with which a design by the angle law of contact is optimised again
+            with contact on distance, where its loss depends on the law.
+        symmetry: that the design is to have.
+        trust_radius: at the start.
+        trust_radius_max: at most.
+        kick: random shifts with which an optimisation that has ended goes on, as far as its
+            budget allows.
+        seed: of the kicks.
     """
 
     methods: Methods
@@ -184,14 +250,24 @@ class Optimiser(Section):
 
 
 class Solver(Section):
-    """Accuracy of the simulation and the integrator; `auto` chooses by the scene."""
+    """Accuracy of the simulation, and the integrator.
+
+    Attributes:
+        accuracy: of steps and tolerances; a draft is good for a look.
+        integrator: in time; `auto` chooses by the scene, see the page on numerics.
+    """
 
     accuracy: Literal["draft", "default", "tight"] = "default"
     integrator: Literal["auto", "implicit", "explicit"] = "auto"
 
 
 class Response(Section):
-    """How much of the response the report shows."""
+    """How much of the response the report shows.
+
+    Attributes:
+        cycles: periods of the drive.
+        samples: instants or load steps, both ends included.
+    """
 
     cycles: Positive = 4.0
     samples: Samples = 401
@@ -222,7 +298,30 @@ class Sweep(Section):
 
 
 class Problem(Section):
-    """A study: what to design, under which loads, to which end; in mm, N, s, tonne, rad."""
+    """A study: what to design, under which loads, to which end; in mm, N, s, tonne, rad.
+
+    Attributes:
+        title: of figure and page.
+        doc: what the study shows, in some sentences.
+        lattice: the intact structure.
+        material: of units and ligaments.
+        contact: of units.
+        supports: what holds the structure.
+        drive: what moves it.
+        horizon: over which the loss is taken.
+        void: what is cut out.
+        inclusion: what is made rigid.
+        cloak: where units may be redesigned.
+        objective: what is asked of the others.
+        constraints: what can be made.
+        optimiser: how to look for the design.
+        solver: accuracy of the simulation.
+        response: how much of it is shown.
+        sweep: the robustness map, if there is to be one.
+        robustness: trials of imperfect copies, if there are to be any.
+        report: choices of figure and page.
+        fabrication: how it is made.
+    """
 
     title: str = ""
     doc: str = ""

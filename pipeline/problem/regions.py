@@ -22,7 +22,15 @@ ROUND = 360  # corners that stand for a circle
 
 
 class Region(Section):
-    """A part of the specimen's plane."""
+    """A part of the specimen's plane, by one shape.
+
+    Attributes:
+        disc: all within a circle.
+        ring: all between two circles.
+        polygon: by its corners.
+        curve: a heart, a smile, or a formula.
+        image: what is dark in a picture, or filled in a drawing.
+    """
 
     shapes: ClassVar[tuple[str, ...]] = ("disc", "ring", "polygon", "curve", "image")
 
@@ -73,19 +81,31 @@ class Region(Section):
 
 
 class VoidRegion(Region):
-    """What is cut out; units that it cuts off from the rest are refused, or removed as well."""
+    """What is cut out.
+
+    Attributes:
+        loose: what to do where units are cut off from the rest: refuse, or remove them as well.
+    """
 
     loose: Literal["refuse", "remove"] = "refuse"
 
 
 class Around(Section):
-    """Points within `distance` of the void, the inclusion, or the region of interest."""
+    """Points near the void, the inclusion, or the region of interest.
+
+    Attributes:
+        distance: from it, at most.
+    """
 
     distance: Length
 
 
 class CloakRegion(Region):
-    """Where units may be redesigned."""
+    """Where units may be redesigned: a region, or all around something.
+
+    Attributes:
+        around: all near the void, the inclusion, or the region of interest.
+    """
 
     shapes: ClassVar[tuple[str, ...]] = (*Region.shapes, "around")
 

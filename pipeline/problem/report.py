@@ -13,9 +13,12 @@ from pipeline.problem.section import Section
 class Robustness(Section):
     """Imperfect copies of the shipped design, each simulated.
 
-    `geometry` are the largest shifts of a vertex along x and y, either way and evenly spread, as
-    shares of the spacing; `stiffness` the standard deviations of every ligament's stiffnesses, as
-    shares of them.
+    Attributes:
+        samples: copies of each kind and size of imperfection.
+        geometry: largest shifts of a vertex along x and y, either way and evenly spread, as shares
+            of the spacing.
+        stiffness: standard deviations of every ligament's stiffnesses, as shares of them.
+        seed: of the random numbers.
     """
 
     samples: Count = 200
@@ -27,8 +30,11 @@ class Robustness(Section):
 class Paper(Section):
     """What a publication tells of this study, to stand beside the numbers computed here.
 
-    `figure` is its figure, `variant` names which of its sets of values is run, `strain` is its
-    label of the full load, `values` the words that it uses for the facts of the report, by key.
+    Attributes:
+        figure: its figure.
+        variant: which of its sets of values is run.
+        strain: its label of the full load.
+        values: the words that it uses for the facts of the report, by key.
     """
 
     figure: str
@@ -40,9 +46,11 @@ class Paper(Section):
 class Report(Section):
     """Choices of the report.
 
-    `snapshots` are the driven displacements that it shows, `shim_strain_limit` the strain up to
-    which the foil of the shims counts as sound (polyester yields at about 5 %), `paper` what a
-    publication tells.
+    Attributes:
+        snapshots: driven displacements that it shows.
+        shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
+            yields at about 5 %).
+        paper: what a publication tells.
     """
 
     snapshots: tuple[Gap, ...] = ()

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
+from pipeline.problem.meanings import lead, meanings
 from pipeline.problem.quantities import fault
 
 
@@ -17,6 +20,20 @@ class Section(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", validate_by_name=False, validate_by_alias=True
     )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The schema, in which every key has the meaning that the docstring tells."""
+        made = handler(core_schema)
+        whole = handler.resolve_ref_schema(made)
+        whole["description"] = lead(cls)
+        told = meanings(cls)
+        for name, field in cls.model_fields.items():
+            if (key := field.alias or name) in whole["properties"] and name in told:
+                whole["properties"][key]["description"] = told[name]
+        return made
 
     @model_validator(mode="before")
     @classmethod

@@ -17,7 +17,11 @@ Index = Annotated[int, Field(ge=0, strict=True)]
 
 
 class ListedUnits(Section):
-    """Units by their lattice indices (i, j), counted from zero."""
+    """Units one by one.
+
+    Attributes:
+        units: pairs [i, j] of column and row, counted from zero.
+    """
 
     units: Annotated[tuple[tuple[Index, Index], ...], Field(min_length=1)]
 

@@ -33,14 +33,25 @@ def at(centre: Centre, middle: Point) -> Point:
 
 
 class Disc(Section):
-    """Points within `radius` of `centre`, the rim included."""
+    """Points within a circle, the rim included.
+
+    Attributes:
+        centre: where it lies: the middle of the lattice, or [x, y] in the specimen's frame.
+        radius: of the circle.
+    """
 
     centre: Centre = "centre"
     radius: Length
 
 
 class Ring(Section):
-    """Points beyond `inner` and within `outer` of `centre`."""
+    """Points between two circles, the outer rim included.
+
+    Attributes:
+        centre: where it lies: the middle of the lattice, or [x, y] in the specimen's frame.
+        inner: radius of the inner circle.
+        outer: radius of the outer circle.
+    """
 
     centre: Centre = "centre"
     inner: Gap
@@ -48,7 +59,12 @@ class Ring(Section):
 
 
 class Polygon(Section):
-    """A polygon by its corners in the specimen frame, turned about the middle of its box."""
+    """A polygon by its corners.
+
+    Attributes:
+        vertices: pairs [x, y] in the specimen's frame.
+        orientation: by which it is turned about the middle of its box, counter-clockwise.
+    """
 
     vertices: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=3)]
     orientation: Angle = 0.0
@@ -63,7 +79,12 @@ class Polygon(Section):
 class Heart(Section):
     """The authors' heart, x = 16 sin^3 t, y = 13 cos t - 5 cos 2t - 2 cos 3t - cos 4t.
 
-    Its extents are scaled to `size`; the curve's own origin comes to lie at `centre`.
+    Attributes:
+        kind: which of the curves this is.
+        size: width and height to which it is scaled.
+        centre: of the curve's own origin: the middle of the lattice, or [x, y].
+        orientation: by which it is turned, counter-clockwise.
+        points: corners of the polygon that stands for it.
     """
 
     kind: Literal["heart"]
@@ -84,7 +105,17 @@ def _heart_height(t: float) -> float:
 
 
 class Smile(Section):
-    """The authors' crescent between two lower half circles whose centres lie above `centre`."""
+    """The authors' crescent between two lower half circles.
+
+    Attributes:
+        kind: which of the curves this is.
+        centre: below the circles' centres: the middle of the lattice, or [x, y].
+        inner_radius: of the upper edge.
+        inner_rise: of its circle's centre above `centre`.
+        outer_radius: of the lower edge.
+        outer_rise: of its circle's centre above `centre`.
+        orientation: by which it is turned, counter-clockwise.
+    """
 
     kind: Literal["smile"]
     centre: Centre = "centre"
@@ -113,7 +144,17 @@ def _on_circle(radius: float, angle: float) -> Point:
 
 
 class Formula(Section):
-    """The curve (x(t), y(t)), 0 <= t < 2 pi; its extents are scaled to `size`, its origin moved."""
+    """The curve (x(t), y(t)), 0 <= t < 2 pi.
+
+    Attributes:
+        kind: which of the curves this is.
+        x: formula in t, e.g. `16 * sin(t)^3`.
+        y: likewise.
+        size: width and height to which it is scaled.
+        centre: of the curve's own origin: the middle of the lattice, or [x, y].
+        orientation: by which it is turned, counter-clockwise.
+        points: corners of the polygon that stands for it.
+    """
 
     kind: Literal["formula"]
     x: Annotated[str, StringConstraints(min_length=1)]
@@ -150,8 +191,14 @@ Curve = Annotated[Heart | Smile | Formula, Field(discriminator="kind")]
 class Image(Section):
     """What is dark in a binary image (PNG, JPG) or filled in an SVG, upright as one sees it.
 
-    The box around the shape is scaled to `size`, or to `width` with its proportions kept, and its
-    middle moved to `centre`. The outline is read from the file when the problem is.
+    The outline is read from the file when the problem is.
+
+    Attributes:
+        file: as seen from the problem file.
+        size: width and height to which the box around the shape is scaled; or `width`.
+        width: to which it is scaled with its proportions kept; or `size`.
+        centre: of the box: the middle of the lattice, or [x, y].
+        orientation: by which it is turned, counter-clockwise.
     """
 
     file: Annotated[str, StringConstraints(min_length=1)]
@@ -159,7 +206,7 @@ class Image(Section):
     width: Length | None = None
     centre: Centre = "centre"
     orientation: Angle = 0.0
-    read: tuple[Outline, ...] | SkipJsonSchema[None] = None
+    read: SkipJsonSchema[tuple[Outline, ...] | None] = None
 
     @model_validator(mode="after")
     def _with_outline(self, info: ValidationInfo) -> Image:

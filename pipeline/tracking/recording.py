@@ -15,7 +15,12 @@ from pipeline.problem.section import Section, exactly_one
 
 
 class Window(Section):
-    """The part of the video that is tracked; its first frame shows the specimen at rest."""
+    """The part of the video that is tracked; its first frame shows the specimen at rest.
+
+    Attributes:
+        start: since the file's first frame.
+        end: likewise; by default that of the file.
+    """
 
     start: Delay = 0.0
     end: Duration | None = None
