@@ -10,18 +10,28 @@ from pipeline.problem.model import Problem
 from pipeline.problem.quantities import SIM_UNITS
 
 Stage = Literal[
-    "design", "simulate", "sweep", "scatter", "verify", "geometric", "fabricate", "report"
+    "design",
+    "simulate",
+    "sweep",
+    "scatter",
+    "verify",
+    "geometric",
+    "fabricate",
+    "compare",
+    "report",
 ]
 
 _WORDS = ("title", "doc", "report")
+_APART = (*_WORDS, "prediction")
 _UNUSED: dict[Stage, tuple[str, ...]] = {
-    "design": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
-    "simulate": (*_WORDS, "sweep", "robustness", "fabrication"),
-    "sweep": (*_WORDS, "response", "robustness", "fabrication"),
-    "scatter": (*_WORDS, "response", "sweep", "fabrication"),
-    "verify": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
-    "geometric": (*_WORDS, "response", "sweep", "robustness", "fabrication"),
-    "fabricate": ("doc", "report", "solver", "response", "sweep", "robustness"),
+    "design": (*_APART, "response", "sweep", "robustness", "fabrication"),
+    "simulate": (*_APART, "sweep", "robustness", "fabrication"),
+    "sweep": (*_APART, "response", "robustness", "fabrication"),
+    "scatter": (*_APART, "response", "sweep", "fabrication"),
+    "verify": (*_APART, "response", "sweep", "robustness", "fabrication"),
+    "geometric": (*_APART, "response", "sweep", "robustness", "fabrication"),
+    "fabricate": ("doc", "report", "solver", "response", "sweep", "robustness", "prediction"),
+    "compare": (*_WORDS, "response", "sweep", "fabrication"),
     "report": (),
 }
 

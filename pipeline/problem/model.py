@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from pipeline.problem.drives import Drive, Harmonic, LinearRamp, RampHarmonic, TanhRamp
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.lattices import Lattice
+from pipeline.problem.prediction import Prediction, Tolerances
 from pipeline.problem.quantities import (
     Angle,
     BendingStiffness,
@@ -341,6 +342,7 @@ class Problem(Section):
     response: Response = Response()
     sweep: Sweep | None = None
     robustness: Robustness | None = None
+    prediction: Prediction = Prediction()
     report: Report = Report()
     fabrication: Fabrication = Fabrication()
 
@@ -362,6 +364,14 @@ class Problem(Section):
         assert self.horizon.periods is not None
         assert self.frequency is not None
         return self.horizon.periods / self.frequency
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """By how much specimens and constants may be off: see `Prediction`."""
+        tried = self.robustness
+        sizes = {"geometry": tried.geometry, "ligaments": tried.stiffness} if tried else {}
+        found = {name: min(given) for name, given in sizes.items() if given}
+        return Tolerances(**(found | self.prediction.given))
 
     @property
     def damping_coefficients(self) -> tuple[float, float]:

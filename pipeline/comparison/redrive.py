@@ -1,0 +1,196 @@
+"""The simulation driven as the specimen was: by the measured motion of the units that are held.
+
+Each degree of freedom of each of these units is filtered by a smoothing spline (Dierckx 1975) that
+departs from the track by its standard uncertainty, no more and no less: the sum of the squared
+residuals over sigma is the number of frames. Its knots gather where the motion needs them, such as
+at the start of a drive. Frames in which a unit was not seen are bridged by it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+from jax import Array
+from numpy.typing import NDArray
+from scipy.interpolate import UnivariateSpline
+
+from pipeline.errors import UserError
+from pipeline.measuring import Structure
+from sim.arrays import Numbers
+from sim.dynamics import solve_case
+from sim.errors import SimulationError
+from sim.observables import observe
+from sim.plan import concrete_parameters, make_plan
+from sim.scene import Scene
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+FINER = 2
+"""Instants that the filtered motion is kept at, for every frame."""
+LEAST_SEEN = 8
+"""Frames in which a unit must be seen to be followed."""
+
+
+class Course(NamedTuple):
+    """A smooth motion, by values and slopes at equally spaced instants; it rests before and after.
+
+    Attributes:
+        step: between the instants, s; the first is at zero.
+        value: (n, n_units, 3) mm, mm, rad.
+        slope: (n, n_units, 3) per s.
+    """
+
+    step: float
+    value: Numbers
+    slope: Numbers
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, n_units, 3) at the given times, s: cubic between the instants."""
+        value, slope = jnp.asarray(self.value), jnp.asarray(self.slope)
+        last = len(value) - 1
+        place = jnp.clip(jnp.asarray(times) / self.step, 0.0, last)
+        before = jnp.minimum(jnp.floor(place), last - 1).astype(int)
+        s = (place - before)[:, None, None]
+        rise = value[before + 1] - value[before]
+        bend = slope[before] * self.step - rise
+        other = rise - slope[before + 1] * self.step
+        return value[before] + s * rise + s * (1 - s) * ((1 - s) * bend + s * other)
+
+
+class Held(NamedTuple):
+    """Filtered motion of the units that supports and drive hold.
+
+    Attributes:
+        unit: (n,) places in the scene's lattice, ascending.
+        driven: (n,) whether the unit follows the drive; the others are clamped.
+        motion: (n_times, n, 3) of them all, as a function of the track's time.
+        noise: (n, 3) root mean square of what the filter took out: mm, mm, rad.
+        filled: (n,) part of the frames that were bridged.
+        assumed: (n,) whether the unit was hardly ever seen: it then rests if it is clamped, and
+            follows the mean of the driven ones if it is driven.
+    """
+
+    unit: Places
+    driven: Mask
+    motion: Course
+    noise: Floats
+    filled: Floats
+    assumed: Mask
+
+
+class Redriven(NamedTuple):
+    """A simulation under the measured motion.
+
+    Attributes:
+        displacement: (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end
+            of a path that ended early.
+        drive_force: (n_times, 2) force of the drive on all driven units, N.
+        failure: why the path ended early.
+    """
+
+    displacement: Floats
+    drive_force: Floats
+    failure: str | None = None
+
+
+def held_motion(track: xr.Dataset, scene: Scene) -> Held:
+    """The motion of the driven units and of those clamped in all three degrees of freedom.
+
+    Args:
+        track: of the specimen; its displacement in the specimen's frame.
+        scene: of the structure.
+
+    Raises:
+        UserError: no driven unit was seen.
+    """
+    unit, driven = held_units(scene)
+    seen = track.sel(unit=scene.lattice.id[unit])
+    measured, sigma = (
+        seen[name].transpose("time", "unit", "dof").values.astype(float)
+        for name in ("displacement", "sigma")
+    )
+    time = track["time"].values - track["time"].values[0]
+    there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    assumed = there.sum(axis=0) < LEAST_SEEN
+    if assumed[driven].all():
+        raise UserError(
+            "no driven unit was seen, so the simulation cannot be driven as the specimen was",
+            remedy="film it so that the units at the drive are in the picture",
+        )
+    step = time[-1] / (FINER * (len(time) - 1))
+    instants = step * np.arange(FINER * (len(time) - 1) + 1)
+    value, slope = (np.zeros((len(instants), len(unit), 3)) for _ in range(2))
+    noise = np.zeros((len(unit), 3))
+    for place, dof in np.ndindex(noise.shape):
+        if not assumed[place]:
+            kept = there[:, place]
+            spline = filtered(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
+            value[:, place, dof] = spline(instants)
+            slope[:, place, dof] = spline(instants, 1)
+            rest = measured[kept, place, dof] - spline(time[kept])
+            noise[place, dof] = np.sqrt(np.mean(rest**2))
+    mean = driven & ~assumed
+    for course in (value, slope):
+        course[:, driven & assumed] = course[:, mean].mean(axis=1, keepdims=True)
+    return Held(unit, driven, Course(step, value, slope), noise, 1 - there.mean(axis=0), assumed)
+
+
+def held_units(scene: Scene) -> tuple[Places, Mask]:
+    """Places of the driven units and of those clamped in all dofs, and which of them are driven."""
+    clamped, count = np.unique(scene.clamped // 3, return_counts=True)
+    unit = np.union1d(clamped[count == 3], scene.driven)
+    return unit, np.isin(unit, scene.driven)
+
+
+def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
+    """The smoothing spline of a course (n,) with standard uncertainties (n,); n at least 8."""
+    return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
+
+
+def under(scene: Scene, held: Held) -> Scene:
+    """The scene with all held units driven as measured; its end is that of the measurement."""
+    followed = (3 * held.unit[:, None] + np.arange(3)).ravel()
+    return replace(
+        scene,
+        driven=held.unit,
+        clamped=np.setdiff1d(scene.clamped, followed),
+        motions=(held.motion,),
+        weights=np.ones(1),
+        duration=held.motion.step * (len(held.motion.value) - 1),
+        frequency=None,
+        reference=None,
+    )
+
+
+def redriven(structure: Structure, held: Held, times: Floats) -> Redriven:
+    """The structure under the measured motion: in time, or as a path of equilibria.
+
+    Args:
+        structure: as designed, under the planned drives.
+        held: the measured motion.
+        times: (n_times,) on the track's clock, ascending, s.
+    """
+    scene, vertices = structure
+    driven = under(scene, held)
+    values = concrete_parameters(driven, vertices)
+    shape = (len(times), scene.lattice.n_units, 3)
+    displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)
+    failure = None
+    try:
+        plan = make_plan(driven, vertices, times)
+        found = solve_case(plan.solver, values, driven.drives[0])[0].reshape(shape)
+    except SimulationError as error:
+        failure = str(error)
+        found = np.empty((0, *shape[1:])) if error.states is None else error.states
+        found = found.reshape(-1, *shape[1:])
+    if len(found):
+        reaction = observe(driven.topology, values, found).reaction
+        displacement[: len(found)] = found
+        force[: len(found)] = reaction[:, scene.driven, :2].sum(axis=1)
+    return Redriven(displacement, force, failure)

@@ -1,0 +1,58 @@
+"""The section `prediction` of a problem: how far specimens and constants may be off."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.problem.quantities import Ratio, Samples
+from pipeline.problem.section import Section
+
+
+class Tolerances(Section):
+    """By how much a specimen differs from its design, and the constants from the true ones.
+
+    Attributes:
+        geometry: largest shift of a vertex along x and y, either way and evenly spread, as a share
+            of the spacing.
+        ligaments: standard deviation of every ligament's stiffnesses, as a share of them.
+        stiffness: the same of each of the three stiffnesses, of all ligaments together.
+        units: standard deviation of every unit's damping, as a share of it.
+        damping: the same of the damping of all units together.
+    """
+
+    geometry: Ratio = 0.01
+    ligaments: Ratio = 0.05
+    stiffness: Ratio = 0.05
+    units: Ratio = 0.1
+    damping: Ratio = 0.2
+
+
+class Prediction(Section):
+    """The spread of the simulation that a measured course is compared with.
+
+    A size that is not given is the smallest that `robustness` tries of its kind, where there is
+    one (`geometry` and its `stiffness`, which is that of the single ligaments), and else that of
+    a specimen cut by laser: see `Tolerances`.
+
+    Attributes:
+        samples: specimens drawn.
+        level: part of the specimens between the limits of the band.
+        seed: of the draws.
+        geometry, ligaments, stiffness, units, damping: see `Tolerances`.
+    """
+
+    samples: Samples = 64
+    level: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    geometry: Ratio | None = None
+    ligaments: Ratio | None = None
+    stiffness: Ratio | None = None
+    units: Ratio | None = None
+    damping: Ratio | None = None
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The sizes that are given, by name."""
+        return self.model_dump(include=set(Tolerances.model_fields), exclude_none=True)
