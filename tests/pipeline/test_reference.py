@@ -1,0 +1,37 @@
+"""The pages that follow from the code do follow from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.environment import ROOT
+from pipeline.reference.__main__ import main, pages
+
+
+@pytest.mark.parametrize("name", ["datasets.md", "keys.md"])
+def test_the_committed_page_is_up_to_date(name: str) -> None:
+    committed = (ROOT / "docs" / name).read_text(encoding="utf-8")
+    assert committed == pages()[name], "run python -m pipeline.reference"
+
+
+def test_the_command_writes_them(tmp_path: Path) -> None:
+    assert main(["--folder", str(tmp_path)]) == 0
+    assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == pages()
+
+
+def test_every_variable_and_every_section_has_its_place() -> None:
+    assert (
+        "| `displacement` | structure, case, time, unit, dof | mm (ux, uy), rad (theta) |"
+        in (pages()["datasets.md"])
+    )
+    keys = pages()["keys.md"]
+    for row in (
+        "| `spacing` | length (`mm`) |  | of the units, or of the cells. |",
+        "| `cell_angle` | angle (`deg`) | `90 deg` |",
+        "| `sheet` | pair, each length (`mm`) | `[600 mm, 300 mm]` |",
+        "| `window` | [Window](#window) | see there |",
+        "| `geometric` | [Method](#method) | `evaluations: 60` |",
+    ):
+        assert row in keys
