@@ -54,7 +54,7 @@ def _work(args: argparse.Namespace) -> None:
     given: dict[Output, Path] = {
         name: path for name in (*REQUIRED, *OPTIONAL) if (path := getattr(args, name)) is not None
     }
-    publish(study.load(args.problem, args.preset, given), args.out_dir)
+    publish(study.load(args.problem, args.preset, given, args.comparisons), args.out_dir)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -68,6 +68,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             metavar="NC",
             help=f"the {name} dataset" + ("" if name in REQUIRED else ", if the problem has one"),
         )
+    parser.add_argument(
+        "--comparisons", type=Path, nargs="*", default=(), metavar="NC",
+        help="its recordings beside their simulation, each in a folder of the recording's name",
+    )  # fmt: skip
     parser.add_argument(
         "--out-dir", type=Path, required=True, metavar="FOLDER", help="the report's folder"
     )

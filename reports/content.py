@@ -62,6 +62,7 @@ def page(
         ),
         skipped=skipped(study.response),
         draft=study.draft,
+        recordings=study.recordings,
         claims=[] if study.draft else claims.judged(study.name, facts),
     )
 

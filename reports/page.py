@@ -13,6 +13,7 @@ import xarray as xr
 from reports import citation, claims, templating
 from reports.claims import Judged
 from reports.facts import ABSENT, Fact
+from reports.recorded import LABEL, Recorded
 from reports.tables import Table
 
 LARGEST_PAGE = 6_000_000
@@ -46,6 +47,7 @@ class Page:
     skipped: Sequence[str]
     draft: Sequence[str] = field(default_factory=tuple)
     claims: Sequence[Judged] = field(default_factory=tuple)
+    recordings: Sequence[Recorded] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,7 @@ def render(page: Page) -> str:
     """HTML of the page."""
     values = dict(vars(page))
     values["quotes"] = any(fact.paper != ABSENT for fact in page.facts)
+    values["synthetic"] = LABEL if any(each.synthetic for each in page.recordings) else ""
     values["tables"] = [_link(table) for table in page.tables]
     values["svg"] = templating.inlined(page.svg)
     values["verdict"] = claims.verdict(page.claims)

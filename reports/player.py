@@ -14,10 +14,13 @@ size, and knows nothing of what moves them. Its data is one JSON object:
                 ligaments (n_ligaments, 2) vertex numbers, clamped, driven, marker}]
                 with polygons contiguous in `arm`, mm from their centroid; marker: a unit or null.
     motion      [structure][case] -> {step: [3], data}: `data` (n_frames, n_units, 3) int16;
-                displacement = step * data in mm, mm, rad; -32768 stands for "no data".
-    fields      [{key, label, unit, factor, scale (3,), map, limits}]: what may colour the units.
-                key "norm" is |u / scale|, "turn" |theta|, else ux, uy or theta; shown times
-                `factor`.
+                displacement = step * data in mm, mm, rad; -32768 stands for "no data". Null where
+                there is none at all of a case: the structure is not shown.
+    residual    [structure][case] likewise: measured less simulated, for structures that were
+                filmed; null for others. The view "residual" colours by it.
+    fields      [{key, label, unit, factor, scale (3,), map, limits, residual}]: what may colour
+                the units. key "norm" is |u / scale|, "turn" |theta|, else ux, uy or theta; shown
+                times `factor`; `residual` are the limits of the residual's colours, or null.
     maps        {name: 256 x 3 uint8}; circles [{x, y, radius, colour}], pad: side of the squares
                 under clamped units; all in mm.
 
@@ -63,13 +66,23 @@ class Axis:
 
 @dataclass(frozen=True)
 class Clip:
-    """One structure with its motion (n_cases, n_frames, n_units, 3) in mm, mm, rad."""
+    """One structure with its motion (n_cases, n_frames, n_units, 3) in mm, mm, rad.
+
+    `residual`, of the same shape, is what a measured motion is more than the simulated one.
+    """
 
     name: str
     colour: str
     structure: Structure
     motion: Array
     marker: int | None = None
+    residual: Array | None = None
+
+    @property
+    def weight(self) -> int:
+        """Numbers that it takes a frame."""
+        held = [self.motion] if self.residual is None else [self.motion, self.residual]
+        return sum(case[0].size for motion in held for case in motion if _known(case))
 
 
 @dataclass(frozen=True)
@@ -112,8 +125,7 @@ def payload(
     pad: float = 0.0,
 ) -> dict[str, Any]:
     """The player's data as an object ready for JSON; frames are thinned to fit the page."""
-    n_values = sum(clip.motion[:, 0].size for clip in clips)
-    frames = kept_frames(len(axis.values), n_values)
+    frames = kept_frames(len(axis.values), sum(clip.weight for clip in clips))
     return {
         "axis": {
             "name": axis.name,
@@ -129,8 +141,9 @@ def payload(
         "start": start,
         "pad": pad,
         "structures": [_structure(clip) for clip in clips],
-        "motion": [[_quantised(case[frames]) for case in clip.motion] for clip in clips],
-        "fields": [_field(field) for field in fields],
+        "motion": [_cases(clip.motion, frames) for clip in clips],
+        "residual": [_cases(clip.residual, frames) for clip in clips],
+        "fields": [_field(field, clips) for field in fields],
         "maps": {name: _levels(COLOUR_MAPS[name]) for name in sorted(COLOUR_MAPS)},
         "circles": [vars(disc) for disc in discs],
     }
@@ -155,8 +168,19 @@ def encoded(values: NDArray[Any], dtype: str) -> str:
 
 def quantisation_error(data: Mapping[str, Any]) -> tuple[float, float]:
     """Largest rounding error of the motion in mm and in rad: half a step."""
-    steps = np.array([case["step"] for clip in data["motion"] for case in clip])
+    steps = np.array([case["step"] for clip in data["motion"] for case in clip if case])
     return 0.5 * float(steps[:, :2].max()), 0.5 * float(steps[:, 2].max())
+
+
+def _known(motion: Array) -> bool:
+    return bool(np.isfinite(motion).any())
+
+
+def _cases(motion: Array | None, frames: NDArray[np.int64]) -> list[dict[str, Any] | None]:
+    """Every case of a motion, None where nothing of it is known."""
+    if motion is None:
+        return []
+    return [_quantised(case[frames]) if _known(case) else None for case in motion]
 
 
 def _quantised(motion: Array) -> dict[str, Any]:
@@ -187,7 +211,8 @@ def _structure(clip: Clip) -> dict[str, Any]:
     }
 
 
-def _field(field: Field) -> dict[str, Any]:
+def _field(field: Field, clips: Sequence[Clip]) -> dict[str, Any]:
+    residuals = [clip.residual for clip in clips if clip.residual is not None]
     return {
         "key": field.key,
         "label": field.label,
@@ -196,7 +221,25 @@ def _field(field: Field) -> dict[str, Any]:
         "scale": list(field.scale),
         "map": field.colours,
         "limits": list(field.limits),
+        "residual": _limits(field, residuals) if residuals else None,
     }
+
+
+def _limits(field: Field, residuals: Sequence[Array]) -> list[float]:
+    """Limits of colours that hold all but the largest hundredth of the residuals."""
+    values = np.concatenate([scalar(field, motion).ravel() for motion in residuals])
+    known = np.abs(values[np.isfinite(values)])
+    most = round_up(float(np.quantile(known, 0.99)) if known.size else 0.0)
+    return [0.0 if field.limits[0] >= 0 else -most, most]
+
+
+def scalar(field: Field, motion: Array) -> Array:
+    """What a field shows of motions (..., 3) in mm, mm, rad."""
+    if field.key == "norm":
+        size: Array = np.linalg.norm(motion / np.array(field.scale), axis=-1)
+        return field.factor * size
+    shown = field.factor * motion[..., {"ux": 0, "uy": 1, "theta": 2, "turn": 2}[field.key]]
+    return np.abs(shown) if field.key == "turn" else shown
 
 
 def _levels(colours: Colormap) -> str:

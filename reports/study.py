@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from pipeline import contacts, datasets, problem, provenance
 from pipeline.datasets.tables import Kind
 from pipeline.errors import UserError
 from pipeline.problem import Output, Problem, Stage
-from reports import draft, scene
+from reports import draft, recorded, scene
+from reports.recorded import Recorded
 from reports.scene import Scene
 
 STAGES: dict[Output, Stage] = {
@@ -59,7 +60,8 @@ class Again:
 class Study:
     """Problem, datasets by kind, where they are from, and why this is but a draft (if it is one).
 
-    `name` is that of the study's folder and of its figure; `files` are hashes of the datasets.
+    `name` is that of the study's folder and of its figure; `files` are hashes of the datasets;
+    `compared` are its recordings beside their simulation, by name.
     """
 
     name: str
@@ -68,6 +70,12 @@ class Study:
     datasets: dict[Output, xr.Dataset]
     files: dict[str, str]
     draft: tuple[str, ...] = ()
+    compared: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+    @cached_property
+    def recordings(self) -> list[Recorded]:
+        """The recordings along the study's course."""
+        return recorded.recordings(self.problem, self.response, self.compared)
 
     @cached_property
     def scene(self) -> Scene:
@@ -116,8 +124,15 @@ class Study:
         return Again(self.datasets["geometric_design"], self.datasets["geometric_response"])
 
 
-def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
-    """The study of a problem file (with a preset) and its datasets.
+def load(
+    path: Path,
+    preset: str | None,
+    files: Mapping[Output, Path],
+    comparisons: Sequence[Path] = (),
+) -> Study:
+    """The study of a problem file (with a preset), its datasets, and those of its recordings.
+
+    A recording is called by the folder that its comparison lies in.
 
     Raises:
         UserError: a file is missing, broken, or made from another problem than this.
@@ -134,13 +149,16 @@ def load(path: Path, preset: str | None, files: Mapping[Output, Path]) -> Study:
     read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
     for name, data in read.items():
         _check_problem(chosen, name, data, files[name])
+    compared = {file.parent.name: datasets.read(file, "comparison") for file in comparisons}
     return Study(
         name=path.resolve().parent.name,
         preset=preset,
         problem=chosen,
         datasets=read,
-        files={f"{kind}.nc": provenance.file_hash(files[kind]) for kind in wanted},
+        files={f"{kind}.nc": provenance.file_hash(files[kind]) for kind in wanted}
+        | {f"recordings/{f.parent.name}/{f.name}": provenance.file_hash(f) for f in comparisons},
         draft=tuple(draft.reasons(chosen, whole)),
+        compared=compared,
     )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reports import measures, style
+from reports import beside, measures, style
 from reports.content import Words
 from reports.fig2.facts import MONITORED
 from reports.player import Axis, Clip, Disc, Field, payload, round_up
@@ -26,7 +26,7 @@ _CAPTION = (
 )
 
 
-def words(_study: Study) -> Words:
+def words(study: Study) -> Words:
     """What the page says of itself."""
     return Words(
         credit=(
@@ -34,7 +34,7 @@ def words(_study: Study) -> Words:
             "number here is computed from the datasets."
         ),
         figure_title="Shielding dynamic excitations",
-        caption=_CAPTION,
+        caption=_CAPTION + beside.caption(study.recordings),
         headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
         player_note="The dot marks the unit of panel d.",
     )
@@ -43,16 +43,19 @@ def words(_study: Study) -> Words:
 def animation(study: Study) -> dict[str, Any]:
     """The player's data: altered and cloaked structures under every load."""
     scene, response = study.scene, study.response
-    clips = []
+    clips: list[Clip] = []
+    times = response["time"].values
     for name in ("altered", "cloaked"):
         part = response.sel(structure=name)
         structure = from_dataset(part, scene.spacing)
         motion = part["displacement"].transpose("case", "time", "unit", "dof").values
         colour, marker = style.STRUCTURE_COLOURS[name], middle_of_top_edge(structure)
-        clips.append(Clip(name.capitalize(), colour, structure, motion, marker))
+        simulated = Clip(name.capitalize(), colour, structure, motion, marker)
+        own = [each for each in study.recordings if each.structure == name]
+        clips += [*beside.clips(own, simulated, times, scene.spacing), simulated]
     angles = [f"α = {angle:g}°" for angle in response["direction"].values]
     speeds = {"¼ of real time": 0.25, "⅛": 0.125, "½": 0.5, "real time": 1.0}
-    axis = Axis("t", "s", response["time"].values, 3, True, speeds)
+    axis = Axis("t", "s", times, 3, True, speeds)
     discs = [Disc(*scene.middle, radius, style.CLOAKED) for radius in scene.radii]
     start = measures.nearest_case(response, MONITORED)
     fields = _fields(scene, clips)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -9,12 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
-from reports import measures, style
+from reports import beside, measures, style
 from reports.facts import percent
 from reports.fig2.facts import monitored, paper_loss
 from reports.fig2.structures import SnapshotRow
 from reports.history import loss_history
+from reports.recorded import Recorded
 from reports.scene import Scene
+from reports.structure import from_dataset, middle_of_top_edge
 
 Array = NDArray[np.float64]
 
@@ -43,7 +47,13 @@ def _paper_line(axes: Axes, design: xr.Dataset) -> None:
     )
 
 
-def motion_panel(axes: Axes, scene: Scene, response: xr.Dataset, rows: list[SnapshotRow]) -> None:
+def motion_panel(
+    axes: Axes,
+    scene: Scene,
+    response: xr.Dataset,
+    rows: list[SnapshotRow],
+    recordings: Sequence[Recorded],
+) -> None:
     """Panel (d): u_y of the middle unit of the top edge; peak-to-peak values and reduction."""
     series = monitored(scene, response)
     time = series["time"].values
@@ -69,21 +79,36 @@ def motion_panel(axes: Axes, scene: Scene, response: xr.Dataset, rows: list[Snap
             zorder=6,
         )
     end = float(time[-1])
-    limit = 1.45 * float(np.abs(series).max())
+    unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
+    for each in recordings:
+        _measured(axes, each, unit)
+    limit = (1.7 if recordings else 1.45) * float(np.abs(series).max())
     axes.set(xlabel="Time $t$ (s)", ylabel="$u_y$ (mm)", xlim=(0, 1.27 * end), ylim=(-limit, limit))
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, end + 1e-9, scene.period / 2))))
     axes.spines["bottom"].set_bounds(0, end)
     axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
-    axes.legend(loc="upper left", ncols=2, borderaxespad=0.0)
+    lines = [*axes.get_legend_handles_labels()[0], *beside.handles(recordings, bands=True)]
+    axes.legend(handles=lines, loc="upper left", ncols=3, borderaxespad=0.0, columnspacing=1.0)
     axes.text(
         1.0,
-        1.0,
+        0.01,
         f"peak-to-peak −{percent(measures.reduction(span))}",
         transform=axes.transAxes,
         ha="right",
-        va="top",
+        va="bottom",
         fontsize=style.TEXT,
     )
+
+
+def _measured(axes: Axes, recording: Recorded, unit: int) -> None:
+    """Measured u_y of a unit and the prediction band behind it."""
+    colour = style.STRUCTURE_COLOURS[recording.structure]
+    motion = recording.data.isel(unit=unit).sel(dof="uy")
+    low, high, curve = (
+        recording.values(motion[name]) for name in ("band_low", "band_high", "measured")
+    )
+    beside.band(axes, recording.along, low, high, colour)
+    beside.measured_curve(axes, recording.along, curve, colour)
 
 
 def _span_arrow(axes: Axes, at: float, curve: Array, colour: str, span: float) -> None:

@@ -12,8 +12,10 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from reports import checks, measures
+from reports import checks, experiment, measures
+from reports.claims import MEASURED
 from reports.facts import ABSENT, Fact, grouped, number, percent, share, worded
+from reports.recorded import Recorded
 from reports.scene import Scene, cycles
 from reports.structure import CLOAK, from_dataset, middle_of_top_edge
 from reports.study import Study
@@ -34,6 +36,8 @@ def collect(study: Study) -> list[Fact]:
         *grouped("Optimisation", history_facts(design)),
         *grouped("Shape", shape_facts(scene, design)),
         *grouped("Motion of the middle unit of the top edge", motion_facts(scene, response)),
+        *grouped("Measured motion of the same unit", recorded_facts(study)),
+        *experiment.facts(study.recordings),
         *grouped("Robustness", map_facts(sweep)),
         *grouped("Checks", check_facts(design, response)),
     ]
@@ -176,6 +180,30 @@ def monitored(scene: Scene, response: xr.Dataset) -> xr.DataArray:
     unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
     case = measures.nearest_case(response, MONITORED)
     return response["displacement"].isel(case=case, unit=unit).sel(dof="uy")
+
+
+def monitored_recordings(study: Study) -> list[Recorded]:
+    """The recordings under the load at which the motion of one unit is shown."""
+    case = measures.nearest_case(study.response, MONITORED)
+    return [each for each in study.recordings if each.case == case]
+
+
+def recorded_facts(study: Study) -> Iterator[Fact]:
+    """Peak-to-peak u_y of the same unit as it was measured."""
+    unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
+    spans: dict[str, float] = {}
+    for each in monitored_recordings(study):
+        found = each.data["peak_to_peak"].isel(unit=unit).sel(source="measured", dof="uy")
+        value, low, high = (float(found.sel(estimate=name)) for name in ("value", "low", "high"))
+        spans[each.structure] = value
+        note = f"{each.source}; 95 %: {low:.3g} to {high:.3g} mm"
+        label = f"u_y peak-to-peak, {each.structure}, measured"
+        key = f"{MEASURED}peak_to_peak_{each.structure}"
+        yield number(key, label, value, "mm", digits=3, note=note)
+    if {"altered", "cloaked"} <= spans.keys():
+        label = "u_y peak-to-peak reduced by, measured"
+        gain = 1.0 - spans["cloaked"] / spans["altered"]
+        yield share(f"{MEASURED}peak_to_peak_reduction", label, gain)
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import xarray as xr
 from matplotlib.figure import Figure
 
 from reports import draft, measures, style
 from reports.fig2.curves import loss_panel, map_panel, motion_panel
-from reports.fig2.facts import MONITORED
+from reports.fig2.facts import MONITORED, monitored_recordings
 from reports.fig2.structures import (
-    SnapshotRow,
     problem_panel,
+    recorded_rows,
     simulated_rows,
     snapshots_panel,
 )
@@ -20,18 +18,20 @@ from reports.scene import Scene
 from reports.structure import from_dataset
 from reports.study import Study
 
-TALLEST_SNAPSHOTS = 130.0
+TALLEST_SNAPSHOTS = 122.0
 """Height in mm that the snapshots may take however many rows there are."""
 
 SNAPSHOT = 40.0
 """Side of a snapshot in mm where there is room."""
 
 
-def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
-    """The whole figure; `recorded` snapshots stand above the simulated ones of their structure."""
+def build(study: Study) -> Figure:
+    """The whole figure; recorded snapshots stand above the simulated ones of their structure."""
     scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
     simulated = simulated_rows(scene, response)
     names = [row.name for row in simulated]
+    recordings = monitored_recordings(study)
+    recorded = recorded_rows(scene, response, recordings)
     rows = sorted([*recorded, *simulated], key=lambda row: names.index(row.name))
     snapshots = min(SNAPSHOT * len(rows), TALLEST_SNAPSHOTS)
     top_c = 51.5
@@ -46,7 +46,8 @@ def build(study: Study, recorded: Sequence[SnapshotRow] = ()) -> Figure:
     style.letter(figure, 0.0, top_c, "c", f"Response over one drive cycle, {load}")
     snapshots_panel(figure, scene, rows, top_c + 8.5, snapshots)
     style.letter(figure, 0.0, top_d, "d", f"Middle unit of the top edge, {load}")
-    motion_panel(style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0), scene, response, simulated)
+    axes = style.place(figure, 11.0, top_d + 6.0, 93.0, 36.0)
+    motion_panel(axes, scene, response, simulated, recordings)
     most = f"largest $J$ = {float(sweep['loss'].max()):.3f}"
     style.letter(figure, 109.0, top_d, "e", f"Robustness, {most}")
     axes = style.place(figure, 118.5, top_d + 6.0, 43.0, 36.0)

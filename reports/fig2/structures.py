@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from reports import measures, style
 from reports.fig2.facts import MONITORED
+from reports.recorded import Recorded
 from reports.scene import Scene
 from reports.structure import (
     CLAMPED,
@@ -100,15 +101,20 @@ def _colours(structure: Structure, name: str) -> Iterator[str]:
             yield UNIT_TINT
 
 
+def snapshot_times(scene: Scene, response: xr.Dataset) -> Array:
+    """When the snapshots are, over the last whole drive cycle, s."""
+    end = response["time"].values[-1]
+    start = (np.floor(end * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
+    wanted: Array = start + np.array(PHASES) * scene.period
+    return wanted
+
+
 def simulated_rows(scene: Scene, response: xr.Dataset) -> list[SnapshotRow]:
     """Snapshots of the altered and the cloaked structure over the last whole drive cycle."""
     case = measures.nearest_case(response, MONITORED)
-    times = response["time"].values
-    start = (np.floor(times[-1] * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
-    rows = []
+    wanted, rows = snapshot_times(scene, response), []
     for name in ("altered", "cloaked"):
         part = response.sel(structure=name).isel(case=case)
-        wanted = start + np.array(PHASES) * scene.period
         frames = part["displacement"].sel(time=wanted, method="nearest")
         rows.append(
             SnapshotRow(
@@ -120,6 +126,23 @@ def simulated_rows(scene: Scene, response: xr.Dataset) -> list[SnapshotRow]:
             )
         )
     return rows
+
+
+def recorded_rows(
+    scene: Scene, response: xr.Dataset, recordings: Sequence[Recorded]
+) -> list[SnapshotRow]:
+    """The recordings at the same times."""
+    wanted = snapshot_times(scene, response)
+    return [
+        SnapshotRow(
+            each.structure,
+            each.source,
+            from_dataset(response.sel(structure=each.structure), scene.spacing),
+            wanted,
+            each.at(each.data["measured"], wanted),
+        )
+        for each in recordings
+    ]
 
 
 def snapshots_panel(
@@ -170,7 +193,7 @@ def _snapshot(axes: Axes, scene: Scene, row: SnapshotRow, frame: Array, norm: No
     draw_clamps(axes, structure, scene.spacing)
     draw(axes, structure, frame, values=size, colour_map=style.MAGNITUDE, norm=norm)
     unit = middle_of_top_edge(structure)
-    x, y = np.nanmean(deformed(structure, frame)[unit], axis=0)
+    x, y = np.nanmean(deformed(structure, frame)[unit], axis=0)  # at rest where it was lost
     colour = style.STRUCTURE_COLOURS[row.name]
     axes.plot(x, y, "o", ms=3.6, mfc=colour, mec="white", mew=0.6, zorder=8)
 

@@ -114,5 +114,4 @@ def _curves(figure: Figure, studies: Sequence[Study], top: float, letters: Itera
             if half == 0:
                 curves.measure_panel(axes, study, way, measure)
             else:
-                values = measures.contraction(problem, response)
-                curves.plain_panel(axes, problem, way, values, "contraction (mm)")
+                curves.contraction_panel(axes, study, way)

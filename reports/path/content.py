@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from reports import style
+from reports import beside, style
 from reports.checks import JUMPED
 from reports.content import Words
 from reports.path import measures
@@ -24,18 +24,18 @@ def animation(study: Study) -> dict[str, Any]:
     """The player's data: every structure along the path."""
     path, response = course(study.problem, study.response), study.response
     spacing = study.problem.lattice.spacing
-    clips = []
+    clips: list[Clip] = []
     for name in structures(response):
         part = response.sel(structure=name)
         motion = part["displacement"].transpose("case", "time", "unit", "dof").values
-        clips.append(
-            Clip(
-                display_name(study.problem, name),
-                style.STRUCTURE_COLOURS[name],
-                from_dataset(part, spacing),
-                motion,
-            )
+        simulated = Clip(
+            display_name(study.problem, name),
+            style.STRUCTURE_COLOURS[name],
+            from_dataset(part, spacing),
+            motion,
         )
+        own = [each for each in study.recordings if each.structure == name]
+        clips += [*beside.clips(own, simulated, path.values, spacing), simulated]
     cases = [f"α = {angle:g}°" for angle in response["direction"].values]
     return payload(axis(path), cases, clips, fields(study), pad=spacing)
 
@@ -109,7 +109,7 @@ def caption(study: Study) -> str:
             f"<b>{next(letters)}</b> The measure of panel d at the end of the path over imperfect "
             "cloaks: median and 5 % to 95 %; dashed without, dotted with the perfect cloak."
         )
-    return " ".join(parts)
+    return " ".join(parts) + beside.caption(study.recordings)
 
 
 def marks(studies: Sequence[Study]) -> str:

@@ -11,9 +11,9 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
-from reports import style
+from reports import beside, style
 from reports.checks import JUMPED
-from reports.path import scatter
+from reports.path import measured, measures, scatter
 from reports.path.course import SECOND, Course, course, display_name, structures
 from reports.path.measures import Measure
 from reports.study import Again, Study
@@ -78,6 +78,8 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
         axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
         _bands(axes, study, course, measure, study.scatter)
+    measured.bands(axes, study, measure)
+    measured.curves(axes, study, course, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
     axes.set_ylim(0, (1.1 + 0.1 * len(legend.get_texts())) * axes.get_ylim()[1])
 
@@ -130,7 +132,34 @@ def robustness_panel(axes: Axes, study: Study, measure: Measure, copies: xr.Data
     axes.xaxis.set_major_locator(MaxNLocator(4))
 
 
-def plain_panel(
+def contraction_panel(axes: Axes, study: Study, course: Course) -> None:
+    """How much nearer top and bottom rows come."""
+
+    def of(response: xr.Dataset) -> xr.DataArray:
+        return measures.contraction(study.problem, response)
+
+    _plain_panel(axes, study.problem, course, of(study.response), "contraction (mm)")
+    measured.curves(axes, study, course, of, structures(study.response))
+    _sides(axes, study)
+
+
+def reaction_panel(axes: Axes, study: Study, course: Course) -> None:
+    """Force of the drive, and of the load cell where there is one."""
+    _plain_panel(axes, study.problem, course, measures.reaction(study.response), "force (N)")
+    measured.forces(axes, study)
+    if study.problem.objective.target == "rest":  # or another panel has told it
+        _sides(axes, study)
+
+
+def _sides(axes: Axes, study: Study) -> None:
+    """Which curves are measured, and which simulated."""
+    if study.recordings:
+        told = beside.handles(study.recordings, bands=study.problem.objective.target == "rest")
+        axes.legend(handles=told, loc="upper left", handlelength=1.6)
+        axes.set_ylim(None, (1.0 + 0.13 * len(told)) * axes.get_ylim()[1])
+
+
+def _plain_panel(
     axes: Axes, problem: Problem, course: Course, values: xr.DataArray, label: str
 ) -> None:
     """A curve of every structure."""

@@ -13,9 +13,9 @@ from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, RampHarmonic
 from pipeline.problem.lattices import Lattice, Quads
 from pipeline.problem.regions import Region
-from reports import checks
+from reports import checks, experiment
 from reports.facts import Fact, grouped, number, share, worded
-from reports.path import contact, measures, scatter
+from reports.path import contact, measured, measures, scatter
 from reports.path.course import Course, course, display_name, lattice_size, structures
 from reports.path.curves import over_cases
 from reports.structure import from_dataset
@@ -28,6 +28,8 @@ def collect(study: Study) -> list[Fact]:
     return [
         *grouped("Scene", scene_facts(study, path)),
         *grouped("Result", measure_facts(study, path)),
+        *grouped("Measured", measured.facts(study, path)),
+        *experiment.facts(study.recordings),
         *grouped("Loss", loss_facts(study)),
         *grouped("Lateral contraction", contraction_facts(study, path)),
         *grouped("Reaction", reaction_facts(study, path)),

@@ -27,13 +27,14 @@ def build(study: Study) -> Figure:
     names = structures(study.response)
     grid = Grid.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
-    low = top + 8.5 + grid.lines * grid.side + 2.0
+    head = 11.5 if study.recordings else 8.5
+    low = top + head + grid.lines * grid.side + 2.0
     figure = style.page(low + 48.0)
     _at_rest(figure, study, names)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
     loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, loss_label(study))
     style.letter(figure, 0.0, top, "c", "Response, true to scale")
-    snapshots(figure, study, grid, top + 8.5)
+    snapshots(figure, study, grid, top + head)
     _curves(figure, _panels(study, path), low)
     if study.draft:
         draft.mark(figure)
@@ -65,22 +66,15 @@ def _at_rest(figure: Figure, study: Study, names: tuple[str, ...]) -> None:
 
 def _panels(study: Study, path: Course) -> list[Panel]:
     """Curves below the snapshots, left to right."""
-    problem, response, measure = study.problem, study.response, measures.measure_of(study.problem)
+    problem, measure = study.problem, measures.measure_of(study.problem)
     panels: list[Panel] = [
         (measure.label, lambda axes: curves.measure_panel(axes, study, path, measure))
     ]
     if path.static and problem.objective.target != "rest":
-        values = measures.contraction(problem, response)
         panels.append(
-            (
-                "Lateral contraction",
-                lambda axes: curves.plain_panel(axes, problem, path, values, "contraction (mm)"),
-            )
+            ("Lateral contraction", lambda axes: curves.contraction_panel(axes, study, path))
         )
-    force = measures.reaction(response)
-    panels.append(
-        ("Reaction", lambda axes: curves.plain_panel(axes, problem, path, force, "force (N)"))
-    )
+    panels.append(("Reaction", lambda axes: curves.reaction_panel(axes, study, path)))
     if (copies := study.scatter) is not None:
         title = f"{copies['sample'].size} imperfect cloaks"
         panels.append((title, lambda axes: curves.robustness_panel(axes, study, measure, copies)))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -14,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
 from reports import style
-from reports.path.course import SECOND, Course, display_name, structures
+from reports.path.course import SECOND, Course, course, display_name, structures
 from reports.path.structures import Shade, shade_of
 from reports.structure import draw, from_dataset
 from reports.study import Study
@@ -37,14 +36,17 @@ class Row:
 
 
 def rows(study: Study) -> list[Row]:
-    """The structures of a study, and its design for contact on distance if that is another one."""
+    """The structures of a study, recordings above them, and a design for contact on distance."""
     response, problem = study.response, study.problem
-    found = [
-        Row(
-            display_name(problem, name), style.STRUCTURE_COLOURS[name], response.sel(structure=name)
-        )
-        for name in structures(response)
-    ]
+    along, found = course(problem, response).values, []
+    for name in structures(response):
+        label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
+        filmed = [each for each in study.recordings if each.structure == name]
+        for each in filmed:
+            part = each.motion(response, along)
+            found.append(Row(f"{label}\n{each.source}", colour, part))
+        label = f"{label}\nsimulation" if filmed else label
+        found.append(Row(label, colour, response.sel(structure=name)))
     if study.again is not None and study.again.changed:
         part = study.again.response.sel(structure="cloaked")
         found.append(Row(SECOND, style.CLOAKED, part))
@@ -61,16 +63,16 @@ class Grid:
     beside: bool
 
     @classmethod
-    def of(cls, study: Study, course: Course, tallest: float) -> Grid:
+    def of(cls, study: Study, path: Course, tallest: float) -> Grid:
         """The layout that shows them larger."""
-        kinds, loads = rows(study), len(course.shown)
+        kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR
 
         def side(columns: int, lines: int) -> float:
             return min(across / columns, tallest / lines, LARGEST)
 
         above, beside = side(loads, len(kinds)), side(len(kinds), loads)
-        return cls(kinds, course, max(above, beside), beside > above)
+        return cls(kinds, path, max(above, beside), beside > above)
 
     @property
     def lines(self) -> int:
@@ -117,13 +119,14 @@ def _labels(
     for k, (text, colour) in enumerate(above):
         x = grid.left + (k + 0.5) * grid.side - GAP / 2
         style.write(
-            figure, x, top - 0.8, text, ha="center", va="bottom", color=colour, fontsize=style.TEXT
-        )
+            figure, x, top - 0.8, text, ha="center", va="bottom", color=colour,
+            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
+        )  # fmt: skip
     for k, (text, colour) in enumerate(left):
         y = top + (k + 0.5) * grid.side - GAP / 2
         style.write(
             figure, grid.left - 1.5, y, text, rotation=90, ha="right", va="center", color=colour,
-            fontsize=style.TEXT,
+            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
         )  # fmt: skip
 
 
@@ -137,7 +140,7 @@ def snapshot(
         axes,
         structure,
         frame,
-        values=shade.values(np.nan_to_num(frame)),
+        values=shade.values(frame),
         colour_map=shade.colours,
         norm=shade.norm,
     )

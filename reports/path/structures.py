@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pipeline.problem import Problem
 from pipeline.problem.regions import Region
 from reports import style
-from reports.player import Field, round_up
+from reports.player import Field, round_up, scalar
 from reports.structure import (
     CLAMPED,
     CLOAK,
@@ -43,12 +43,7 @@ class Shade:
 
     def values(self, displacement: Array) -> Array:
         """The number (n_units,) that each unit shows."""
-        if self.field.key == "norm":
-            size: Array = np.linalg.norm(displacement / np.array(self.field.scale), axis=-1)
-            return size
-        column = {"ux": 0, "uy": 1, "theta": 2, "turn": 2}[self.field.key]
-        shown = self.field.factor * displacement[..., column]
-        return np.abs(shown) if self.field.key == "turn" else shown
+        return scalar(self.field, displacement)
 
     @property
     def norm(self) -> Normalize:

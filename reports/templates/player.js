@@ -17,15 +17,17 @@
     owner: decode(item.owner, Int32Array),
     ligaments: decode(item.ligaments, Int32Array),
   }));
-  const motion = data.motion.map((cases) =>
-    cases.map((item) => ({ step: item.step, data: decode(item.data, Int16Array) })));
+  const unpacked = (structures) => structures.map((cases) => cases.map((item) =>
+    item && { step: item.step, data: decode(item.data, Int16Array) }));
+  const motion = unpacked(data.motion);
+  const residual = unpacked(data.residual);
   const maps = Object.fromEntries(
     Object.entries(data.maps).map(([name, text]) => [name, decode(text, Uint8Array)]));
 
   const NO_DATA = -32768;
   const first = axis.values[0];
   const last = axis.values[axis.values.length - 1];
-  const state = { at: first, playing: false, load: data.start, field: 0,
+  const state = { at: first, playing: false, load: data.start, field: 0, residual: false,
     rate: data.speeds[0].rate };
 
   const make = (tag, properties = {}, parent = null) => {
@@ -47,8 +49,7 @@
     return { low, high, part: width > 0 ? Math.min(1, Math.max(0, (at - axis.values[low]) / width)) : 0 };
   };
 
-  const displacement = (index, at) => {
-    const { step, data: levels } = motion[index][state.load];
+  const sampled = ({ step, data: levels }, index, at) => {
     const count = structures[index].centroid.length / 2;
     const { low, high, part } = bracket(at);
     const out = new Float32Array(3 * count);
@@ -67,9 +68,11 @@
     return factor * { ux: x, uy: y, theta: turn, turn: Math.abs(turn) }[key];
   };
 
+  const limits = (field) => (state.residual ? field.residual : field.limits);
+
   const colour = (field, value) => {
     if (Number.isNaN(value)) return "#ffffff";
-    const [low, high] = field.limits;
+    const [low, high] = limits(field);
     const level = Math.round(255 * Math.min(1, Math.max(0, (value - low) / (high - low))));
     const map = maps[field.map];
     return `rgb(${map[3 * level]},${map[3 * level + 1]},${map[3 * level + 2]})`;
@@ -93,12 +96,14 @@
     width: box.right - box.left + 2 * margin, height: box.high - box.low + 2 * margin };
 
   const stage = make("div", { className: "stage" }, root);
+  const figures = [];
   const canvases = structures.map((structure) => {
     const figure = make("figure", {}, stage);
     make("figcaption", { textContent: structure.name, style: `color:${structure.colour}` }, figure);
     const canvas = make("canvas", {}, figure);
     canvas.setAttribute("role", "img");
     canvas.style.aspectRatio = `${extent.width} / ${extent.height}`;
+    figures.push(figure);
     return canvas;
   });
   const bar = make("div", { className: "bar" }, root);
@@ -128,6 +133,10 @@
   }
   menu("Colour", data.fields.map((field) => field.label), 0,
     (index) => { state.field = index; paintBar(); }).id = "player-field";
+  if (residual.some((cases) => cases.some(Boolean))) {
+    menu("View", ["motion", "residual: measured less simulated"], 0,
+      (index) => { state.residual = index === 1; paintBar(); }).id = "player-view";
+  }
   menu("Speed", data.speeds.map((speed) => speed.label), 0,
     (index) => { state.rate = data.speeds[index].rate; }).id = "player-speed";
   make("p", { className: "hint", textContent: "Space plays and pauses, ← and → step, Home and End jump. "
@@ -173,7 +182,7 @@
     }
   };
 
-  const drawUnits = (pen, structure, points, u) => {
+  const drawUnits = (pen, structure, points, shown) => {
     const field = data.fields[state.field];
     const { owner } = structure;
     for (let v = 0; v < owner.length;) {
@@ -181,7 +190,7 @@
       pen.beginPath();
       for (; v < owner.length && owner[v] === unit; v += 1) pen.lineTo(points[2 * v], points[2 * v + 1]);
       pen.closePath();
-      pen.fillStyle = colour(field, scalar(field, u, unit));
+      pen.fillStyle = shown ? colour(field, scalar(field, shown, unit)) : "#eceef0";
       pen.fill();
       pen.stroke();
     }
@@ -212,7 +221,9 @@
     const scale = fit(canvas);
     const pixel = (window.devicePixelRatio || 1) / scale;
     const structure = structures[index];
-    const u = displacement(index, state.at);
+    const u = sampled(motion[index][state.load], index, state.at);
+    const apart = residual[index][state.load];
+    const shown = state.residual ? apart && sampled(apart, index, state.at) : u;
     const points = corners(structure, u);
     const pen = canvas.getContext("2d");
     pen.setTransform(1, 0, 0, 1, 0, 0);
@@ -231,7 +242,7 @@
     pen.stroke();
     pen.strokeStyle = "#1a1a1a";
     pen.lineWidth = 0.45 * pixel;
-    drawUnits(pen, structure, points, u);
+    drawUnits(pen, structure, points, shown);
     drawMarks(pen, structure, u, pixel);
   };
 
@@ -240,20 +251,22 @@
     const unit = field.unit ? ` ${field.unit}` : "";
     const pen = barCanvas.getContext("2d");
     for (let k = 0; k < 256; k += 1) {
-      const [low, high] = field.limits;
+      const [low, high] = limits(field);
       pen.fillStyle = colour(field, low + (high - low) * (k / 255));
       pen.fillRect(k, 0, 1, 1);
     }
     const number = (value) => `${Number(value.toPrecision(3))}`.replace("-", "−");
-    barLabel.textContent = field.label;
-    barLow.textContent = number(field.limits[0]) + unit;
-    barHigh.textContent = number(field.limits[1]) + unit;
+    const [low, high] = limits(field);
+    barLabel.textContent = state.residual ? `residual ${field.label}` : field.label;
+    barLow.textContent = number(low) + unit;
+    barHigh.textContent = number(high) + unit;
   };
 
   const paint = () => {
     const words = `${axis.name} = ${state.at.toFixed(axis.digits)} ${axis.unit}`;
     canvases.forEach((canvas, index) => {
-      draw(canvas, index);
+      figures[index].hidden = !motion[index][state.load];
+      if (!figures[index].hidden) draw(canvas, index);
       canvas.setAttribute("aria-label",
         `${structures[index].name} structure, ${data.cases[state.load]}, ${words}`);
     });

@@ -14,11 +14,9 @@ from tests.reports import pictures
 from tests.reports.pictures import texts
 
 
-def drawn(study: Study, recorded: int = 0) -> Figure:
-    rows = simulated_rows(study.scene, study.response)
+def drawn(study: Study) -> Figure:
     with style.styled():
-        made = figure.build(study, [dataclasses.replace(rows[0], source="experiment")] * recorded)
-        return pictures.drawn(made)
+        return pictures.drawn(figure.build(study))
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +46,6 @@ def test_snapshots_are_near_the_peaks_of_one_cycle(study: Study) -> None:
     np.testing.assert_allclose(altered.time, [1.525, 1.65, 1.775, 1.9], atol=1e-9)
     np.testing.assert_array_equal(altered.time, cloaked.time)
     assert altered.displacement.shape == (4, 225, 3)
-
-
-def test_recorded_rows_take_their_place(study: Study, whole: Figure) -> None:
-    more = drawn(study, recorded=2)
-    assert len(more.axes) == len(whole.axes) + 8
-    assert more.get_size_inches()[1] > whole.get_size_inches()[1]
-    assert more.get_size_inches()[1] * style.MM_PER_INCH < 250.0
 
 
 def test_a_draft_says_so(quick: Study) -> None:

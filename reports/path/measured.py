@@ -1,0 +1,116 @@
+"""Recordings along the path: in the form of responses, as curves, and as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from reports import beside, style
+from reports.claims import MEASURED
+from reports.facts import Fact, number, share
+from reports.path import measures
+from reports.path.course import Course, display_name
+from reports.path.measures import Measure
+from reports.recorded import Recorded
+from reports.study import Study
+
+Array = NDArray[np.float64]
+Of = Callable[[xr.Dataset], xr.DataArray]
+
+
+def response(study: Study, path: Course, recording: Recorded) -> xr.Dataset:
+    """A recording in the form of the study's response, the simulated intact structure beside it."""
+    held = study.response["structure"].values
+    names = [name for name in held if name in {"intact", recording.structure}]
+    part = study.response.sel(structure=names).isel(case=[recording.case])
+    dims = ("structure", "case", "time", "unit", "dof")
+    motion = part["displacement"].transpose(*dims).copy(deep=True)
+    measured = recording.at(recording.data["measured"], path.values)
+    motion.values[names.index(recording.structure), 0] = measured
+    return part.assign(displacement=motion)
+
+
+def curve(study: Study, path: Course, recording: Recorded, of: Of) -> Array:
+    """What `of` makes of a recording (n_times,), NaN where nothing was recorded."""
+    made = response(study, path, recording)
+    values = of(made).sel(structure=recording.structure).isel(case=0)
+    motion = made["displacement"].sel(structure=recording.structure).isel(case=0)
+    seen = motion.notnull().any(("unit", "dof"))
+    found: Array = values.where(seen).transpose("time").values
+    return found
+
+
+def curves(axes: Axes, study: Study, path: Course, of: Of, names: Collection[str]) -> None:
+    """The same of every recording of these structures, dashed with markers."""
+    for each in study.recordings:
+        if each.structure not in names:
+            continue
+        colour = style.STRUCTURE_COLOURS[each.structure]
+        beside.measured_curve(axes, path.values, curve(study, path, each, of), colour)
+
+
+def bands(axes: Axes, study: Study, measure: Measure) -> None:
+    """Prediction bands of the measure, where the comparison has them."""
+    if measure.key != "rotation":
+        return
+    for each in study.recordings:
+        found = each.data["mean_rotation"].sel(source="simulated")
+        low, high = (np.degrees(each.values(found.sel(estimate=end))) for end in ("low", "high"))
+        beside.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
+
+
+def forces(axes: Axes, study: Study) -> None:
+    """Forces of the load cell with the prediction bands, of the recordings that have one."""
+    for each in study.recordings:
+        force, low, high = (
+            each.values(each.data[name]) for name in ("load_force", "force_low", "force_high")
+        )
+        if np.isfinite(force).any():
+            colour = style.STRUCTURE_COLOURS[each.structure]
+            beside.band(axes, each.along, low, high, colour)
+            beside.measured_curve(axes, each.along, force, colour)
+
+
+def facts(study: Study, path: Course) -> Iterator[Fact]:
+    """The measure and the contraction at the end of the path, as they were measured."""
+    measure = measures.measure_of(study.problem)
+    yield from _measure_facts(study, path, measure)
+    ends: dict[str, float] = {}
+    if not path.static:
+        return
+    for each in study.recordings:
+        values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
+        ends[each.structure] = values[-1]
+        name = display_name(study.problem, each.structure).lower()
+        key = f"{MEASURED}contraction_{each.structure}"
+        label = f"Contraction, {name}, measured"
+        yield number(key, label, values[-1], "mm", digits=3, note=each.source)
+    for structure in ("altered", "cloaked"):
+        if structure in ends and "intact" in ends:
+            off = ends[structure] / ends["intact"] - 1.0
+            label = (
+                f"Contraction, {display_name(study.problem, structure).lower()}, off the intact by"
+            )
+            yield share(f"{MEASURED}contraction_error_{structure}", f"{label}, measured", off)
+
+
+def _measure_facts(study: Study, path: Course, measure: Measure) -> Iterator[Fact]:
+    ends: dict[str, float] = {}
+    for each in study.recordings:
+        if each.structure == "intact":
+            continue
+        values = curve(study, path, each, measure.of)
+        ends[each.structure] = values[-1]
+        label = f"{measure.label}, {display_name(study.problem, each.structure).lower()}, measured"
+        key = f"{MEASURED}{measure.key}_{each.structure}"
+        yield number(key, label, values[-1], measure.unit, digits=3, note=each.source)
+        most = float(np.nanmax(values))
+        yield number(f"{key}_most", f"{label}, at most", most, measure.unit, digits=3)
+    if {"altered", "cloaked"} <= ends.keys():
+        gain = 1.0 - ends["cloaked"] / ends["altered"]
+        label = f"{measure.label} reduced by, measured"
+        yield share(f"{MEASURED}{measure.key}_reduction", label, gain)
