@@ -6,7 +6,7 @@ import sys
 
 from snakemake.utils import min_version
 
-from pipeline.filmed import recording_pages, tracked
+from pipeline.filmed import compared, recording_pages, tracked
 from pipeline.sources import source_hash
 from pipeline.workflow import (
     check_problems,
@@ -55,5 +55,6 @@ include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
+include: "pipeline/rules/compare.smk"
 include: "pipeline/rules/report.smk"
 include: "pipeline/rules/index.smk"

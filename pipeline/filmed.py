@@ -25,6 +25,44 @@ def recording_pages(study: str, root: Path = ROOT) -> list[str]:
     return [f"results/{study}/recordings/{name}/index.html" for name in names]
 
 
+def shown_recordings(study: str, root: Path = ROOT) -> list[str]:
+    """Names of the recordings that the report of a study, or of a preset of it, shows.
+
+    One that was filmed takes the place of those that are virtual and show the same structure under
+    the same load case. One that cannot be read is shown too: its stage will tell why.
+    """
+    name, _, preset = study.partition("@")
+    folder = root / "experiments" / name / "recordings"
+    found = {path.stem: _read(path) for path in sorted(folder.glob("*.yaml"))}
+    shown = {
+        stem: asked
+        for stem, asked in found.items()
+        if asked is None or not preset or preset in asked.presets
+    }
+    filmed = {_shows(asked) for asked in shown.values() if asked and asked.virtual is None}
+    return [
+        stem
+        for stem, asked in shown.items()
+        if asked is None or asked.virtual is None or _shows(asked) not in filmed
+    ]
+
+
+def _shows(asked: Recording) -> tuple[str, int]:
+    return asked.structure, asked.case
+
+
+def comparisons(wildcards: Wildcards) -> list[str]:
+    """The datasets of the recordings that the report of a study shows."""
+    study = f"{wildcards.name}{wildcards.preset}"
+    names = shown_recordings(study)
+    return [f"results/{study}/recordings/{name}/comparison.nc" for name in names]
+
+
+def compared(wildcards: Wildcards) -> dict[str, str]:
+    """The recording's YAML that a comparison depends on, as it is tracked."""
+    return {"recording": tracked(wildcards)["recording"]}
+
+
 def tracked(wildcards: Wildcards) -> dict[str, str]:
     """The files that tracking a recording depends on: its YAML, video, design, load cell."""
     asked = described(wildcards)
@@ -46,8 +84,12 @@ def tracked(wildcards: Wildcards) -> dict[str, str]:
 
 def described(wildcards: Wildcards) -> Recording | None:
     """The recording; None for one that cannot be read, of which the stage will tell why."""
+    return _read(ROOT / _source(wildcards))
+
+
+def _read(path: Path) -> Recording | None:
     try:
-        return load(ROOT / _source(wildcards))
+        return load(path)
     except UserError:
         return None
 

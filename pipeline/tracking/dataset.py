@@ -52,7 +52,7 @@ def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) 
     }
     made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
     driven = made["displacement"].values[:, is_driven(design), :2]
-    return made.assign_coords(drive_displacement=(("time", "xy"), _mean(driven)))
+    return made.assign_coords(drive_displacement=(("time", "xy"), mean_seen(driven)))
 
 
 def is_driven(design: xr.Dataset) -> Mask:
@@ -61,7 +61,7 @@ def is_driven(design: xr.Dataset) -> Mask:
     return np.asarray(design["support"].values == flag)
 
 
-def _mean(motion: Floats) -> Floats:
+def mean_seen(motion: Floats) -> Floats:
     """Mean (frames, 2) over those of the units (frames, units, 2) that are seen; NaN without."""
     seen = np.isfinite(motion[..., :1])
     total = np.where(seen, motion, 0.0).sum(axis=1)

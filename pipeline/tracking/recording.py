@@ -59,6 +59,7 @@ class Recording(Section):
         design: the design dataset of the specimen, likewise; a study's own need not be named.
         structure: which of the design's structures it is.
         case: number of the study's load case that it was under.
+        presets: of the study whose report shows it too: those of its lattice.
         specimen: what the units show; `auto` finds out.
         pixel_size: roughly, in the specimen's plane; without it, the units are looked for in
             several sizes.
@@ -80,6 +81,7 @@ class Recording(Section):
     design: Annotated[str, Field(min_length=1)] | None = None
     structure: Literal["intact", "altered", "cloaked"] = "cloaked"
     case: Annotated[int, Field(ge=0, strict=True)] = 0
+    presets: tuple[str, ...] = ()
     specimen: Literal["auto", "dots", "speckle", "bare"] = "auto"
     pixel_size: Length | None = None
     thickness: Gap = 0.0

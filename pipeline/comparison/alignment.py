@@ -1,0 +1,218 @@
+"""Time or load that measurement and simulation have in common, found by the drive alone.
+
+A motion in time is aligned by the cross-correlation of the measured and the nominal course of the
+driven units, to a fraction of a frame. A quasi-static one has no time: equal displacement of the
+driven units is equal load, on the way there and back.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import UserError
+from pipeline.tracking.arrays import Floats
+
+LEAST_FRAMES = 8
+LEAST_CORRELATION = 0.9
+MOTION, LOADING, UNLOADING = range(3)
+
+_LEAST_OVERLAP = 0.5  # of the shorter course
+_PER_FRAME = 2  # lags tried
+_STEPS = 12  # of refinement
+_RIVAL = 0.02  # of the correlation: a lag that is as good as the best
+_BEYOND = 0.005  # of the nominal range: still its end
+_LEAST_RANGE = 0.05  # of the nominal range: a drive that moves
+_STILL = 0.1  # of the mean speed: neither way
+
+
+class Lag(NamedTuple):
+    """When the nominal course starts on the clock of the measured one.
+
+    Attributes:
+        value: s.
+        sigma: its standard uncertainty, from what the fit leaves and how that is correlated, s.
+        correlation: of both courses.
+        gain: measured over nominal amplitude.
+        gain_sigma: likewise.
+        ambiguous: whether another lag is as good, as in a steady vibration.
+    """
+
+    value: float
+    sigma: float
+    correlation: float
+    gain: float
+    gain_sigma: float
+    ambiguous: bool
+
+
+class Course(NamedTuple):
+    """A motion at rest before its first time: times (n,) in s, values (n, channels) in mm."""
+
+    time: Floats
+    value: Floats
+
+    def at(self, time: Floats) -> Floats:
+        """Values (times, channels), linear between the samples, NaN after the last."""
+        columns = [np.interp(time, self.time, column, right=np.nan) for column in self.value.T]
+        return np.stack(columns, axis=-1)
+
+
+def find_lag(measured: Course, nominal: Course) -> Lag:
+    """The lag at which the courses agree best, up to a gain and an offset.
+
+    Raises:
+        UserError: too few frames, or the courses agree at no lag.
+    """
+    seen = np.isfinite(measured.value).all(axis=1)
+    held = Course(measured.time[seen], measured.value[seen])
+    if len(held.time) < LEAST_FRAMES:
+        raise too_few(len(held.time))
+    tried = _lags(held, nominal)
+    found = np.array([_correlation(held, nominal, lag) for lag in tried])
+    place, ambiguous = _best(tried, found)
+    lag = _refined(held, nominal, tried[place])
+    correlation = _correlation(held, nominal, lag)
+    if correlation < LEAST_CORRELATION:
+        raise UserError(
+            "the drive cannot be aligned: the measured motion of the driven units follows that of"
+            f" the problem at no time (correlation {correlation:.2f},"
+            f" where {LEAST_CORRELATION:g} is wanted)",
+            key="case",
+            remedy="give the structure and the load case that were filmed, or a window that shows"
+            " the drive",
+        )
+    sigma, gain, gain_sigma = _fit(held, nominal, lag)
+    return Lag(lag, sigma, correlation, gain, gain_sigma, ambiguous)
+
+
+def too_few(frames: int) -> UserError:
+    """The error of a track that is too short."""
+    return UserError(
+        "too few frames show the driven units",
+        value=frames,
+        remedy=f"give a video, or a window of it, with {LEAST_FRAMES} or more",
+    )
+
+
+def _lags(measured: Course, nominal: Course) -> Floats:
+    """Lags (s) at which the courses overlap enough."""
+    interval = float(np.median(np.diff(measured.time)))
+    span, length = np.ptp(measured.time), np.ptp(nominal.time)
+    least = _LEAST_OVERLAP * min(span, length)
+    first = measured.time[0] + least - nominal.time[-1]
+    last = measured.time[-1] - least - nominal.time[0]
+    return np.arange(first, last, interval / _PER_FRAME)
+
+
+def _best(tried: Floats, found: Floats) -> tuple[int, bool]:
+    """The peak of the correlation nearest to no lag among those as good as the best, if many."""
+    inner = np.concatenate([[-np.inf], found, [-np.inf]])
+    peak = np.flatnonzero((found >= inner[:-2]) & (found >= inner[2:]))
+    good = peak[found[peak] > found.max() - _RIVAL]
+    best = peak[np.argmax(found[peak])]
+    ambiguous = len(good) > 1
+    return int(good[np.argmin(np.abs(tried[good]))] if ambiguous else best), ambiguous
+
+
+def _pair(measured: Course, nominal: Course, lag: float) -> tuple[Floats, Floats]:
+    """Both courses at the frames where both are known, less their means."""
+    there = nominal.at(measured.time - lag)
+    both = np.isfinite(there).all(axis=1)
+    first, last = measured.value[both], there[both]
+    return first - first.mean(axis=0), last - last.mean(axis=0)
+
+
+def _correlation(measured: Course, nominal: Course, lag: float) -> float:
+    first, last = _pair(measured, nominal, lag)
+    size = np.sqrt(np.sum(first**2) * np.sum(last**2))
+    return float(np.sum(first * last) / size) if size > 0 else 0.0
+
+
+def _refined(measured: Course, nominal: Course, lag: float) -> float:
+    """The lag at the peak of the correlation, by golden section within a frame either way."""
+    interval = float(np.median(np.diff(measured.time)))
+    low, high = lag - interval / _PER_FRAME, lag + interval / _PER_FRAME
+    share = (np.sqrt(5) - 1) / 2
+    for _ in range(2 * _STEPS):
+        left, right = high - share * (high - low), low + share * (high - low)
+        if _correlation(measured, nominal, left) > _correlation(measured, nominal, right):
+            high = right
+        else:
+            low = left
+    return (low + high) / 2
+
+
+def _fit(measured: Course, nominal: Course, lag: float) -> tuple[float, float, float]:
+    """Uncertainty of the lag, gain, and its uncertainty, by least squares about the lag."""
+    step = 1e-3 * float(np.median(np.diff(measured.time)))
+    first, last = _pair(measured, nominal, lag)
+    sooner, later = (nominal.at(measured.time - lag + shift) for shift in (step, -step))
+    gain = float(np.sum(first * last) / np.sum(last**2))
+    rest = first - gain * last
+    variance = float(np.mean(rest**2)) * _inflation(rest)
+    steep = float(np.nansum((gain * (sooner - later) / (2 * step)) ** 2))
+    return np.sqrt(variance / steep), gain, np.sqrt(variance / float(np.sum(last**2)))
+
+
+def _inflation(rest: Floats) -> float:
+    """How much less correlated residuals (frames, channels) tell than independent ones."""
+    size = float(np.sum(rest**2))
+    alike = float(np.sum(rest[1:] * rest[:-1])) / size if size > 0 else 0.0
+    alike = float(np.clip(alike, 0.0, 0.99))
+    return (1 + alike) / (1 - alike)
+
+
+def load_time(measured: Floats, nominal: Course) -> Floats:
+    """The nominal time (frames,) at which the drive is where it was measured; NaN beyond its ends.
+
+    Args:
+        measured: (frames,) displacement of the driven units along the drive, mm.
+        nominal: its course, one channel that only grows.
+
+    Raises:
+        UserError: too few frames, a drive that goes to and fro, or one that hardly moves.
+    """
+    course = nominal.value[:, 0]
+    if (np.diff(course) <= 0).any():
+        remedy = "compare under a ramp: give the problem a drive of that kind"
+        raise UserError("a quasi-static drive to and fro has no load axis", remedy=remedy)
+    if (seen := int(np.isfinite(measured).sum())) < LEAST_FRAMES:
+        raise too_few(seen)
+    span = float(np.ptp(course))
+    if (reached := float(np.nanmax(measured) - course[0])) < _LEAST_RANGE * span:
+        raise UserError(
+            f"the drive cannot be aligned: the driven units move by {reached:.3g} mm along the"
+            f" drive's direction, where the problem moves them by {span:.3g} mm",
+            remedy="check `turned` and `mirrored` of the recording, and its window",
+        )
+    margin = _BEYOND * span
+    inside = (measured >= course[0] - margin) & (measured <= course[-1] + margin)
+    return np.where(inside, np.interp(measured, course, nominal.time), np.nan)
+
+
+def branches(measured: Floats) -> NDArray[np.int8]:
+    """Whether the load grows or falls (frames,); while it rests, as before."""
+    course = _filled(measured)
+    width = max(len(course) // 40, 1)
+    kernel = np.ones(2 * width + 1) / (2 * width + 1)
+    speed = np.convolve(np.gradient(np.pad(course, 2 * width, mode="edge")), kernel, mode="same")
+    speed = speed[2 * width : 2 * width + len(course)]
+    way = np.where(np.abs(speed) < _STILL * np.abs(speed).mean(), 0.0, np.sign(speed))
+    last = np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))
+    return np.where(way[last] < 0, UNLOADING, LOADING).astype(np.int8)
+
+
+def _filled(values: Floats) -> Floats:
+    seen = np.flatnonzero(np.isfinite(values))
+    return np.interp(np.arange(len(values)), seen, values[seen])
+
+
+def turn(measured: Floats, nominal: Floats) -> float:
+    """Direction of a measured drive (frames, 2) less that of the nominal one, rad."""
+    both = np.isfinite(measured + nominal).all(axis=1)
+    first, last = measured[both], nominal[both]
+    across = np.sum(last[:, 0] * first[:, 1] - last[:, 1] * first[:, 0])
+    return float(np.arctan2(across, np.sum(first * last)))

@@ -1,0 +1,196 @@
+"""How far a simulation is from a measurement, in numbers with intervals.
+
+The intervals are those of a bootstrap over units and over blocks of frames (Kuensch, Ann. Stat. 17
+(1989) 1217). To every copy noise of the measurement's own uncertainty is added, and its mean square
+is taken out again, so that the interval holds it and the value is not shifted by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.tracking.arrays import Floats, Ints
+
+COPIES = 300
+LEVEL = 0.95
+METRICS = ("rmse", "nrmse", "correlation", "noise_share", "time_shift")
+
+_LONGEST = 4  # blocks in a recording, at least
+_STEPS = 6
+
+
+class Pair(NamedTuple):
+    """Both sides of a comparison, NaN in either where there is nothing to compare.
+
+    Attributes:
+        measured, simulated: (frames, units, dofs).
+        sigma: standard uncertainty of the measured ones.
+        slope: (frames, units, dofs) rate of the simulated ones, per s; None without a time.
+        added: whether noise of that uncertainty was added once more.
+    """
+
+    measured: Floats
+    simulated: Floats
+    sigma: Floats
+    slope: Floats | None = None
+    added: bool = False
+
+    def taken(self, frames: Ints, units: Ints) -> Pair:
+        """The frames and units of these numbers, which may come more than once."""
+        chosen = np.ix_(frames, units)
+        slope = None if self.slope is None else self.slope[chosen]
+        return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
+
+    def noisier(self, random: np.random.Generator) -> Pair:
+        """The same with noise added to the measured side."""
+        noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
+        return self._replace(measured=self.measured + noise, added=True)
+
+
+class _Moments(NamedTuple):
+    """Means (dofs,) over frames and units of what the metrics are made of."""
+
+    residual: Floats
+    measured: Floats
+    variance: Floats
+    noise: Floats
+    correlation: Floats
+
+
+def metrics(pair: Pair) -> Floats:
+    """The metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
+    mean = _moments(pair)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rows = [
+            np.sqrt(mean.residual),
+            np.sqrt(mean.residual / mean.measured),
+            mean.correlation,
+            mean.noise / mean.residual,
+            _shift(pair),
+        ]
+    return np.where(np.isfinite(rows), rows, np.nan)
+
+
+def _moments(pair: Pair) -> _Moments:
+    both = np.isfinite(pair.measured - pair.simulated)
+    count = both.sum(axis=(0, 1))
+
+    def mean(values: Floats) -> Floats:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.where(both, values, 0.0).sum(axis=(0, 1)) / count)
+
+    noise = mean(np.nan_to_num(pair.sigma) ** 2)
+    extra = noise if pair.added else np.zeros_like(noise)
+    first, last = mean(pair.measured), mean(pair.simulated)
+    variance = np.maximum(mean(pair.measured**2) - first**2 - extra, 0.0)
+    spread = mean(pair.simulated**2) - last**2
+    product = mean(pair.measured * pair.simulated) - first * last
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = product / np.sqrt(variance * spread)
+    residual = np.maximum(mean((pair.measured - pair.simulated) ** 2) - extra, 0.0)
+    return _Moments(residual, mean(pair.measured**2) - extra, variance, noise, alike)
+
+
+def _shift(pair: Pair) -> Floats:
+    """How far (dofs,) the measured side is behind, s, to first order in it."""
+    if pair.slope is None:
+        return np.full(pair.measured.shape[-1], np.nan)
+    ahead = (pair.measured - pair.simulated) * pair.slope
+    known = np.isfinite(ahead)
+    steep = np.where(known, pair.slope, 0.0) ** 2
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(-np.where(known, ahead, 0.0).sum(axis=(0, 1)) / steep.sum(axis=(0, 1)))
+
+
+def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
+    """The pair with the simulated side as late as the measured one, and by how much (dofs,), s.
+
+    The shift is NaN where the sides are so unlike that none is found.
+
+    Args:
+        pair: both sides.
+        time: (frames,) s.
+    """
+    most = float(np.ptp(time)) / _LONGEST
+    total = np.zeros(pair.measured.shape[-1])
+    moved = _late(pair, time, total)
+    for _ in range(_STEPS):
+        total = np.clip(total + np.nan_to_num(_shift(moved)), -most, most)
+        moved = _late(pair, time, total)
+    return moved, np.where(np.abs(total) < most, total, np.nan)
+
+
+def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
+    """The pair with the simulated side later by ``lag`` (dofs,) s; NaN where that is not known."""
+    made = np.full_like(pair.simulated, np.nan)
+    for dof, late in enumerate(lag):
+        for unit in range(made.shape[1]):
+            course = pair.simulated[:, unit, dof]
+            known = np.isfinite(course)
+            if known.any():
+                made[:, unit, dof] = np.interp(
+                    time - late, time[known], course[known], left=np.nan, right=np.nan
+                )
+    return pair._replace(simulated=made, slope=np.gradient(made, time, axis=0))
+
+
+def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
+    """Value and ends of the interval (3, len(METRICS), dofs) of every metric.
+
+    Args:
+        pair: both sides.
+        time: (frames,) s; None for a quasi-static pair, which has no shift in time.
+        random: draws the copies.
+    """
+    found = bootstrap(pair, metrics, random)
+    if time is None:
+        return found
+    late, total = shifted(pair, time)
+    shift = bootstrap(late, lambda copy: _shift(copy)[None], random)[:, 0]
+    found[:, METRICS.index("time_shift")] = total + shift - shift[0]
+    return found
+
+
+def bootstrap(
+    pair: Pair, statistic: Callable[[Pair], Floats], random: np.random.Generator
+) -> Floats:
+    """A statistic's value and the ends of its interval, stacked (3, ...)."""
+    frames, units = pair.measured.shape[:2]
+    length = block_length(pair.measured - pair.simulated)
+
+    def copy() -> Pair:
+        drawn = np.asarray(random.integers(units, size=units))
+        return pair.taken(_blocks(frames, length, random), drawn).noisier(random)
+
+    copies = [statistic(copy()) for _ in range(COPIES)]
+    return np.concatenate([statistic(pair)[None], limits(np.array(copies))])
+
+
+def limits(copies: Floats) -> Floats:
+    """The ends (2, ...) of the interval that holds most of the copies (n, ...); NaN for none."""
+    ends = np.full((2, *copies.shape[1:]), np.nan)
+    known = np.isfinite(copies).all(axis=0)
+    tail = (1 - LEVEL) / 2
+    ends[:, known] = np.quantile(copies[:, known], [tail, 1 - tail], axis=0)
+    return ends
+
+
+def block_length(residual: Floats) -> int:
+    """Frames in a block: until residuals (frames, ...) forget, at most a quarter of them all."""
+    flat = np.nan_to_num(residual.reshape(len(residual), -1))
+    most = max(len(flat) // _LONGEST, 1)
+    size = float(np.sum(flat**2))
+    for lag in range(1, most):
+        if float(np.sum(flat[lag:] * flat[:-lag])) < size / np.e:
+            return lag
+    return most
+
+
+def _blocks(frames: int, length: int, random: np.random.Generator) -> Ints:
+    """Numbers of as many frames, in blocks that start anywhere and go round the end."""
+    count = -(-frames // length)
+    starts = random.integers(frames, size=count)
+    return ((starts[:, None] + np.arange(length)).ravel()[:frames]) % frames

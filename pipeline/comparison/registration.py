@@ -1,0 +1,107 @@
+"""How the measured places of the units at rest lie on the design: a rigid motion and a scale.
+
+The rigid part is taken out of what is compared. The scale is told and left in: a specimen that was
+made too large, or a pixel of the wrong size, is a finding.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.tracking.arrays import Floats
+from pipeline.tracking.camera import Camera
+
+_LEAST = 3  # units
+
+
+class Registration(NamedTuple):
+    """A similarity from the design's places to the measured ones, with standard uncertainties.
+
+    Attributes:
+        rotation: counter-clockwise, rad.
+        shift: (2,) of the specimen's middle, mm.
+        scale: measured over designed distances.
+        rotation_sigma, shift_sigma, scale_sigma: from the scatter of the units about it.
+        residual: root mean square distance that it leaves, mm.
+    """
+
+    rotation: float
+    shift: Floats
+    scale: float
+    rotation_sigma: float
+    shift_sigma: Floats
+    scale_sigma: float
+    residual: float
+
+    def upright(self, motion: Floats) -> Floats:
+        """Motions (..., 3) turned back into the design's frame."""
+        cos, sin = np.cos(self.rotation), np.sin(self.rotation)
+        turned = motion[..., :2] @ np.array([[cos, -sin], [sin, cos]])
+        return np.concatenate([turned, motion[..., 2:]], axis=-1)
+
+
+UNKNOWN = Registration(0.0, np.full(2, np.nan), np.nan, np.nan, np.full(2, np.nan), np.nan, np.nan)
+"""Of a track that does not tell where its units were at rest."""
+
+
+def register(design: Floats, measured: Floats) -> Registration:
+    """The similarity (least squares) between places (units, 2) in mm; NaN where one is unknown."""
+    known = np.isfinite(design).all(axis=1) & np.isfinite(measured).all(axis=1)
+    if known.sum() < _LEAST:
+        return UNKNOWN
+    middle = design[known].mean(axis=0)
+    before, after = _complex(design[known] - middle), _complex(measured[known] - middle)
+    shift = after.mean()
+    spread = float(np.sum(np.abs(before) ** 2))
+    factor = np.sum(np.conj(before) * (after - shift)) / spread
+    square = np.abs(after - shift - factor * before) ** 2
+    variance = float(square.sum()) / max(2 * len(before) - 4, 1)
+    turn_sigma = np.sqrt(variance / spread)
+    return Registration(
+        rotation=float(np.angle(factor)),
+        shift=np.array([shift.real, shift.imag]),
+        scale=float(np.abs(factor)),
+        rotation_sigma=float(turn_sigma / np.abs(factor)),
+        shift_sigma=np.full(2, np.sqrt(variance / len(before))),
+        scale_sigma=float(turn_sigma),
+        residual=float(np.sqrt(square.mean())),
+    )
+
+
+def measured_places(track: xr.Dataset, design: Floats) -> Floats:
+    """Where the camera saw the units at rest (units, 2), mm; NaN where it did not.
+
+    Args:
+        track: with its camera.
+        design: (units, 2) where they should be, NaN for those that are absent.
+    """
+    measured = np.full_like(design, np.nan)
+    camera, missed = _camera(track), track["camera_residual"].values
+    if camera is not None:
+        there = np.isfinite(design + missed).all(axis=1)
+        measured[there] = camera.unproject(camera.project(design[there]) + missed[there])
+    return measured
+
+
+def pixel_size(track: xr.Dataset, middle: Floats) -> float:
+    """Size of a pixel at a place (2,) by the camera's calibration, mm; NaN without a camera."""
+    if (camera := _camera(track)) is None:
+        return np.nan
+    return float(1 / np.sqrt(abs(np.linalg.det(camera.jacobian(middle)))))
+
+
+def _camera(track: xr.Dataset) -> Camera | None:
+    """The camera that a track was made with; points of another system come without."""
+    homography = track["camera_homography"].values
+    if np.isnan(homography).any():
+        return None
+    width, height = track["image_size"].values.tolist()
+    centre, radial = track["camera_centre"].values, track["camera_radial"].values
+    return Camera(homography, centre, radial, (width, height))
+
+
+def _complex(points: Floats) -> np.ndarray:
+    return np.asarray(points[:, 0] + 1j * points[:, 1])

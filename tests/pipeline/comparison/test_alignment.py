@@ -1,0 +1,124 @@
+"""Lags and loads that are known, found again to the precision that is stated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.comparison.alignment import (
+    LOADING,
+    UNLOADING,
+    Course,
+    branches,
+    find_lag,
+    load_time,
+    turn,
+)
+from pipeline.errors import UserError
+
+RATE = 60.0
+TIMES = np.linspace(0.0, 2.0, 401)
+
+
+def sine(time: np.ndarray) -> np.ndarray:
+    """Two cycles a second, from rest at time zero, along a line."""
+    wave = np.where(time > 0, 4.5 * np.sin(4 * np.pi * time), 0.0)
+    return wave[:, None] * np.array([0.8, 0.6])
+
+
+NOMINAL = Course(TIMES, sine(TIMES))
+
+
+def filmed(lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0) -> Course:
+    time = np.arange(frames) / RATE
+    drawn = np.random.default_rng(seed).normal(0.0, noise, (frames, 2))
+    return Course(time, sine(time - lag) + drawn)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(-0.1, 0.4))
+def test_a_known_lag_is_found_to_a_hundredth_of_a_frame(lag: float) -> None:
+    found = find_lag(filmed(lag), NOMINAL)
+    assert abs(found.value - lag) < 0.01 / RATE
+    assert found.gain == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_stated_uncertainty_of_the_lag_is_that_of_the_result() -> None:
+    found = [find_lag(filmed(0.21, noise=0.05, seed=seed), NOMINAL) for seed in range(60)]
+    off = np.array([(each.value - 0.21) / each.sigma for each in found])
+    assert 0.7 < np.std(off) < 1.3
+    assert found[0].sigma < 0.05 / RATE
+
+
+def test_frames_without_the_drive_are_left_out() -> None:
+    course = filmed(0.1)
+    course.value[20:40] = np.nan
+    assert find_lag(course, NOMINAL).value == pytest.approx(0.1, abs=0.01 / RATE)
+
+
+def test_a_gain_is_told_and_not_taken_for_a_lag() -> None:
+    course = filmed(0.1)
+    found = find_lag(course._replace(value=1.3 * course.value), NOMINAL)
+    assert found.gain == pytest.approx(1.3, abs=2e-3)
+    assert found.value == pytest.approx(0.1, abs=0.01 / RATE)
+
+
+def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
+    time = np.arange(60) / RATE
+    steady = Course(time, sine(time + 0.5 - 0.02))
+    found = find_lag(steady, NOMINAL)
+    assert found.ambiguous
+    assert np.angle(np.exp(4j * np.pi * (found.value - 0.02))) == pytest.approx(0.0, abs=0.01)
+    assert not find_lag(filmed(0.2), NOMINAL).ambiguous
+
+
+def test_a_drive_of_another_frequency_cannot_be_aligned() -> None:
+    time = np.arange(90) / RATE
+    other = Course(time, sine(2.7 * time))
+    with pytest.raises(UserError, match="cannot be aligned") as caught:
+        find_lag(other, NOMINAL)
+    assert "correlation" in str(caught.value)
+
+
+def test_too_few_frames_are_refused() -> None:
+    with pytest.raises(UserError, match="too few frames"):
+        find_lag(filmed(0.0, frames=7), NOMINAL)
+    with pytest.raises(UserError, match="too few frames"):
+        load_time(np.full(20, np.nan), Course(TIMES, TIMES[:, None]))
+
+
+def test_equal_displacement_is_equal_load_on_both_branches() -> None:
+    path = Course(TIMES, 15 * (1 + np.tanh(3 * (TIMES - 1)))[:, None])
+    there = np.concatenate([np.linspace(path.value[0, 0], 20, 50), np.linspace(20, 5, 30)])
+    found = load_time(there, path)
+    np.testing.assert_allclose(path.at(found)[:, 0], there, atol=1e-9)
+    np.testing.assert_array_equal(branches(there)[[5, 40]], LOADING)
+    np.testing.assert_array_equal(branches(there)[[60, 75]], UNLOADING)
+
+
+def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
+    ramp = Course(TIMES, 10 * TIMES[:, None])
+    found = load_time(np.linspace(-0.01, 25.0, 26), ramp)
+    assert found[0] == 0.0
+    assert np.isfinite(found[:20]).all()
+    assert np.isnan(found[22:]).all()
+
+
+def test_a_rest_belongs_to_the_way_before_it() -> None:
+    held = np.concatenate([np.zeros(20), np.linspace(0, 9, 40), np.full(20, 9.0)])
+    assert (branches(held) == LOADING).all()
+
+
+def test_a_drive_that_does_not_move_along_is_refused() -> None:
+    ramp = Course(TIMES, 10 * TIMES[:, None])
+    with pytest.raises(UserError, match="cannot be aligned"):
+        load_time(np.linspace(0.0, -15.0, 30), ramp)
+    with pytest.raises(UserError, match="to and fro"):
+        load_time(np.linspace(0.0, 1.0, 30), Course(TIMES, np.sin(TIMES * 4)[:, None]))
+
+
+def test_the_direction_of_a_drive_is_told() -> None:
+    line = np.linspace(0, 5, 9)[:, None]
+    assert turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)

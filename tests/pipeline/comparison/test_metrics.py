@@ -1,0 +1,95 @@
+"""Metrics against what they must be, and how often their intervals hold the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.comparison.metrics import METRICS, Pair, block_length, bootstrap, estimates, metrics
+
+FRAMES, UNITS = 60, 30
+TIME = np.arange(FRAMES) / 60
+RMSE, NRMSE, CORRELATION, SHARE, SHIFT = range(len(METRICS))
+
+
+def waves(lag: float = 0.0) -> np.ndarray:
+    """Three-dof waves of units with phases of their own, at 2 Hz."""
+    phase = np.linspace(0, 3, UNITS)[:, None] + np.array([0.0, 0.5, 1.0])
+    return np.asarray(np.sin(4 * np.pi * (TIME[:, None, None] - lag) - phase))
+
+
+def pair(noise: float, stated: float | None = None, lag: float = 0.0, seed: int = 0) -> Pair:
+    simulated = waves()
+    drawn = np.random.default_rng(seed).normal(0, noise, simulated.shape)
+    sigma = np.full(simulated.shape, noise if stated is None else stated)
+    return Pair(waves(lag) + drawn, simulated, sigma)
+
+
+def test_pure_noise_explains_all_of_the_residual() -> None:
+    found = estimates(pair(0.05), TIME, np.random.default_rng(0))
+    np.testing.assert_allclose(found[0, SHARE], 1.0, atol=0.1)
+    assert (found[1, SHARE] < 1).all()
+    assert (found[2, SHARE] > 1).all()
+    np.testing.assert_allclose(found[0, RMSE], 0.05, rtol=0.05)
+
+
+def test_noise_explains_little_of_a_wrong_simulation() -> None:
+    seen = pair(0.01)
+    found = metrics(seen._replace(simulated=1.2 * seen.simulated))
+    assert (found[SHARE] < 0.02).all()
+    np.testing.assert_allclose(found[NRMSE], 0.2, rtol=0.02)
+    np.testing.assert_allclose(found[CORRELATION], 1.0, atol=1e-3)
+
+
+@settings(max_examples=4, deadline=None)
+@given(st.floats(-0.04, 0.04))
+def test_a_known_shift_in_time_is_found(lag: float) -> None:
+    found = estimates(pair(0.002, lag=lag), TIME, np.random.default_rng(1))
+    np.testing.assert_allclose(found[0, SHIFT], lag, atol=3e-4)
+    assert (found[1, SHIFT] <= found[0, SHIFT]).all()
+
+
+def test_a_quasi_static_pair_has_no_shift_in_time() -> None:
+    assert np.isnan(estimates(pair(0.01), None, np.random.default_rng(0))[:, SHIFT]).all()
+
+
+def test_gaps_are_left_out_and_nothing_at_all_gives_no_number() -> None:
+    whole = pair(0.05)
+    holes = np.random.default_rng(3).random(whole.measured.shape) < 0.2
+    found = metrics(whole._replace(measured=np.where(holes, np.nan, whole.measured)))
+    np.testing.assert_allclose(found[:SHIFT], metrics(whole)[:SHIFT], rtol=0.05)
+    empty = metrics(whole._replace(measured=np.full_like(whole.measured, np.nan)))
+    assert np.isnan(empty).all()
+    nothing = estimates(
+        whole.taken(np.arange(FRAMES), np.arange(0)), None, np.random.default_rng(0)
+    )
+    assert np.isnan(nothing).all()
+
+
+def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
+    """Units off by amounts of their own, of a known mean square."""
+    held = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        seen = pair(0.02, seed=seed).taken(np.arange(15), np.arange(UNITS))
+        off = random.normal(0, 0.1, (1, UNITS, 3))
+        _, low, high = bootstrap(seen._replace(measured=seen.measured + off), metrics, random)
+        truth = np.sqrt(0.1**2 + 0.02**2)
+        held += int(((low[RMSE] <= truth) & (truth <= high[RMSE])).sum())
+    assert held >= 0.85 * 120
+
+
+def test_equal_seeds_give_equal_intervals() -> None:
+    first, again = (estimates(pair(0.05), TIME, np.random.default_rng(7)) for _ in range(2))
+    np.testing.assert_array_equal(first, again)
+
+
+@pytest.mark.parametrize(("kept", "longest"), [(0.0, 2), (0.9, 15)])
+def test_blocks_are_as_long_as_residuals_remember(kept: float, longest: int) -> None:
+    random = np.random.default_rng(0)
+    residual = random.normal(size=(FRAMES, UNITS))
+    for frame in range(1, FRAMES):
+        residual[frame] += kept * residual[frame - 1]
+    assert longest / 3 <= block_length(residual) <= longest
