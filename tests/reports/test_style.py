@@ -5,7 +5,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.colors import Colormap
+from matplotlib.colors import Colormap, to_rgb
 from matplotlib.font_manager import FontProperties, findfont
 
 from reports import style
@@ -35,6 +35,49 @@ def test_signed_is_palest_at_zero_and_balanced() -> None:
     assert (np.diff(lightness)[:127] > 0).all()
     assert (np.diff(lightness)[128:] < 0).all()
     assert lightness[0] == pytest.approx(lightness[-1], abs=0.02)
+
+
+VISION = {  # of linear RGB: Machado, Oliveira and Fernandes 2009, at full severity
+    "protanopia": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "deuteranopia": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+    "tritanopia": [
+        [1.255528, -0.076749, -0.178779],
+        [-0.078411, 0.930809, 0.147602],
+        [0.004733, 0.691367, 0.303900],
+    ],
+}
+
+
+def seen(rgb: np.ndarray, kind: str) -> np.ndarray:
+    """OKLab of sRGB colours as somebody without one kind of cones sees them."""
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(linear @ np.array(VISION[kind]).T, 0.0, 1.0)
+    return style.oklab(
+        np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    )
+
+
+@pytest.mark.parametrize("kind", VISION)
+def test_maps_and_structures_can_be_told_apart_with_any_colour_vision(kind: str) -> None:
+    levels = np.arange(256)
+    magnitude, signed = (
+        seen(np.asarray(colours(levels))[:, :3], kind)
+        for colours in (style.MAGNITUDE, style.SIGNED)
+    )
+    assert (np.diff(magnitude[:, 0]) < 0).all()
+    assert np.linalg.norm(signed[40] - signed[215]) > 0.1
+    colours = np.array([to_rgb(c) for c in (style.INTACT, style.ALTERED, style.CLOAKED)])
+    shown = seen(colours, kind)
+    apart = np.linalg.norm(shown[:, None] - shown[None], axis=2)[np.triu_indices(3, 1)]
+    assert apart.min() > 0.15
 
 
 def test_oklab_is_inverted() -> None:
