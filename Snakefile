@@ -6,6 +6,7 @@ import sys
 
 from snakemake.utils import min_version
 
+from pipeline.calibrated import calibrations, description, measurements
 from pipeline.filmed import compared, recording_pages, tracked
 from pipeline.sources import source_hash
 from pipeline.workflow import (
@@ -55,6 +56,7 @@ include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
+from pipeline.calibrated import calibrations, description, measurements
 include: "pipeline/rules/compare.smk"
 include: "pipeline/rules/report.smk"
 include: "pipeline/rules/index.smk"

@@ -45,16 +45,19 @@ def attributes(
     }
 
 
-def recorded(recording: str, parents: Mapping[str, Path], *, synthetic: bool) -> dict[str, str]:
-    """The provenance of what is made of a recording.
+def recorded(
+    description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
+) -> dict[str, str]:
+    """The provenance of what is made of a recording, or of the measurements of a calibration.
 
     Args:
-        recording: its YAML as JSON.
+        description: its YAML as JSON.
         parents: files that were read, by role; the hash of a folder is that of its files.
-        synthetic: whether it was rendered.
+        synthetic: whether it was rendered or computed.
+        role: what it describes.
     """
     return {
-        "recording": recording,
+        role: description,
         "synthetic": "yes" if synthetic else "no",
         **_made_from(parents),
     }

@@ -45,10 +45,28 @@ def publish(parts: Parts, folder: Path) -> list[Path]:
     Raises:
         UserError: the folder is full, read-only or not ours.
     """
+    return _published(lambda aside: write(parts, aside), folder)
+
+
+def draw(figure: Callable[[], Figure], name: str, folder: Path) -> list[Path]:
+    """Make a figure alone, in the style of all; returns the paths of its files.
+
+    Raises:
+        UserError: the folder is full, read-only or not ours.
+    """
+
+    def drawn(aside: Path) -> list[Path]:
+        with style.styled():
+            return style.save(figure(), aside / name)
+
+    return _published(drawn, folder)
+
+
+def _published(make: Callable[[Path], list[Path]], folder: Path) -> list[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with _aside(folder) as aside:
-            return [_moved(path, folder) for path in write(parts, aside)]
+            return [_moved(path, folder) for path in make(aside)]
     except OSError as error:
         raise refusal(folder, error) from error
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from pipeline.datasets.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
 from pipeline.datasets.responses import RESPONSE, SWEEP
@@ -24,6 +25,7 @@ Kind = Literal[
     "track",
     "truth",
     "comparison",
+    "calibration",
 ]
 
 TABLES: Mapping[Kind, Table] = {
@@ -36,6 +38,7 @@ TABLES: Mapping[Kind, Table] = {
     "track": TRACK,
     "truth": TRUTH,
     "comparison": COMPARISON,
+    "calibration": CALIBRATION,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -49,6 +52,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "track": RECORDED,
     "truth": RECORDED,
     "comparison": COMPARED,
+    "calibration": WARNED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""
 
@@ -62,5 +66,6 @@ TITLES: Mapping[Kind, str] = {
     "track": "Motion of every unit in a video, with its uncertainty",
     "truth": "Motion of every unit that a synthetic video shows",
     "comparison": "Motion in a recording beside its simulation",
+    "calibration": "Constants of a specimen, found from measurements, with their errors",
 }
 """What each kind holds, in a line; a dataset may have a title of its own."""

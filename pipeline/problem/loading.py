@@ -93,7 +93,7 @@ def section(path: Path, kind: type[Alone]) -> Alone:
     """
     document = yamlfile.read(path)
     try:
-        return kind.model_validate(document.data)
+        return kind.model_validate(document.data, context={FOLDER: document.path.parent})
     except ValidationError as error:
         raise told(error, document, document.data, None) from error
 

@@ -34,8 +34,8 @@ from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Selector
 
-_UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
-_UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
+UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
+UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
 
 
 class DampingLaw(Section):
@@ -87,8 +87,8 @@ class Material(Section):
             assert law.translation is not None
             assert law.rotation is not None
             return law.translation, law.rotation
-        mass = _UNROTATED_AREA * self.density * spacing**2
-        inertia = _UNROTATED_MOMENT * self.density * spacing**4
+        mass = UNROTATED_AREA * self.density * spacing**2
+        inertia = UNROTATED_MOMENT * self.density * spacing**4
         return (
             law.ratio * 2.0 * math.sqrt(mass * self.shear_stiffness),
             law.ratio * 2.0 * math.sqrt(inertia * self.bending_stiffness),

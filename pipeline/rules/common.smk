@@ -6,6 +6,7 @@ wildcard_constraints:
     preset=r"(@\w+)?",
     method=r"\w+",
     recording=r"\w+",
+    calibration=r"\w+",
     chunk=r"\d+",
     law=r"(geometric_)?",
     structure="intact|altered|cloaked",

@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.errors import UserError, refusal
 from pipeline.tracking.arrays import Floats
+
+
+class Cells(NamedTuple):
+    """The cells of a CSV.
+
+    Attributes:
+        rows: of cells, without blanks about them.
+        separator: a comma, semicolon or tab; with the latter two, a comma may be the decimal sign.
+    """
+
+    rows: list[list[str]]
+    separator: str
+
+
+def cells(path: Path) -> Cells:
+    """All cells of a file, a row a line.
+
+    Raises:
+        UserError: no such file.
+    """
+    lines = _lines(path)
+    separator = next((sign for sign in ";\t" if any(sign in line for line in lines)), ",")
+    rows = csv.reader(lines, delimiter=separator)
+    return Cells([[cell.strip() for cell in row] for row in rows], separator)
 
 
 def read(path: Path, names: Sequence[str]) -> Floats:
@@ -20,17 +46,15 @@ def read(path: Path, names: Sequence[str]) -> Floats:
     Raises:
         UserError: no such file, no such column, or no numbers in them.
     """
-    lines = _lines(path)
-    separator = next((sign for sign in ";\t" if any(sign in line for line in lines)), ",")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
+    rows, separator = cells(path)
     at = next((k for k, row in enumerate(rows) if set(names) <= set(row)), None)
     if at is None:
         known = next((", ".join(row) for row in rows if len(row) >= len(names)), "none")
         remedy = f"name the columns as the file does; it has: {known}"
         raise UserError("columns are missing", file=path, value=list(names), remedy=remedy)
     place = [rows[at].index(name) for name in names]
-    found = [_numbers(row, place, separator) for row in rows[at + 1 :]]
-    kept = np.array([values for values in found if values is not None], float)
+    found = [[_at(row, k, separator) for k in place] for row in rows[at + 1 :]]
+    kept = np.array([values for values in found if None not in values], float)
     if not len(kept):
         remedy = "give plain numbers below the heading"
         raise UserError("no line holds numbers in all columns", file=path, remedy=remedy)
@@ -46,13 +70,14 @@ def _lines(path: Path) -> list[str]:
         raise refusal(path, error) from error
 
 
-def _numbers(row: list[str], place: Sequence[int], separator: str) -> list[float] | None:
-    """The numbers at some places of a row; None if one is missing."""
-    if len(row) <= max(place):
-        return None
-    cells = [row[k] if separator == "," else row[k].replace(",", ".") for k in place]
+def _at(row: list[str], column: int, separator: str) -> float | None:
+    return number(row[column], separator) if column < len(row) else None
+
+
+def number(text: str, separator: str) -> float | None:
+    """The number in a cell of a file with this separator; None where it holds no finite one."""
     try:
-        values = [float(cell) for cell in cells]
+        value = float(text if separator == "," else text.replace(",", "."))
     except ValueError:
         return None
-    return values if np.isfinite(values).all() else None
+    return value if math.isfinite(value) else None

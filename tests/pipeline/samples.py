@@ -35,6 +35,10 @@ SIZES = {
     "side": 2,
     "source": 3,
     "estimate": 3,
+    "parameter": 4,
+    "with_parameter": 4,
+    "set": 3,
+    "point": 20,
 }
 
 
@@ -49,6 +53,7 @@ _ATTRIBUTES: dict[str, dict[str, str]] = {
         "structure": "cloaked",
         "case": "0",
     },
+    "calibration": {"calibration": "{}", "synthetic": "no", "warnings": ""},
 }
 
 

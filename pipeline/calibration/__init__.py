@@ -1,0 +1,1 @@
+"""From recordings to the constants of a specimen, with what is known of their errors."""

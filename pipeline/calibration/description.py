@@ -1,0 +1,238 @@
+"""The YAML file of a calibration: which constants are wanted, and what was measured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from pipeline.problem.lattices import Lattice
+from pipeline.problem.model import Contact, Material
+from pipeline.problem.quantities import (
+    Angle,
+    Count,
+    Duration,
+    Force,
+    Frequency,
+    Length,
+    Samples,
+    fault,
+)
+from pipeline.problem.section import Section, exactly_one
+
+Name = Literal[
+    "axial_stiffness",
+    "shear_stiffness",
+    "bending_stiffness",
+    "damping_ratio",
+    "damping_translation",
+    "damping_rotation",
+    "contact_cutoff",
+]
+
+File = Annotated[str, Field(min_length=1)]
+Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
+Amplitude = Annotated[Angle, Field(gt=0.0)]
+
+
+class ForceColumns(Section):
+    """Names of the columns; their units stand in brackets behind them in the file."""
+
+    displacement: str = "displacement"
+    force: str = "force"
+
+
+class VirtualForces(Section):
+    """A test that is computed: up to a displacement, with white noise of the load cell."""
+
+    end: Length
+    points: Samples = 40
+    noise: Force
+
+
+class ForceDisplacement(Section):
+    """Force over displacement of a lattice whose bottom row is clamped and whose top row moves.
+
+    Attributes:
+        name: of the set.
+        file: a CSV with a heading, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        lattice: the specimen.
+        test: where the top row moves to; displacement and force count positive that way.
+        columns: of the file.
+        noise: standard deviation of the forces; estimated where it is not given.
+        tare: whether the load cell's zero is unknown.
+    """
+
+    kind: Literal["force_displacement"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualForces | None = None
+    lattice: Lattice
+    test: Literal["tension", "compression", "shear"]
+    columns: ForceColumns = ForceColumns()
+    noise: Force | None = None
+    tare: bool = False
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        return self
+
+
+class DecayColumns(Section):
+    """Names of the columns; their units stand in brackets behind them in the file."""
+
+    time: str = "time"
+    angle: str = "angle"
+
+
+class VirtualDecay(Section):
+    """A trace that is computed: a damped oscillation at the authors' frequency of one hinge."""
+
+    amplitude: Amplitude
+    duration: Duration
+    rate: Frequency = 960.0
+    noise: Amplitude
+
+
+class FreeDecay(Section):
+    """Angle over time of two units on one ligament that was bent and let go.
+
+    Attributes:
+        name: of the set.
+        file: a CSV with a heading, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        columns: of the file.
+        noise: standard deviation of the angles; estimated where it is not given.
+    """
+
+    kind: Literal["free_decay"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualDecay | None = None
+    columns: DecayColumns = DecayColumns()
+    noise: Amplitude | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        return self
+
+
+class Error(Section):
+    """A standard deviation of places and of rotations."""
+
+    displacement: Length
+    rotation: Amplitude
+
+
+class VirtualTrack(Section):
+    """A track that is computed: noise of every frame, and a bias that stays with each unit."""
+
+    rate: Frequency
+    noise: Error
+    bias: Error | None = None
+
+
+class TrackedMotion(Section):
+    """The motion of a whole specimen, as `pipeline.track` writes it.
+
+    Attributes:
+        name: of the set.
+        file: the track, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        problem: of the study that was filmed, likewise.
+        preset: of the problem.
+        structure: which of the study's structures it is.
+        case: number of the study's load case; only for what is computed.
+        every: takes every so many frames.
+        noise: whether the tracker's uncertainties hold, or only their ratios do.
+        bias: standard deviation of what stays with a unit through all frames (registration); where
+            it is not given, each unit's is unknown and nothing is learnt from its mean place.
+    """
+
+    kind: Literal["track"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualTrack | None = None
+    problem: File
+    preset: str | None = None
+    structure: Literal["intact", "altered", "cloaked"] = "cloaked"
+    case: Annotated[int, Field(ge=0, strict=True)] = 0
+    every: Count = 1
+    noise: Literal["tracker", "estimated"] = "estimated"
+    bias: Error | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        return self
+
+
+Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminator="kind")]
+
+
+class Virtual(Section):
+    """What computed data are made with: the true constants and the seed of the noise."""
+
+    truth: Material
+    cutoff_angle: Angle | None = None
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class Calibration(Section):
+    """Which constants are wanted, from which measurements.
+
+    Attributes:
+        title: one line about it.
+        doc: more lines.
+        spacing: of the lattice, for the authors' law of damping.
+        material: values to start from; those that are not wanted stay as they are.
+        contact: of neighbouring units in the tests of forces; without it there is none.
+        fit: the wanted constants.
+        data: what was measured; all sets are fitted together.
+        virtual: what data are computed with.
+        synthetic: whether the data were computed, not measured.
+    """
+
+    title: str = ""
+    doc: str = ""
+    spacing: Length
+    material: Material
+    contact: Contact | None = None
+    fit: Annotated[tuple[Name, ...], Field(min_length=1)]
+    data: Annotated[tuple[Set, ...], Field(min_length=1)]
+    virtual: Virtual | None = None
+    synthetic: bool = False
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for what, remedy, key in _faults(self):
+            raise fault(what, remedy, key)
+        return self
+
+
+def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
+    """What the sections do not see by themselves: fault, remedy, key."""
+    found = []
+    names = [each.name for each in asked.data]
+    if len(set(names)) < len(names):
+        found.append(("two sets have one name", "name them apart", "data"))
+    if len(set(asked.fit)) < len(asked.fit):
+        found.append(("a constant is named twice", "name each once", "fit"))
+    by_ratio, both = asked.material.damping.ratio is not None, {"translation", "rotation"}
+    wanted = {"ratio"} if by_ratio else both
+    unknown = {name for name in {"ratio", *both} - wanted if f"damping_{name}" in asked.fit}
+    if unknown:
+        form = "ratio" if by_ratio else "translation and rotation"
+        remedy = "write material.damping in the form that is wanted in fit"
+        found.append((f"the damping starts from {form}", remedy, "fit"))
+    if "contact_cutoff" in asked.fit and (asked.contact is None or asked.contact.law != "angle"):
+        remedy = "give contact, with law: angle"
+        found.append(("the cut-off of no contact is wanted", remedy, "fit"))
+    computed = [each.virtual is not None for each in asked.data]
+    if any(computed) != (asked.virtual is not None):
+        remedy = "give virtual.truth with virtual sets, and only then"
+        found.append(("data are computed with true constants", remedy, "virtual"))
+    return found

@@ -1,0 +1,114 @@
+"""One set of measurements as the estimator sees it, whatever its kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+
+from pipeline.calibration.constants import Constants
+from pipeline.calibration.description import Name
+from sim.arrays import Floats, Ints
+
+Kind = Literal["force_displacement", "free_decay", "track"]
+
+ELASTIC: tuple[Name, ...] = (
+    "axial_stiffness",
+    "shear_stiffness",
+    "bending_stiffness",
+    "contact_cutoff",
+)
+"""What equilibria depend on."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The measured values of one set.
+
+    Attributes:
+        name: of the set.
+        kind: of the set.
+        abscissa: (n,) displacement in mm, or time in s.
+        values: (n,) forces in N, angles in rad, or displacements in mm and rad.
+        sigma: (n,) standard deviations, or their ratios only.
+        known: whether the standard deviations hold as they are.
+        channel: (n,) which course each value belongs to; of a track, 3 unit + dof.
+        bias: (n,) standard deviation of what a channel's values have in common besides; infinite
+            where it is unknown, so that a channel's mean tells nothing.
+    """
+
+    name: str
+    kind: Kind
+    abscissa: Floats
+    values: Floats
+    sigma: Floats
+    known: bool
+    channel: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    bias: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def whitened(self, deviation: Floats) -> Floats:
+        """Deviations (n, ...) from the values as numbers of unit variance, without correlation.
+
+        The covariance in a channel is D + b^2 1 1', with D the squared ``sigma``: its inverse root
+        takes from D^-1/2 x a part of the component along D^-1/2 1.
+        """
+        return self._less_mean((deviation.T / self.sigma).T)
+
+    def transposed(self, white: Floats) -> Floats:
+        """What the transpose of ``whitened`` makes of whitened numbers (n,)."""
+        return self._less_mean(white) / self.sigma
+
+    def _less_mean(self, scaled: Floats) -> Floats:
+        """Multiples (n, ...) of ``sigma`` without what a bias of their channels may explain."""
+        if not len(self.bias):
+            return scaled
+        weight = 1 / self.sigma
+        size = np.bincount(self.channel, weight**2)[self.channel]
+        part = 1 - 1 / np.sqrt(1 + self.bias**2 * size)
+        flat = scaled.reshape(len(scaled), -1)
+        along = np.stack([np.bincount(self.channel, weight * column) for column in flat.T], axis=1)
+        taken = (part * weight / size)[:, None] * along[self.channel]
+        return (flat - taken).reshape(scaled.shape)
+
+    @property
+    def channels(self) -> Ints:
+        """(n,) the channel of each value; one where there is only one."""
+        return self.channel if len(self.channel) else np.zeros(len(self.values), dtype=np.int64)
+
+    @property
+    def unbiased(self) -> int:
+        """Number of means that tell nothing."""
+        return len(np.unique(self.channel[np.isinf(self.bias)])) if len(self.bias) else 0
+
+
+class Experiment(Protocol):
+    """What was measured, and a model of it."""
+
+    @property
+    def measured(self) -> Measured:
+        """The measurements."""
+        ...
+
+    @property
+    def sees(self) -> tuple[Name, ...]:
+        """The constants that the measurements depend on."""
+        ...
+
+    @property
+    def own_start(self) -> Floats:
+        """(n_own,) unknowns of this set alone to start from."""
+        ...
+
+    @property
+    def own_scale(self) -> Floats:
+        """(n_own,) changes of them that are about as visible as one of a constant by e."""
+        ...
+
+    def predict(self, constants: Constants, own: Floats) -> Floats:
+        """(n,) what would be measured without errors.
+
+        Raises:
+            SimulationError: there is no such state.
+        """
+        ...

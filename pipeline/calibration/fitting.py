@@ -1,0 +1,60 @@
+"""From the YAML of a calibration and its files to a fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.calibration import decay, forces
+from pipeline.calibration.constants import Constants, start
+from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay, Set
+from pipeline.calibration.estimate import Fit, Model, fit
+from pipeline.calibration.experiment import Experiment
+from pipeline.errors import UserError
+from sim.errors import SimulationError
+
+
+def fitted(asked: Calibration, path: Path) -> Fit:
+    """The fit that a calibration asks for.
+
+    Args:
+        asked: the calibration.
+        path: its YAML; files are named as seen from there.
+
+    Raises:
+        UserError: a file cannot be used, or the measured states cannot be simulated.
+    """
+    begin = start(asked)
+    experiments = [experiment(each, begin, path) for each in asked.data]
+    model = Model(begin, asked.fit, experiments)
+    values = sum(len(each.measured.values) for each in experiments)
+    if values <= len(model.start):
+        remedy = "measure more, or fit fewer constants"
+        what = f"{values} values do not determine {len(model.start)} unknowns"
+        raise UserError(what, file=path, key="data", remedy=remedy)
+    try:
+        return fit(model)
+    except SimulationError as error:
+        remedy = "check lattice, displacements and the values in material that the fit starts from"
+        what = f"the measured states cannot be simulated: {error}"
+        raise UserError(what, file=path, key="data", remedy=remedy) from error
+
+
+def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
+    """One set as an experiment.
+
+    Raises:
+        UserError: its file cannot be used.
+    """
+    if asked.file is None:
+        raise UserError(
+            "the data of this set are computed, and have not been yet",
+            file=path,
+            key=f"data: {asked.name}",
+            remedy=f"run python -m pipeline.calibrate synthesise {path} --out-dir FOLDER, and give"
+            " the calibration.yaml that it writes",
+        )
+    folder = path.parent
+    if isinstance(asked, ForceDisplacement):
+        return forces.experiment(asked, begin, *forces.read(asked, folder))
+    assert isinstance(asked, FreeDecay)
+    return decay.experiment(asked, *decay.read(asked, folder))

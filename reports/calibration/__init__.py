@@ -1,0 +1,1 @@
+"""Figures of calibrations: the fit beside the data, and what the data determine."""

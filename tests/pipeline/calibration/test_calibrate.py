@@ -1,0 +1,130 @@
+"""The constants of computed specimens are found again, with the errors that the noise makes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+import yaml
+
+from pipeline import calibrate, datasets
+from pipeline.calibration.description import Calibration
+from pipeline.calibration.fitting import fitted
+from pipeline.calibration.uncertainty import gradient, uncertainty
+from pipeline.problem.loading import section
+from pipeline.problem.model import Material
+from tests.pipeline.calibration.specimens import (
+    STIFFNESS,
+    decay_set,
+    described,
+    force_sets,
+    written,
+)
+
+ALL = [*STIFFNESS, "damping_ratio"]
+TRUE = {"axial_stiffness": 120.0, "shear_stiffness": 1.19, "bending_stiffness": 1.5}
+TRUE |= {"damping_ratio": 0.0186, "damping_translation": 2.8768e-5, "damping_rotation": 1.1884e-4}
+
+
+def synthesised(folder: Path, text: dict[str, object]) -> Path:
+    """The calibration of computed files."""
+    source = written(folder, text)
+    done = ["synthesise", str(source), "--out-dir", str(folder / "data"), "--quiet"]
+    assert calibrate.main(done) == 0
+    return folder / "data/calibration.yaml"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a calibration of forces and a decay, and what was found."""
+    folder = tmp_path_factory.mktemp("calibration")
+    path = synthesised(folder, described([*force_sets(), decay_set()], ALL, title="A specimen"))
+    assert calibrate.main([str(path), "--out", str(folder / "found.nc"), "--quiet"]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(made: Path) -> xr.Dataset:
+    return datasets.read(made / "found.nc", "calibration")
+
+
+def test_the_truth_is_within_the_intervals(found: xr.Dataset) -> None:
+    names = found["parameter"].values.tolist()
+    assert names == [*ALL, "damping_translation", "damping_rotation"]
+    true = np.array([TRUE[name] for name in names])
+    assert (found["lower"].values < true).all()
+    assert (true < found["upper"].values).all()
+    assert (found["standard_error"].values < 0.1).all()
+    assert (found["status"].values == 0).all()
+
+
+def test_errors_are_those_of_the_bound_where_drives_have_no_noise(found: xr.Dataset) -> None:
+    np.testing.assert_allclose(found["standard_error"], found["bound"], rtol=1e-8)
+    width = np.log(found["upper"].values / found["lower"].values)
+    assert width / found["standard_error"].values == pytest.approx(2 * 1.96, rel=0.02)
+    covariance, error = found["covariance"].values, found["standard_error"].values
+    np.testing.assert_allclose(np.diag(covariance), error**2)
+    np.testing.assert_allclose(found["correlation"], covariance / np.outer(error, error))
+
+
+def test_noise_is_estimated_and_leaves_nothing_but_noise(found: xr.Dataset) -> None:
+    told = found["sigma"].groupby(found["set_of_point"]).mean().values
+    assert told[:3] == pytest.approx(0.02, rel=0.5)
+    assert told[3] == pytest.approx(np.deg2rad(0.2), rel=0.15)
+    assert found["chi_square"].values == pytest.approx(found["freedom"].values, rel=1e-2)
+    assert (np.abs(found["autocorrelation"]) < 0.5).all()
+    assert found.attrs["warnings"] == ""
+
+
+def test_the_peaks_tell_the_damping_too(found: xr.Dataset) -> None:
+    by_peaks = found["peak_ratio"].sel(set="decay").item()
+    assert by_peaks == pytest.approx(0.0186, rel=0.15)
+    assert np.isnan(found["peak_ratio"].sel(set="shear"))
+
+
+def test_a_problem_file_takes_the_fragment(made: Path) -> None:
+    text = (made / "found.yaml").read_text()
+    assert text.startswith("# SYNTHETIC")
+    material = Material.model_validate(yaml.safe_load(text)["material"])
+    found = datasets.read(made / "found.nc", "calibration").set_index(parameter="parameter")
+    assert material.shear_stiffness == pytest.approx(found["value"].values[1], rel=1e-5)
+    assert material.damping_coefficients(15.0) == pytest.approx(found["value"].values[4:], rel=1e-5)
+
+
+def test_the_same_files_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    again = ["--out", str(tmp_path / "found.nc"), "--quiet"]
+    assert calibrate.main([str(made / "data/calibration.yaml"), *again]) == 0
+    for name in ("found.nc", "found.yaml"):
+        assert (tmp_path / name).read_bytes() == (made / name).read_bytes()
+
+
+def test_columns_of_the_jacobian_are_those_of_the_adjoint(made: Path) -> None:
+    path = made / "data/calibration.yaml"
+    fit = fitted(section(path, Calibration), path)
+    random = np.random.default_rng(4).normal(size=len(fit.residual))
+    elsewhere = fit._replace(residual=random)
+    columns = (fit.jacobian.T @ random)[: len(ALL)]
+    np.testing.assert_allclose(gradient(elsewhere), columns, rtol=1e-5)
+    assert uncertainty(fit).newton < 1e-3
+
+
+def test_little_noise_makes_errors_below_one_percent(tmp_path: Path) -> None:
+    sets = [*force_sets("0.0005 N"), decay_set("0.005 deg")]
+    path = synthesised(tmp_path, described(sets, ALL))
+    fit = fitted(section(path, Calibration), path)
+    constants = fit.model.constants(fit.unknowns)
+    for name in fit.model.names:
+        assert constants.value(name) == pytest.approx(TRUE[name], rel=0.01)
+
+
+def test_what_the_data_do_not_tell_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = synthesised(tmp_path, described([decay_set()], ["damping_ratio", "shear_stiffness"]))
+    assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 0
+    assert "shear_stiffness is not determined by these data" in capsys.readouterr().err
+    found = datasets.read(tmp_path / "found.nc", "calibration")
+    assert found["status"].values.tolist()[:2] == [0, 2]
+    assert "shear_stiffness: 1.19 " not in (tmp_path / "found.yaml").read_text()
