@@ -1,4 +1,4 @@
-"""Stage: a design under finer load steps and the other contact law, beside those of the run."""
+"""Stage: a design under finer steps of load or time, and other contact, beside those of the run."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import cli, problem
+from pipeline import cli, finer_times, problem
+from pipeline.checked import AS_RUN, Numbers, dataset
 from pipeline.errors import UserError
 from pipeline.measuring import UNSTABLE, Measured
 
@@ -24,7 +25,6 @@ LOG = logging.getLogger(__name__)
 
 Table = dict[str, list[Measured]]
 
-AS_RUN = "as run"
 FINER = (2, 10)
 """How many times more load steps the loss is checked with."""
 
@@ -32,7 +32,7 @@ FINER = (2, 10)
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
     made = cli.parser(
-        "pipeline.verify", "Check a design with finer load steps and another contact."
+        "pipeline.verify", "Check a design with finer steps of load or time, and another contact."
     )
     made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
@@ -45,7 +45,7 @@ def work(args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
 
     asked = problem.load(args.problem, args.preset)
-    if asked.horizon.steps is None:
+    if asked.static and asked.horizon.steps is None:
         raise UserError(
             "the loss of this problem is not taken on load steps",
             file=args.problem,
@@ -79,65 +79,46 @@ def variants(asked: Problem) -> dict[str, Problem]:
 def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
     """The dataset ``verification``; a variant that cannot be simulated keeps its reason."""
     from pipeline.responses import loss_units
+
+    found, status = (
+        _finer_loads(asked, folder, design, threads)
+        if asked.static
+        else finer_times.trials(asked, folder, design)
+    )
+    made = dataset(found, status)
+    made["loss"].attrs["units"] = loss_units(asked)
+    return made
+
+
+def _finer_loads(
+    asked: Problem, folder: Path, design: xr.Dataset, threads: int
+) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
+    """Numbers by check and structure of a path of equilibria, and why a check has none."""
     from pipeline.scenes import scene_of
     from pipeline.simulate import measured_cases, structures_of, times_of
 
     posed = variants(asked)
-    found: dict[str, Table] = {}
+    tables: dict[str, Table] = {}
     status = dict.fromkeys(posed, "ok")
     for name, variant in posed.items():
         structures = structures_of(scene_of(variant, folder), design)
         times = times_of(variant, structures["altered"].scene)
         try:
-            found[name], _ = measured_cases(structures, times, threads)
+            tables[name], _ = measured_cases(structures, times, threads)
         except UserError as error:
             if name == AS_RUN:
                 raise
             LOG.warning("%s: %s", name, error.what)
             status[name] = error.what
-    shares = {name: _share(asked, variant) for name, variant in posed.items()}
-    made = _dataset(found, shares, status)
-    made["loss"].attrs["units"] = loss_units(asked)
-    return made
-
-
-def _dataset(
-    found: dict[str, Table], shares: dict[str, float], status: dict[str, str]
-) -> xr.Dataset:
-    import xarray as xr
-
-    as_run = found[AS_RUN]
-    rows = [
-        [
-            _numbers(found[name][structure], cases, shares[name]) if name in found else NOTHING
-            for structure, cases in as_run.items()
-        ]
-        for name in status
-    ]
-    columns = {
-        field: np.array([[getattr(numbers, field) for numbers in row] for row in rows])
-        for field in Numbers._fields
+    as_run = tables[AS_RUN]
+    found = {
+        name: {
+            structure: _numbers(cases, as_run[structure], _share(asked, posed[name]))
+            for structure, cases in table.items()
+        }
+        for name, table in tables.items()
     }
-    return xr.Dataset(
-        {name: (("check", "structure"), values) for name, values in columns.items()}
-        | {"status": (("check",), list(status.values()))},
-        {"check": list(status), "structure": list(as_run)},
-    )
-
-
-class Numbers(NamedTuple):
-    """What is kept of a structure under one variant: the extremes of its load cases."""
-
-    loss: float
-    departure: float
-    min_void_angle: float
-    gap: float
-    overlaps: int
-    contact_pairs: int
-    unstable: int
-
-
-NOTHING = Numbers(np.nan, np.nan, np.nan, np.nan, 0, 0, 0)
+    return found, status
 
 
 def _share(asked: Problem, variant: Problem) -> float:

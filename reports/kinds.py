@@ -46,9 +46,12 @@ class Kind:
 
 
 def of(problem: Problem) -> Kind:
-    """The report of a problem: shielding from a shaken source with its map, or along a path."""
+    """The report of a problem: shielding from a source with its map, of a wave, or of a path."""
     shaken = isinstance(problem.drive, Harmonic | RampHarmonic)
-    return _shielding() if shaken and problem.sweep is not None else _along_a_path()
+    if shaken and problem.sweep is not None:
+        return _shielding()
+    mimics = problem.objective.kind == "displacement" and problem.objective.target == "intact"
+    return _of_a_wave() if mimics and not problem.static else _along_a_path()
 
 
 def _shielding() -> Kind:
@@ -63,3 +66,11 @@ def _along_a_path() -> Kind:
     from reports.path import facts, figure, tables
 
     return Kind(facts.collect, tables.build, figure.build, about.words, about.animation)
+
+
+def _of_a_wave() -> Kind:
+    from reports.path import content as path
+    from reports.wave import content as about
+    from reports.wave import facts, figure, tables
+
+    return Kind(facts.collect, tables.build, figure.build, about.words, path.animation)

@@ -24,6 +24,8 @@ KEEP_FROM_LIMIT = 0.95
 FINER = 0.1
 """Finer steps at a barrier, in shares of the stability limit."""
 RUNG = 1.25
+MOVING = 1.5
+"""Highest eigenfrequency in motion over that at rest, as expected before the first run."""
 NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -46,10 +48,11 @@ class Record:
 class ExplicitSolver:
     """Integrates one case explicitly with equal steps (``dynamics.Solver``).
 
-    The step is cut to one that is stable for the structure at rest and, after a run, in the state
-    that stores the most energy; and halved as long as the run leaves the admissible states (a
-    blow-up, units that overlap), MAX_REFINEMENTS runs in all. Contact on void angles asks for no
-    shorter step: the voids' barriers have finer steps of their own.
+    The step is cut to one that is likely to be stable for the structure, judged at rest, and after
+    a run to one that is in the state that stores the most energy; and halved as long as the run
+    leaves the admissible states (a blow-up, units that overlap), MAX_REFINEMENTS runs in all.
+    Contact on void angles asks for no shorter step: the voids' barriers have finer ones of their
+    own.
 
     Attributes:
         topology: the structure.
@@ -80,7 +83,7 @@ class ExplicitSolver:
         top = self.topology
         system = system_of(top, values, NONE)
         refuse_overlap(system.contacts)
-        stable = self._steps_for(highest_frequency(top, values, touching=NONE))
+        stable = self._steps_for(MOVING * highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(values, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))

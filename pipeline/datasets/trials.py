@@ -1,4 +1,4 @@
-"""What datasets hold of trials of a design: imperfect copies, finer load steps."""
+"""What datasets hold of trials of a design: imperfect copies, finer steps."""
 
 from __future__ import annotations
 
@@ -50,10 +50,23 @@ VERIFICATION: Table = {
         "largest distance of a unit from where it is as run, at equal loads",
         gaps=True,
     ),
+    "error": Variable(
+        _CHECK,
+        "1",
+        "relative error of the displacement in the region of interest over time, against the"
+        " intact structure",
+        gaps=True,
+    ),
+    "time_step": Variable(_CHECK, "s", "equal steps of a motion in time", gaps=True),
     "min_void_angle": Variable(_CHECK, "rad", "smallest void angle at any load", gaps=True),
     "gap": Variable(_CHECK, "mm", "smallest gap between units at any load", gaps=True),
     "overlaps": Variable(_CHECK, "1", "most overlapping pairs of units at any load", "int64"),
-    "contact_pairs": Variable(_CHECK, "1", "pairs of units in contact at the full load", "int64"),
+    "contact_pairs": Variable(
+        _CHECK,
+        "1",
+        "pairs of units in contact at the full load; of a motion in time, at most",
+        "int64",
+    ),
     "unstable": Variable(_CHECK, "1", "loads whose equilibrium is no minimum", "int64"),
     "status": Variable(("check",), "1", "ok, or why there is no result", "str"),
 }

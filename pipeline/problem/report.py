@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.problem.quantities import Count, Gap, Positive, Ratio
+from pipeline.problem.quantities import Coordinate, Count, Delay, Gap, Positive, Ratio
 from pipeline.problem.section import Section
 
 
@@ -48,11 +48,15 @@ class Report(Section):
 
     Attributes:
         snapshots: driven displacements that it shows.
+        instants: times of a motion in time that it shows.
+        places: the units nearest to these are followed over time, at most three.
         shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
             yields at about 5 %).
         paper: what a publication tells.
     """
 
     snapshots: tuple[Gap, ...] = ()
+    instants: tuple[Delay, ...] = ()
+    places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
     shim_strain_limit: Positive = 0.05
     paper: Paper | None = None

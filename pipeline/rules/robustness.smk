@@ -40,7 +40,7 @@ rule gather_scatter:
         "python -m pipeline.scatter gather --parts {input} --out {output} --log {log}"
 
 
-# Not what the design depends on: finer load steps, the other contact law.
+# Not what the design depends on: finer steps of load or time, the other contact law.
 rule verify:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
@@ -55,7 +55,7 @@ rule verify:
         problem=section("verify"),
         source=source_hash("pipeline.verify"),
     message:
-        "Checking load steps and contact of {wildcards.name}{wildcards.preset}"
+        "Checking steps and contact of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.verify {params.study} --design {input.design}"
         " --out {output} --log {log}"

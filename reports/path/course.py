@@ -61,7 +61,7 @@ def course(problem: Problem, response: xr.Dataset) -> Course:
         values=values,
         static=static,
         strain=None if paper is None or not static else paper.strain,
-        shown=_samples(values, problem.report.snapshots),
+        shown=_samples(values, problem.report.snapshots if static else problem.report.instants),
     )
 
 

@@ -30,7 +30,7 @@ def build(study: Study) -> Figure:
     head = 11.5 if study.recordings else 8.5
     low = top + head + grid.lines * grid.side + 2.0
     figure = style.page(low + 48.0)
-    _at_rest(figure, study, names)
+    at_rest(figure, study, names)
     style.letter(figure, 123.0, 0.8, "b", "Optimisation")
     loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, loss_label(study))
     style.letter(figure, 0.0, top, "c", "Response, true to scale")
@@ -46,13 +46,15 @@ def loss_label(study: Study) -> str:
     return "Loss (N mm)" if study.problem.objective.kind == "strain_energy" else r"Loss $J$"
 
 
-def _at_rest(figure: Figure, study: Study, names: tuple[str, ...]) -> None:
+def at_rest(figure: Figure, study: Study, names: tuple[str, ...]) -> list[Axes]:
+    """Panel a: the structures side by side, and how large and how driven they are."""
     style.letter(figure, 0.0, 0.8, "a")
     side = 40.0
     lattice, drive = study.problem.lattice, study.problem.drive
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
     notes = [size, f"$A$ = {drive.amplitude:g} mm" if hasattr(drive, "amplitude") else "", ""]
     left = (3 - len(names)) * (side + 0.6) / 2
+    panels = []
     for k, name in enumerate(names):
         x = left + k * (side + 0.6)
         axes = style.place(figure, x, 6.0, side, side)
@@ -62,6 +64,8 @@ def _at_rest(figure: Figure, study: Study, names: tuple[str, ...]) -> None:
             display_name(study.problem, name), color=colour, fontsize=style.TITLE, pad=2.0
         )
         style.write(figure, x + side / 2, 46.6, notes[k], ha="center", fontsize=style.SMALL)
+        panels.append(axes)
+    return panels
 
 
 def _panels(study: Study, path: Course) -> list[Panel]:

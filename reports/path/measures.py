@@ -41,36 +41,44 @@ def measure_of(problem: Problem) -> Measure:
             "motion", "RMS |U| in the region of interest", symbol, "1", lambda r: motion(r, scale)
         )
     return Measure(
-        "mismatch", "Mimicking error", "mimicking error", "1", lambda r: mismatch(r, scale)
+        "mismatch",
+        "Mimicking error",
+        "mimicking error",
+        "1",
+        lambda r: mismatch(r, scale, problem.static),
     )
 
 
 def rotation(response: xr.Dataset) -> xr.DataArray:
     """Mean |theta| over the region of interest, degrees."""
-    turn: xr.DataArray = np.abs(_interest(response).sel(dof="theta"))  # type: ignore[assignment]
+    turn: xr.DataArray = np.abs(interest(response).sel(dof="theta"))  # type: ignore[assignment]
     mean: xr.DataArray = turn.mean("unit")
     return np.degrees(mean)  # type: ignore[return-value]
 
 
 def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
     """Root mean square of |U|, U = (ux/s, uy/s, theta), over the region of interest."""
-    mean: xr.DataArray = _squares(_interest(response), scale).mean("unit")
+    mean: xr.DataArray = squares(interest(response), scale).mean("unit")
     return mean**0.5
 
 
-def mismatch(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
-    """Norm of U - U_intact over the region of interest, over that of U_intact at the end."""
-    inside = _interest(response)
+def mismatch(
+    response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
+) -> xr.DataArray:
+    """Norm of U - U_intact over the region of interest, over what ``size_of_intact`` is."""
+    inside = interest(response)
     intact = inside.sel(structure="intact")
-    apart: xr.DataArray = _squares(inside - intact, scale).sum("unit") ** 0.5
-    return apart / size_of_intact(response, scale)
+    apart: xr.DataArray = squares(inside - intact, scale).sum("unit") ** 0.5
+    return apart / size_of_intact(response, scale, static)
 
 
-def size_of_intact(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
-    """Norm (case,) of U_intact over the region of interest at the end of the path."""
-    end = _interest(response).sel(structure="intact").isel(time=-1)
-    size: xr.DataArray = _squares(end, scale).sum("unit") ** 0.5
-    return size
+def size_of_intact(
+    response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
+) -> xr.DataArray:
+    """Norm (case,) of U_intact over the region of interest: at the end of a path, most in time."""
+    intact = interest(response).sel(structure="intact")
+    size: xr.DataArray = squares(intact, scale).sum("unit") ** 0.5
+    return size.isel(time=-1) if static else size.max("time")
 
 
 def scales(problem: Problem) -> tuple[float, float, float]:
@@ -78,11 +86,13 @@ def scales(problem: Problem) -> tuple[float, float, float]:
     return problem.lattice.spacing, problem.lattice.spacing, 1.0
 
 
-def _interest(response: xr.Dataset) -> xr.DataArray:
+def interest(response: xr.Dataset) -> xr.DataArray:
+    """Displacements of the units of the region of interest."""
     return response["displacement"].isel(unit=response["roi"].values.astype(bool))
 
 
-def _squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
+def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Sum of squares of dimensionless displacements (..., dof)."""
     divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
     squares: xr.DataArray = ((displacement / divisors) ** 2).sum("dof")
     return squares

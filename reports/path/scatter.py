@@ -34,7 +34,7 @@ def curves(
     if measure.key == "motion":
         return copies["departure"]
     count = int(response["roi"].sum())
-    intact = float(size_of_intact(response, scales(problem)).isel(case=0))
+    intact = float(size_of_intact(response, scales(problem), problem.static).isel(case=0))
     return copies["departure"] * np.sqrt(count) / intact
 
 

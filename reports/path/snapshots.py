@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import xarray as xr
@@ -94,8 +94,13 @@ class Grid:
         return (load, row) if self.beside else (row, load)
 
 
-def snapshots(figure: Figure, study: Study, grid: Grid, top: float) -> None:
-    """Every structure at every load shown, from ``top`` (mm) on."""
+Overlay = Callable[[Axes, Row, int], None]
+
+
+def snapshots(
+    figure: Figure, study: Study, grid: Grid, top: float, overlay: Overlay | None = None
+) -> None:
+    """Every structure at every load shown, from ``top`` (mm) on, with an ``overlay`` on each."""
     shade, side = shade_of(study.problem, study.response), grid.side
     for k, row in enumerate(grid.rows):
         for m, sample in enumerate(grid.course.shown):
@@ -104,6 +109,8 @@ def snapshots(figure: Figure, study: Study, grid: Grid, top: float) -> None:
                 figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
             )
             snapshot(axes, study.problem, row.part, sample, shade)
+            if overlay is not None:
+                overlay(axes, row, sample)
     loads = [f"{grid.course.symbol} = {grid.course.at(sample)}" for sample in grid.course.shown]
     kinds = [(row.label, row.colour) for row in grid.rows]
     values = [(load, style.INTACT) for load in loads]

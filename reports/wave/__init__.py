@@ -1,0 +1,1 @@
+"""Report of structures that waves run through."""

@@ -1,0 +1,31 @@
+"""The page of a wave: its words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from reports.content import Words
+from reports.path import content
+from reports.study import Study
+
+_CAPTION = (
+    "<b>a</b> The structures at rest: orange units are driven along the arrows, purple ones are "
+    "redesigned; red marks are the places of panel d. "
+    "<b>b</b> Loss against evaluation; rejected evaluations are dots, infeasible ones pale, the "
+    "circle is the best feasible design. "
+    "<b>c</b> Snapshots at true size, coloured by u<sub>y</sub>; red dots are ligaments beside "
+    "which a void is closed to contact. "
+    "<b>d</b> Vertical displacement of the marked units. "
+    "<b>e</b> Distance of the surroundings' motion to the intact one, over the largest size of "
+    "that in time. "
+    "<b>f</b> Number of closed voids along the top and bottom edges."
+)
+
+
+def words(study: Study) -> Words:
+    """What the page says of itself."""
+    return replace(
+        content.words(study),
+        caption=_CAPTION,
+        headline=("error_altered", "error_cloaked", "error_reduction", "loss_reduction"),
+    )

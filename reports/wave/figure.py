@@ -1,0 +1,109 @@
+"""The figure of structures that waves run through, at a journal's two-column width."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from reports import draft, style
+from reports.history import loss_history
+from reports.path import measures
+from reports.path.course import course, structures
+from reports.path.curves import measure_panel, path_axes, structure_curves
+from reports.path.figure import TALLEST_SNAPSHOTS, at_rest
+from reports.path.snapshots import Grid, Row, snapshots
+from reports.structure import deformed, from_dataset
+from reports.study import Study
+from reports.wave import voids
+from reports.wave.course import Place, first_structure, places
+
+CONTACT = "#e3342f"
+"""Colour of marks: of contacts, and of places, as in the paper."""
+ROOM = 8.5
+"""Between the letter of a row and its panels, mm."""
+
+
+def build(study: Study) -> Figure:
+    """The whole figure."""
+    path = course(study.problem, study.response)
+    grid = Grid.of(study, path, TALLEST_SNAPSHOTS)
+    top = 52.0
+    middle = top + ROOM + grid.lines * grid.side + 1.5
+    low = middle + 44.0
+    figure = style.page(low + 46.0)
+    for axes in at_rest(figure, study, structures(study.response)):
+        _mark_places(axes, study)
+    style.letter(figure, 123.0, 0.8, "b", "Optimisation")
+    loss_history(style.place(figure, 133.5, ROOM, 43.5, 31.5), study.design)
+    style.letter(figure, 0.0, top, "c", "Response, true to scale; red dots: closed voids")
+    snapshots(figure, study, grid, top + ROOM, partial(_contacts, study))
+    _places(figure, study, middle)
+    _whole(figure, study, low)
+    if study.draft:
+        draft.mark(figure)
+    return figure
+
+
+def _mark_places(axes: Axes, study: Study) -> None:
+    sites = first_structure(study.problem, study.response).site
+    for place in places(study.problem, study.response):
+        _mark(axes, place, *sites[place.unit])
+
+
+def _mark(axes: Axes, place: Place, x: float, y: float) -> None:
+    size = 6.0 if isinstance(place.mark, tuple) else 3.6
+    axes.plot(
+        x, y, ls="", marker=place.mark, ms=size, mfc=CONTACT, mec="white", mew=0.5, zorder=9,
+        clip_on=False,
+    )  # fmt: skip
+
+
+def _contacts(study: Study, axes: Axes, row: Row, sample: int) -> None:
+    """Dots on the ligaments beside which a void is closed."""
+    part = row.part.isel(case=0)
+    structure = from_dataset(row.part, study.problem.lattice.spacing)
+    frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
+    touching = voids.closed(study.problem, part.isel(time=[sample]))[0]
+    x, y = voids.middles(structure, deformed(structure, frame))[touching].T
+    axes.plot(x, y, ls="", marker="o", ms=1.6, mfc=CONTACT, mec="none", zorder=8)
+
+
+def _places(figure: Figure, study: Study, top: float) -> None:
+    """u_y over time at each place, side by side."""
+    shown = places(study.problem, study.response)
+    path, rise = course(study.problem, study.response), study.response["displacement"].sel(dof="uy")
+    style.letter(figure, 0.0, top, "d", "Vertical displacement where marked in a")
+    whole = style.TWO_COLUMNS / max(len(shown), 1)
+    for k, place in enumerate(shown):
+        axes = style.place(figure, k * whole + 11.0, top + ROOM, whole - 14.0, 25.0)
+        path_axes(axes, path, "$u_y$ (mm)" if k == 0 else "")
+        curves = rise.isel(unit=place.unit)
+        structure_curves(axes, study.problem, path, curves, structures(study.response))
+        reach = 1.25 * float(np.abs(curves).max())
+        axes.set_ylim(-reach, reach)
+        size = 6.0 if isinstance(place.mark, tuple) else 4.0
+        axes.plot(
+            0.05, 0.9, ls="", marker=place.mark, ms=size, mfc=CONTACT, mec="white", mew=0.5,
+            transform=axes.transAxes,
+        )  # fmt: skip
+        if k == 0:
+            axes.legend(loc="lower left", handlelength=1.2, borderaxespad=0.2)
+
+
+def _whole(figure: Figure, study: Study, top: float) -> None:
+    """Mimicking error, and contacts on the edges, over time."""
+    path, half = course(study.problem, study.response), style.TWO_COLUMNS / 2
+    style.letter(figure, 0.0, top, "e", "Mimicking error")
+    error = style.place(figure, 11.0, top + ROOM, half - 14.0, 27.0)
+    measure_panel(error, study, path, measures.measure_of(study.problem))
+    style.letter(figure, half, top, "f", "Closed voids along the top and bottom edges")
+    count = style.place(figure, half + 11.0, top + ROOM, half - 14.0, 27.0)
+    path_axes(count, path, "number")
+    contacts = voids.edge_contacts(study.problem, study.response)
+    structure_curves(count, study.problem, path, contacts, structures(study.response))
+    count.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    count.set_ylim(0, 1.15 * max(float(contacts.max()), 1.0))

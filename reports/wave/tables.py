@@ -1,0 +1,71 @@
+"""Data tables of a wave: what the curves show, and the losses with shorter steps, as CSV."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from reports.fig2.tables import history, vertices
+from reports.path import measures
+from reports.path.course import structures
+from reports.path.curves import over_cases
+from reports.study import Study
+from reports.tables import Table
+from reports.wave.course import places
+from reports.wave.voids import edge_contacts
+
+Columns = dict[str, NDArray[Any]]
+
+
+def build(study: Study) -> list[Table]:
+    """All tables, in the order of the panels."""
+    tables = [
+        Table(
+            "design.csv",
+            "vertices of the cloaked and of the initial design",
+            vertices(study.design),
+        ),
+        Table("loss_history.csv", "loss against evaluation (panel b)", history(study.design)),
+        Table("waves.csv", "every structure over time (panels d to f)", over_time(study)),
+    ]
+    if study.verification is not None:
+        tables.append(
+            Table("steps.csv", "loss and error with shorter steps", steps(study.verification))
+        )
+    return tables
+
+
+def over_time(study: Study) -> Columns:
+    """One row a sample: u_y where marked, mimicking error, closed voids, energies."""
+    problem, response = study.problem, study.response
+    rise = response["displacement"].sel(dof="uy")
+    series = {
+        f"uy_{k + 1}_mm": rise.isel(unit=place.unit)
+        for k, place in enumerate(places(problem, response))
+    }
+    series |= {
+        "mimicking_error": measures.measure_of(problem).of(response),
+        "edge_contacts": edge_contacts(problem, response),
+        "strain_energy_Nmm": response["strain_energy"],
+        "contact_energy_Nmm": response["contact_energy"],
+        "min_void_angle_rad": response["min_void_angle"],
+    }
+    columns: Columns = {"time_s": response["time"].values}
+    for label, values in series.items():
+        mean = over_cases(problem, values)
+        for name in structures(response):
+            columns[f"{name}_{label}"] = mean.sel(structure=name).values
+    return columns
+
+
+def steps(verification: xr.Dataset) -> Columns:
+    """One row a check and structure."""
+    checks, names = verification["check"].values, verification["structure"].values
+    check, structure = np.meshgrid(checks, names, indexing="ij")
+    columns: Columns = {"check": check.ravel(), "structure": structure.ravel()}
+    for field in ("time_step", "loss", "error", "departure", "min_void_angle", "gap", "overlaps"):
+        columns[field] = verification[field].values.ravel()
+    return columns
