@@ -56,7 +56,7 @@ include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
-from pipeline.calibrated import calibrations, description, measurements
+include: "pipeline/rules/calibrate.smk"
 include: "pipeline/rules/compare.smk"
 include: "pipeline/rules/report.smk"
 include: "pipeline/rules/index.smk"
