@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
 PAGES := all index
-PRODUCTS := $(foreach product,fabrication recordings,$(addsuffix _$(product),$(STUDIES)))
+PRODUCTS := $(foreach product,fabrication recordings spectrum,$(addsuffix _$(product),$(STUDIES)))
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
@@ -16,6 +16,7 @@ help:
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make fig2_fabrication   drawings, meshes and papers of what is built: results/fig2/fabrication"
 	@echo "make fig2_recordings    videos of the specimens, tracked: results/fig2/recordings"
+	@echo "make fig7_spectrum      modes, transmission and waves of a study that asks for them"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make index     that page alone, over what is there"
 	@echo "make test      run the tests"

@@ -18,7 +18,7 @@ from pipeline.workflow import (
     figures,
 )
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
-from pipeline.workflow import package_pages, packages, section, shown, shown_options
+from pipeline.workflow import packages, product_pages, section, shown, shown_options
 from pipeline.workflow import targets
 
 min_version("9.20")
@@ -40,7 +40,13 @@ for target, built in targets().items():
         name:
             f"{target}_fabrication"
         input:
-            package_pages(built),
+            product_pages(built, "fabrication"),
+
+    rule:
+        name:
+            f"{target}_spectrum"
+        input:
+            product_pages(built, "spectrum"),
 
     rule:
         name:
@@ -54,6 +60,7 @@ include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
+include: "pipeline/rules/spectrum.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/calibrate.smk"

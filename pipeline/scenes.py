@@ -52,7 +52,7 @@ def scene_of(
     intact, altered = lattice_of(problem), altered_lattice_of(problem)
     interest = _units(problems.interest_units(problem))
     samples = problem.horizon.samples
-    material = _material(problem)
+    material = material_of(problem)
     scene = Scene(
         lattice=intact,
         material=material,
@@ -127,7 +127,8 @@ def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
     return lattice.positions(_units(problems.selected_units(problem.drive.units, problem.lattice)))
 
 
-def _material(problem: Problem) -> Material:
+def material_of(problem: Problem) -> Material:
+    """Constants of a problem's specimen, without those of an inclusion."""
     given = problem.material
     translation, rotation = problem.damping_coefficients
     return Material(

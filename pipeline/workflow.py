@@ -32,7 +32,7 @@ from pipeline.problem import (
     section_hash,
 )
 
-FABRICATION = "_fabrication"  # ends the targets that build what a lab makes
+PRODUCTS = ("_fabrication", "_spectrum", RECORDINGS)  # end the targets of more than the report
 ALL = "all"  # the target that builds every figure of the paper
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -124,10 +124,10 @@ def members(wildcards: Wildcards) -> list[str]:
     ]
 
 
-def package_pages(built: str) -> list[str]:
-    """The pages of what is built of a study, or of all studies of a figure."""
+def product_pages(built: str, product: str) -> list[str]:
+    """The pages of a product (fabrication, spectrum) of a study, or of all studies of a figure."""
     names = joints().get(built) or [Study.parse(built)]
-    return [f"results/{study}/fabrication/index.html" for study in names]
+    return [f"results/{study}/{product}/index.html" for study in names]
 
 
 def packages(wildcards: Wildcards) -> list[str]:
@@ -160,13 +160,17 @@ def asked_for(words: Collection[str]) -> list[Study]:
     names = {study.name for study in by_target.values()}
     together = joints()
     words = [*words, *(figures() if ALL in words else ())]
-    words = [word.removesuffix(FABRICATION).removesuffix(RECORDINGS) for word in words]
+    words = [_without_product(word) for word in words]
     found = [study for word in words for study in together.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
         if study.name in names:
             found.append(study)
     return found
+
+
+def _without_product(word: str) -> str:
+    return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
 
 
 def check_problems(words: Collection[str]) -> None:

@@ -20,6 +20,7 @@ from sim.energy import (
     contact_energy,
     contact_void_angles,
     ligament_energy,
+    ligament_strain,
 )
 from sim.errors import SimulationError
 from sim.lattice import Lattice
@@ -28,6 +29,8 @@ from sim.model import Topology, Values
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""
 STEPS, MAX_NEWTON = 20, 40
+CRUSHED = 0.5
+"""Change of a ligament's length, as a share of it, from which on its law means nothing."""
 
 
 class Cell(NamedTuple):
@@ -167,7 +170,30 @@ def strained(cell: Cell, gradient: Floats, free: Floats) -> Strained:
             )
     found = np.array(np.ravel(gradient), dtype=float)
     found[loose] = state[3 * cell.n_units :]
-    return Strained(state[: 3 * cell.n_units].reshape(-1, 3), found.reshape(2, 2))
+    made = Strained(state[: 3 * cell.n_units].reshape(-1, 3), found.reshape(2, 2))
+    if (worst := _crushed(cell, made)) > CRUSHED:
+        raise SimulationError(
+            f"a ligament of the unit cell would change its length by {worst:.0%}; try a smaller"
+            " strain"
+        )
+    return made
+
+
+def _crushed(cell: Cell, at: Strained) -> float:
+    """Largest change of length of a ligament, as a share of it."""
+    ends = zip(_pairs(cell, at), cell.arm, cell.vector, strict=True)
+    return max(
+        abs(float(ligament_strain(one, other, arm[0], arm[1], vector).stretch))
+        / float(np.linalg.norm(vector))
+        for (one, other), arm, vector in ends
+    )
+
+
+def _pairs(cell: Cell, at: Strained) -> Floats:
+    """Motion (n_ligaments, 2, 3) of the units at both ends of every ligament."""
+    shift = np.pad(cell.image @ at.gradient.T, ((0, 0), (0, 1)))
+    first, second = cell.joined.T
+    return np.stack([at.motion[first], at.motion[second] + shift], axis=1)
 
 
 def _admissible(energy: Callable[[Floats, Array], Array], state: Floats, change: Floats,
@@ -215,10 +241,7 @@ def bands(cell: Cell, wave_vectors: Floats, at: Strained | None = None) -> Float
         at: the equilibrium that the waves are about; by default rest.
     """
     state = Strained(np.zeros((cell.n_units, 3)), np.zeros((2, 2))) if at is None else at
-    shift = np.pad(cell.image @ state.gradient.T, ((0, 0), (0, 1)))
-    pairs = np.stack(
-        [state.motion[cell.joined[:, 0]], state.motion[cell.joined[:, 1]] + shift], axis=1
-    )
+    pairs = _pairs(cell, state)
     blocks = _pair_hessians(pairs, cell.arm, cell.vector, cell.void, cell.law, cell.contact)
     return np.array([_squares(cell, np.asarray(blocks), wave) for wave in wave_vectors])
 

@@ -121,21 +121,21 @@ def _signs(shapes: Floats) -> Floats:
     return np.asarray(np.sign(shapes[largest, np.arange(shapes.shape[1])]))
 
 
-def transmission(of: Linear, drive: Floats, frequencies: Floats) -> Complexes:
-    """Steady motion (n_frequencies, n_units, 3) under harmonic motion of the held dofs.
+def transmission(of: Linear, drives: Floats, frequencies: Floats) -> Complexes:
+    """Steady motion (n_frequencies, n_cases, n_units, 3) under harmonic motion of the held dofs.
 
     Args:
         of: the structure.
-        drive: (n_held,) amplitudes of the held dofs.
+        drives: (n_held, n_cases) amplitudes of the held dofs.
         frequencies: (n_frequencies,) angular, rad/s.
 
     Returns:
         complex amplitudes: the real part of their product with exp(i w t) is the motion.
     """
-    right = -(of.coupling @ drive)
-    out = np.zeros((len(frequencies), of.n_dofs), dtype=complex)
-    out[:, of.held] = drive
-    for row, w in zip(out, frequencies, strict=True):
+    right = -(of.coupling @ drives).astype(complex)
+    out = np.zeros((len(frequencies), drives.shape[1], of.n_dofs), dtype=complex)
+    out[..., of.held] = drives.T
+    for steady, w in zip(out, frequencies, strict=True):
         dynamic = of.stiffness + sp.diags_array(1j * w * of.damping - w**2 * of.mass)
-        row[of.free] = spla.spsolve(sp.csc_array(dynamic), right.astype(complex))
-    return out.reshape(len(frequencies), -1, 3)
+        steady[:, of.free] = spla.splu(sp.csc_array(dynamic)).solve(right).T
+    return out.reshape(*out.shape[:2], -1, 3)

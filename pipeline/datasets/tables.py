@@ -9,6 +9,7 @@ from pipeline.datasets.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
 from pipeline.datasets.responses import RESPONSE, SWEEP
+from pipeline.datasets.spectra import SPECTRUM
 from pipeline.datasets.tracks import RECORDED, TRACK, TRUTH
 from pipeline.datasets.trials import SCATTER, VERIFICATION
 from pipeline.datasets.variables import Table
@@ -22,6 +23,7 @@ Kind = Literal[
     "sweep",
     "scatter",
     "verification",
+    "spectrum",
     "track",
     "truth",
     "comparison",
@@ -35,6 +37,7 @@ TABLES: Mapping[Kind, Table] = {
     "sweep": SWEEP,
     "scatter": SCATTER,
     "verification": VERIFICATION,
+    "spectrum": SPECTRUM,
     "track": TRACK,
     "truth": TRUTH,
     "comparison": COMPARISON,
@@ -49,6 +52,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "sweep": {},
     "scatter": {},
     "verification": {},
+    "spectrum": {},
     "track": RECORDED,
     "truth": RECORDED,
     "comparison": COMPARED,
@@ -63,6 +67,7 @@ TITLES: Mapping[Kind, str] = {
     "sweep": "Loss over directions and frequencies of the drive",
     "scatter": "Responses of imperfect copies of a design",
     "verification": "Results with finer steps and with the other law of contact",
+    "spectrum": "Small vibrations of the structures, and waves in their unit cell",
     "track": "Motion of every unit in a video, with its uncertainty",
     "truth": "Motion of every unit that a synthetic video shows",
     "comparison": "Motion in a recording beside its simulation",

@@ -16,13 +16,14 @@ Stage = Literal[
     "scatter",
     "verify",
     "geometric",
+    "spectrum",
     "fabricate",
     "compare",
     "report",
 ]
 
 _WORDS = ("title", "doc", "report")
-_APART = (*_WORDS, "prediction")
+_APART = (*_WORDS, "prediction", "spectrum")
 _UNUSED: dict[Stage, tuple[str, ...]] = {
     "design": (*_APART, "response", "sweep", "robustness", "fabrication"),
     "simulate": (*_APART, "sweep", "robustness", "fabrication"),
@@ -30,8 +31,18 @@ _UNUSED: dict[Stage, tuple[str, ...]] = {
     "scatter": (*_APART, "response", "sweep", "fabrication"),
     "verify": (*_APART, "response", "sweep", "robustness", "fabrication"),
     "geometric": (*_APART, "response", "sweep", "robustness", "fabrication"),
-    "fabricate": ("doc", "report", "solver", "response", "sweep", "robustness", "prediction"),
-    "compare": (*_WORDS, "response", "sweep", "fabrication"),
+    "spectrum": (*_WORDS, "prediction", "response", "sweep", "robustness", "fabrication"),
+    "fabricate": (
+        "doc",
+        "report",
+        "solver",
+        "prediction",
+        "spectrum",
+        "response",
+        "sweep",
+        "robustness",
+    ),
+    "compare": (*_WORDS, "spectrum", "response", "sweep", "fabrication"),
     "report": (),
 }
 

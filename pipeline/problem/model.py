@@ -33,6 +33,7 @@ from pipeline.problem.regions import CloakRegion, Region, VoidRegion
 from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Selector
+from pipeline.problem.spectrum import Spectrum
 
 UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
 UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
@@ -320,6 +321,8 @@ class Problem(Section):
         response: how much of it is shown.
         sweep: the robustness map, if there is to be one.
         robustness: trials of imperfect copies, if there are to be any.
+        prediction: by how much specimens and constants may be off.
+        spectrum: analysis of small vibrations, if there is to be one.
         report: choices of figure and page.
         fabrication: how it is made.
     """
@@ -343,6 +346,7 @@ class Problem(Section):
     sweep: Sweep | None = None
     robustness: Robustness | None = None
     prediction: Prediction = Prediction()
+    spectrum: Spectrum | None = None
     report: Report = Report()
     fabrication: Fabrication = Fabrication()
 

@@ -39,6 +39,12 @@ SIZES = {
     "with_parameter": 4,
     "set": 3,
     "point": 20,
+    "state": 2,
+    "mode": 4,
+    "excitation": 5,
+    "compression": 2,
+    "wave": 7,
+    "band": 12,
 }
 
 

@@ -67,6 +67,8 @@ def test_strain_changes_the_bands_and_keeps_them_real(cell: Cell) -> None:
 def test_a_strain_beyond_the_contacts_is_refused(cell: Cell) -> None:
     with pytest.raises(SimulationError, match="no equilibrium"):
         strained(cell, np.diag([-0.6, -0.6]), NO_LOOSE)
+    with pytest.raises(SimulationError, match="change its length"):
+        strained(cell, np.diag([-0.7, 0.0]), np.diag([0.0, 1.0]))
 
 
 def test_a_lattice_that_does_not_repeat_has_no_cell() -> None:

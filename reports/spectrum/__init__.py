@@ -1,0 +1,1 @@
+"""The page on small vibrations: modes, transmission, waves in the unit cell."""
