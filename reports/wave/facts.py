@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from pipeline.problem.drives import Harmonic, RampHarmonic
+from pipeline.problem.drives import RampHarmonic
 from reports import checks
 from reports.facts import Fact, grouped, number, share, within, worded
 from reports.path import measures
@@ -36,11 +36,8 @@ def collect(study: Study) -> list[Fact]:
 
 
 def drive_facts(study: Study) -> Iterator[Fact]:
-    """How the structures are shaken."""
+    """How the drive is switched on."""
     drive = study.problem.drive
-    if isinstance(drive, Harmonic | RampHarmonic):
-        yield number("amplitude", "Amplitude A", drive.amplitude, "mm")
-        yield number("frequency", "Frequency f", drive.frequency, "Hz")
     if isinstance(drive, RampHarmonic):
         note = "A (1 + tanh((t − delay)/rise))/2 sin(2πf (t − delay))"
         yield number("delay", "Delay of the drive", 1e3 * drive.delay, "ms", note=note)
@@ -99,7 +96,7 @@ def edge_facts(study: Study) -> Iterator[Fact]:
         words = display_name(study.problem, name).lower()
         of_one = counts.sel(structure=name)
         time = 100.0 * float((of_one > 0).mean())
-        note = f"of the ligaments there; at least one in {time:.1f} % of the time"
+        note = f"along the top and bottom edges; at least one in {time:.1f} % of the time"
         label = f"Closed voids at once, {words}, most"
         yield number(f"edge_contacts_{name}", label, int(of_one.max()), note=note)
 

@@ -64,9 +64,9 @@ QUANTITIES = ("design", "stiffness", "density", "damping", "drive")
 
 
 @cache
-def shaken(bias_deg: float = 20.0, recorded: bool = False) -> Rig:
+def shaken(bias_deg: float = 20.0, recorded: bool = False, amplitude: float = 2.0) -> Rig:
     """5 x 5 squares with clamped corners, the middle shaken for 1.8 periods of 150 Hz."""
-    motion = measured() if recorded else Harmonic(2.0, 150.0, 0.6, rise=0.0015, delay=0.003)
+    motion = measured() if recorded else Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
     return Rig(rotating_squares(5, bias_deg), np.array([0, 4, 20, 24]), np.array([12]), motion)
 
 
@@ -213,6 +213,16 @@ def test_motions_in_contact(solver: str, quantity: str) -> None:
     for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
         np.testing.assert_array_equal(ray.in_contact(step, EVERYWHERE), pattern)
     assert_exact_in_contact(ray)
+
+
+@pytest.mark.parametrize("quantity", ["design", "contact", "drive"])
+def test_motions_deep_in_contact(quantity: str) -> None:
+    """Voids that close to their barrier, followed by many finer steps."""
+    rig = shaken(bias_deg=45.0, amplitude=3.0)
+    ray = Ray(rig, SOLVERS["blanes_moan"](rig), quantity)
+    states = np.asarray(simulate(ray.solver, rig.values, (rig.drive,)).displacement[0])
+    assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
+    assert ray.slope == pytest.approx(ray.difference(1e-7), rel=1e-3)
 
 
 @pytest.mark.parametrize("quantity", ["design", "drive"])

@@ -1,0 +1,119 @@
+"""Waves by the explicit method at the steps that a plan chooses: agreement, energy, memory."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.arrays import Floats
+from sim.dynamics import solve_case
+from sim.evaluation import objective
+from sim.explicit import ExplicitSolver
+from sim.lattice import quads
+from sim.loads import Harmonic, TimeSeries
+from sim.modes import highest_frequency
+from sim.plan import concrete_parameters, make_plan
+from sim.potential import gradient
+from sim.scene import Scene
+from sim.splitting import BLANES_MOAN
+from sim.system import system_of, workspace
+from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, NONE, Rig, rotating_squares
+
+SIDE = 12
+HOLE = np.array([65, 66, 77, 78])
+
+
+def shaken_lattice() -> Scene:
+    """12 x 12 squares without the middle ones, shaken along the left edge until voids close."""
+    intact = quads(SIDE, SIDE, 15.0, 2.25, np.deg2rad(20.0))
+    kept = np.setdiff1d(np.arange(SIDE**2), HOLE)
+    left = SIDE * np.arange(SIDE)
+    whole = Scene(
+        lattice=intact,
+        material=MATERIAL,
+        barrier=BARRIER,
+        cutoff=CUTOFF,
+        clamped=NONE,
+        driven=left,
+        motions=(Harmonic(4.5, 30.0, 0.0, rise=0.01, delay=0.015),),
+        weights=np.ones(1),
+        duration=0.07,
+        frequency=30.0,
+        static=False,
+        cloak=NONE,
+        region=kept,
+        samples=71,
+    )
+    holed = intact.without(HOLE)
+    places = holed.positions(kept)
+    return replace(
+        whole, lattice=holed, driven=holed.positions(left), region=places, reference=whole
+    )
+
+
+def motion(scene: Scene, finer: int = 1) -> tuple[Floats, Floats]:
+    """Displacement (n_asked, n_units, 3), and smallest void angle at each time."""
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    solver = make_plan(scene, scene.lattice.vertices).solver
+    assert isinstance(solver, ExplicitSolver)
+    finer_solver = replace(solver, n_steps=finer * solver.n_steps)
+    states = solve_case(finer_solver, values, scene.drives[0])[0].reshape(scene.samples, -1, 3)
+    return states, scene.topology.smallest_void_angle(values.void, states)
+
+
+def loss(scene: Scene, whole: Floats, part: Floats) -> float:
+    """Of a holed lattice whose intact one moves as ``whole``."""
+    assert scene.reference is not None
+    measure = objective(scene, whole[None][:, :, scene.reference.region])
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    return float(measure(part[None], values)[0])
+
+
+def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
+    holed = shaken_lattice()
+    assert holed.reference is not None
+    (whole, closed), (part, _) = motion(holed.reference), motion(holed)
+    (fine_whole, _), (fine_part, _) = motion(holed.reference, 6), motion(holed, 6)
+    assert BARRIER < closed.min() < CUTOFF
+    for coarse, fine in ((whole, fine_whole), (part, fine_part)):
+        np.testing.assert_allclose(coarse, fine, atol=1e-2 * np.abs(fine).max())
+    exact = loss(holed, fine_whole, fine_part)
+    assert exact > 0.05
+    assert loss(holed, whole, part) == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("bias_deg", "drift"), [(20.0, 1e-3), (40.0, 1e-2)], ids=["free", "in contact"]
+)
+def test_energy_does_not_drift_in_1e5_steps(bias_deg: float, drift: float) -> None:
+    """At half the stability limit, undamped, after the drive has come to rest."""
+    push = TimeSeries(np.array([0.0, 1e-3, 1e3]), np.array([[0.0] * 3, *[[1.0, 0.5, 0.05]] * 2]))
+    rig = Rig(rotating_squares(3, bias_deg), np.array([0]), np.array([4]), push)
+    values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
+    frequency = highest_frequency(rig.topology, values, touching=NONE)
+    step = 0.5 * BLANES_MOAN.stability / frequency
+    n_steps, n_asked = 100_000, 200
+    asked = np.asarray(step * np.arange(500, n_steps + 1, n_steps // n_asked))
+    solver = ExplicitSolver(rig.topology, n_steps * step, n_steps, asked)
+    u, v, record = solver.forward(values, rig.drive)
+    assert record.steps.n_steps == n_steps
+    v[:, rig.topology.held] = 0.0
+    system = system_of(rig.topology, values)
+    work = workspace(system)
+    potential = np.array([sum(gradient(state, system, work.turn, work.force)) for state in u])
+    energy = potential + 0.5 * v**2 @ values.mass.ravel()
+    closed = rig.topology.smallest_void_angle(values.void, u.reshape(len(u), -1, 3)).min()
+    assert (closed < CUTOFF) == (bias_deg > 20.0)
+    np.testing.assert_allclose(energy, energy[0], rtol=drift)
+
+
+def test_memory_of_the_adjoint_grows_with_the_root_of_the_steps() -> None:
+    rig = Rig(rotating_squares(3), np.array([0]), np.array([4]), Harmonic(0.1, 30.0))
+    solver = ExplicitSolver(rig.topology, 0.01, 400, np.array([0.01]))
+    _, _, record = solver.forward(rig.values, rig.drive)
+    assert record.steps.n_steps == solver.n_steps
+    assert record.checkpoints.nbytes < solver.adjoint_memory()
+    longer = replace(solver, n_steps=100 * solver.n_steps)
+    assert longer.adjoint_memory() == pytest.approx(10 * solver.adjoint_memory(), rel=0.1)
