@@ -4,7 +4,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
-PAGES := all index
+PAGES := all index movies
 PRODUCTS := $(foreach product,fabrication recordings spectrum,$(addsuffix _$(product),$(STUDIES)))
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
@@ -19,6 +19,7 @@ help:
 	@echo "make fig7_spectrum      modes, transmission and waves of a study that asks for them"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make index     that page alone, over what is there"
+	@echo "make movies    the paper's movies: results/movies"
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"

@@ -18,8 +18,9 @@ from pipeline.workflow import (
     figures,
 )
 from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
-from pipeline.workflow import packages, product_pages, section, shown, shown_options
-from pipeline.workflow import targets
+from pipeline.workflow import movies, packages, product_pages, section, shown
+from pipeline.workflow import screened, screened_comparisons, screened_hashes
+from pipeline.workflow import shown_options, targets
 
 min_version("9.20")
 
@@ -66,4 +67,5 @@ include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/calibrate.smk"
 include: "pipeline/rules/compare.smk"
 include: "pipeline/rules/report.smk"
+include: "pipeline/rules/movies.smk"
 include: "pipeline/rules/index.smk"

@@ -21,7 +21,8 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
-from pipeline.filmed import RECORDINGS
+from pipeline.filmed import RECORDINGS, shown_recordings
+from pipeline.movies import MOVIES
 from pipeline.problem import (
     Problem,
     Stage,
@@ -113,6 +114,40 @@ def targets() -> dict[str, str]:
 def figures() -> list[str]:
     """The studies that are figures of the paper, by their names."""
     return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
+
+
+def movies() -> dict[str, list[Study]]:
+    """The movies whose studies are there, with these studies."""
+    there = {study.name for study in studies()}
+    return {
+        name: [Study(each) for each in shown]
+        for name, shown in MOVIES.items()
+        if there.issuperset(shown)
+    }
+
+
+def screened(wildcards: Wildcards) -> list[str]:
+    """The datasets that a movie shows."""
+    return [
+        f"results/{study}/{name}.nc"
+        for study in movies()[wildcards.movie]
+        for name in outputs(problem_of(study))
+    ]
+
+
+def screened_comparisons(wildcards: Wildcards) -> list[str]:
+    """Its recordings beside their simulation."""
+    return [
+        f"results/{study}/recordings/{name}/comparison.nc"
+        for study in movies()[wildcards.movie]
+        for name in shown_recordings(str(study))
+    ]
+
+
+def screened_hashes(wildcards: Wildcards) -> str:
+    """Hash of what it depends on in the problem files of its studies."""
+    of_each = (problem_of(study) for study in movies()[wildcards.movie])
+    return " ".join(section_hash(problem, "report") for problem in of_each)
 
 
 def members(wildcards: Wildcards) -> list[str]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -14,6 +13,7 @@ from reports import content
 from reports.content import Words
 from reports.facts import Fact
 from reports.page import Page
+from reports.player import Reel, payload
 from reports.study import Study
 from reports.tables import Table
 
@@ -27,21 +27,21 @@ class Kind:
         tables: what the curves show.
         figure: the figure at two-column width.
         words: what the page says of itself.
-        animation: data of the page's player.
+        animation: what the page's player and movies show.
     """
 
     facts: Callable[[Study], list[Fact]]
     tables: Callable[[Study], list[Table]]
     figure: Callable[[Study], Figure]
     words: Callable[[Study], Words]
-    animation: Callable[[Study], Mapping[str, Any]]
+    animation: Callable[[Study], Reel]
 
     def page(
         self, study: Study, facts: Sequence[Fact], tables: Sequence[Table], svg: str,
         figure_files: Sequence[str],
     ) -> Page:  # fmt: skip
         """The page of a study, of which everything else has been made."""
-        words, player = self.words(study), self.animation(study)
+        words, player = self.words(study), payload(self.animation(study))
         return content.page(study, words, facts, tables, player, svg, figure_files)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import xarray as xr
 
+from pipeline.movies import showing
 from reports import citation, claims, templating
 from reports.claims import Judged
 from reports.facts import ABSENT, Fact
@@ -79,6 +80,7 @@ def render(page: Page) -> str:
     values = dict(vars(page))
     values["quotes"] = any(fact.paper != ABSENT for fact in page.facts)
     values["synthetic"] = LABEL if any(each.synthetic for each in page.recordings) else ""
+    values["movies"] = showing(page.targets)
     values["tables"] = [_link(table) for table in page.tables]
     values["svg"] = templating.inlined(page.svg)
     values["verdict"] = claims.verdict(page.claims)

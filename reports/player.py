@@ -115,16 +115,32 @@ def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
     return np.union1d(np.arange(0, n_frames, stride), n_frames - 1)
 
 
-def payload(
-    axis: Axis,
-    cases: Sequence[str],
-    clips: Sequence[Clip],
-    fields: Sequence[Field],
-    discs: Sequence[Disc] = (),
-    start: int = 0,
-    pad: float = 0.0,
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Reel:
+    """What plays: structures side by side under their load cases, along one axis.
+
+    Attributes:
+        axis: what the slider runs over.
+        cases: labels of the load cases.
+        clips: the structures with their motions.
+        fields: what may colour them, the default first.
+        discs: circles on all of them.
+        start: the case shown first.
+        pad: side of the squares under clamped units, mm.
+    """
+
+    axis: Axis
+    cases: Sequence[str]
+    clips: Sequence[Clip]
+    fields: Sequence[Field]
+    discs: Sequence[Disc] = ()
+    start: int = 0
+    pad: float = 0.0
+
+
+def payload(reel: Reel) -> dict[str, Any]:
     """The player's data as an object ready for JSON; frames are thinned to fit the page."""
+    axis, clips = reel.axis, reel.clips
     frames = kept_frames(len(axis.values), sum(clip.weight for clip in clips))
     return {
         "axis": {
@@ -137,15 +153,15 @@ def payload(
             "values": encoded(axis.values[frames], "<f4"),
         },
         "speeds": [{"label": label, "rate": rate} for label, rate in axis.speeds.items()],
-        "cases": list(cases),
-        "start": start,
-        "pad": pad,
+        "cases": list(reel.cases),
+        "start": reel.start,
+        "pad": reel.pad,
         "structures": [_structure(clip) for clip in clips],
         "motion": [_cases(clip.motion, frames) for clip in clips],
         "residual": [_cases(clip.residual, frames) for clip in clips],
-        "fields": [_field(field, clips) for field in fields],
+        "fields": [_field(field, clips) for field in reel.fields],
         "maps": {name: _levels(COLOUR_MAPS[name]) for name in sorted(COLOUR_MAPS)},
-        "circles": [vars(disc) for disc in discs],
+        "circles": [vars(disc) for disc in reel.discs],
     }
 
 

@@ -162,6 +162,25 @@ def load(
     )
 
 
+def built(path: Path, preset: str | None, results: Path, recordings: Sequence[str] = ()) -> Study:
+    """The study of a problem file, its datasets where the workflow puts them below `results`.
+
+    Args:
+        path: the problem file.
+        preset: one of its presets.
+        results: the folder of all results.
+        recordings: names of those that are shown.
+
+    Raises:
+        UserError: as for `load`.
+    """
+    name = path.resolve().parent.name
+    folder = results / (name if preset is None else f"{name}@{preset}")
+    wanted = problem.outputs(problem.load(path, preset))
+    compared = [folder / f"recordings/{each}/comparison.nc" for each in recordings]
+    return load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}, compared)
+
+
 def _check_problem(chosen: Problem, name: Output, data: xr.Dataset, path: Path) -> None:
     posed = contacts.geometric(chosen) if name == "geometric_response" else chosen
     wanted = problem.section_hash(posed, STAGES[name])

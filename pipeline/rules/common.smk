@@ -7,6 +7,7 @@ wildcard_constraints:
     method=r"\w+",
     recording=r"\w+",
     calibration=r"\w+",
+    movie=r"S\d",
     chunk=r"\d+",
     law=r"(geometric_)?",
     structure="intact|altered|cloaked",

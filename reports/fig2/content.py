@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from reports import beside, measures, style
 from reports.content import Words
 from reports.fig2.facts import MONITORED
-from reports.player import Axis, Clip, Disc, Field, payload, round_up
+from reports.player import Axis, Clip, Disc, Field, Reel, round_up
 from reports.scene import Scene
 from reports.structure import DRIVEN, from_dataset, middle_of_top_edge
 from reports.study import Study
@@ -40,8 +39,8 @@ def words(study: Study) -> Words:
     )
 
 
-def animation(study: Study) -> dict[str, Any]:
-    """The player's data: altered and cloaked structures under every load."""
+def animation(study: Study) -> Reel:
+    """What the player shows: altered and cloaked structures under every load."""
     scene, response = study.scene, study.response
     clips: list[Clip] = []
     times = response["time"].values
@@ -59,7 +58,7 @@ def animation(study: Study) -> dict[str, Any]:
     discs = [Disc(*scene.middle, radius, style.CLOAKED) for radius in scene.radii]
     start = measures.nearest_case(response, MONITORED)
     fields = _fields(scene, clips)
-    return payload(axis, angles, clips, fields, discs, start=start, pad=scene.spacing)
+    return Reel(axis, angles, clips, fields, discs, start=start, pad=scene.spacing)
 
 
 def _fields(scene: Scene, clips: Sequence[Clip]) -> list[Field]:

@@ -40,6 +40,7 @@ def page(results: Path) -> str:
         "others": [(each, thumbnail(each.picture)) for each in built if not each.figure],
         "tables": tables(built),
         "source": claims.listed().source,
+        "movies": found.others(results, "movies", "*.mp4"),
         "benchmark": found.others(results, "benchmark", "*.*"),
         "datasets": [each for study in built for each in study.datasets],
         "made": _made(),

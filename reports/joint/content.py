@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from pipeline.problem import canonical_json
 from pipeline.problem.joint import Joint
@@ -17,7 +16,7 @@ from reports.path import facts as path_facts
 from reports.path import measures, tables
 from reports.path.content import axis, fields, marks
 from reports.path.course import course, display_name, structures
-from reports.player import Clip, payload
+from reports.player import Clip, Reel, payload
 from reports.publishing import Parts
 from reports.structure import from_dataset
 from reports.study import Study
@@ -70,7 +69,7 @@ def page(
 ) -> Page:
     """The page, of which everything else has been made."""
     by_key = {fact.key: fact for fact in known}
-    player = animation(studies)
+    player = payload(animation(studies))
     problems = {study.name: json.loads(canonical_json(study.problem)) for study in studies}
     draft = list(dict.fromkeys(reason for study in studies for reason in study.draft))
     headline = []
@@ -127,8 +126,8 @@ def caption(studies: Sequence[Study]) -> str:
     )
 
 
-def animation(studies: Sequence[Study]) -> dict[str, Any]:
-    """The player's data: every structure along the first study's path; equal intact ones once."""
+def animation(studies: Sequence[Study]) -> Reel:
+    """What plays: every structure along the first study’s path; equal intact ones once."""
     first = studies[0]
     way, times = course(first.problem, first.response), first.response["time"]
     clips = []
@@ -146,4 +145,4 @@ def animation(studies: Sequence[Study]) -> dict[str, Any]:
             clips.append(Clip(label, colour, shape, values))
     colours = max((fields(study) for study in studies), key=lambda found: found[0].limits[1])
     cases = [f"α = {angle:g}°" for angle in first.response["direction"].values]
-    return payload(axis(way), cases, clips, colours, pad=first.problem.lattice.spacing)
+    return Reel(axis(way), cases, clips, colours, pad=first.problem.lattice.spacing)

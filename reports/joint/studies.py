@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline import problem
 from pipeline.errors import UserError
 from pipeline.problem.joint import Joint
 from reports import study
@@ -20,9 +19,7 @@ def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[
     found = []
     for name in asked.studies:
         path = figure.parent.parent / name / "problem.yaml"
-        folder = results / (name if preset is None else f"{name}@{preset}")
-        wanted = problem.outputs(problem.load(path, preset))
-        found.append(study.load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}))
+        found.append(study.built(path, preset, results))
     for each in found:
         if not each.problem.static:
             raise UserError(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,15 +12,15 @@ from reports.content import Words
 from reports.path import measures
 from reports.path.course import Course, course, display_name, structures
 from reports.path.structures import shade_of
-from reports.player import Axis, Clip, Field, payload, round_up
+from reports.player import Axis, Clip, Field, Reel, round_up
 from reports.structure import from_dataset
 from reports.study import Study
 
 _SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
 
 
-def animation(study: Study) -> dict[str, Any]:
-    """The player's data: every structure along the path."""
+def animation(study: Study) -> Reel:
+    """What the player shows: every structure along the path."""
     path, response = course(study.problem, study.response), study.response
     spacing = study.problem.lattice.spacing
     clips: list[Clip] = []
@@ -37,7 +36,7 @@ def animation(study: Study) -> dict[str, Any]:
         own = [each for each in study.recordings if each.structure == name]
         clips += [*beside.clips(own, simulated, path.values, spacing), simulated]
     cases = [f"α = {angle:g}°" for angle in response["direction"].values]
-    return payload(axis(path), cases, clips, fields(study), pad=spacing)
+    return Reel(axis(path), cases, clips, fields(study), pad=spacing)
 
 
 def axis(path: Course) -> Axis:

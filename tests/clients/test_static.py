@@ -14,7 +14,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 from reports import kinds
 from reports.fig2 import facts
 from reports.page import render
-from reports.player import Axis, Clip, Field, payload
+from reports.player import Axis, Clip, Field, Reel, payload
 from reports.structure import from_dataset
 from tests.clients.conftest import Open
 from tests.reports import synthetic
@@ -31,7 +31,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     motion = np.zeros((1, 4, structure.n_units, 3))
     motion[0, :, :, 0] = -0.05 * loads[:, None] * structure.site[:, 0] / 15.0
     motion[0, 1:, LOST] = np.nan
-    player = payload(
+    reel = Reel(
         Axis("load", "mm", loads, 1, False, {"slow": 2.0, "fast": 50.0}),
         ["compression"],
         [Clip("Cloaked", "#6f3fa0", structure, motion)],
@@ -39,7 +39,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     whole = kinds.of(study.problem).page(study, facts.collect(study), [], "<svg/>", [])
     path = folder / "index.html"
-    path.write_text(render(dataclasses.replace(whole, player=player)), encoding="utf-8")
+    path.write_text(render(dataclasses.replace(whole, player=payload(reel))), encoding="utf-8")
     return path
 
 

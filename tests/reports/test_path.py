@@ -14,6 +14,7 @@ from reports.build import publish
 from reports.fig2 import facts as shielding
 from reports.path import content, course, figure, measures, scatter
 from reports.path import facts as path_facts
+from reports.player import payload
 from reports.study import Study
 from tests.reports import pictures, static
 
@@ -202,7 +203,7 @@ def test_a_jump_is_marked_and_counted(shield: Study) -> None:
 
 
 def test_absent_units_are_not_in_the_player(smile: Study) -> None:
-    intact, voided, _ = content.animation(smile)["structures"]
+    intact, voided, _ = payload(content.animation(smile))["structures"]
     count = [len(part["owner"]) for part in (intact, voided)]
     assert count[0] - count[1] == pytest.approx(18 * 4 * 4 * 4 / 3, abs=4)  # base64 of int32
     assert voided["name"] == "Voided"

@@ -9,7 +9,7 @@ import pytest
 
 from reports import player
 from reports.fig2.content import animation
-from reports.player import Axis, Clip, Field, payload
+from reports.player import Axis, Clip, Field, Reel, payload
 from reports.structure import Structure
 from reports.study import Study
 
@@ -32,11 +32,11 @@ def clip(motion: np.ndarray) -> Clip:
 def static(motion: np.ndarray) -> dict[str, Any]:
     axis = Axis("load", "mm", np.linspace(0, 5, motion.shape[1]), 2, False, {"slow": 1.0})
     field = Field("uy", "u_y", "mm", 1.0, "signed", (-1.0, 1.0))
-    return payload(axis, ["compression"], [clip(motion)], [field])
+    return payload(Reel(axis, ["compression"], [clip(motion)], [field]))
 
 
 def test_motion_is_right_within_the_stated_error(study: Study) -> None:
-    data = animation(study)
+    data = payload(animation(study))
     shift, turn = player.quantisation_error(data)
     assert shift < 1e-4
     assert turn < 1e-5
@@ -52,7 +52,7 @@ def test_motion_is_right_within_the_stated_error(study: Study) -> None:
 
 
 def test_axis_keeps_both_ends(study: Study) -> None:
-    data = animation(study)
+    data = payload(animation(study))
     values = decoded(data["axis"]["values"], "<f4")
     assert values[0] == 0.0
     assert values[-1] == np.float32(2.0)
@@ -92,7 +92,7 @@ def test_a_static_study_needs_no_time() -> None:
 
 
 def test_polygons_are_whole(study: Study) -> None:
-    shape = animation(study)["structures"][1]
+    shape = payload(animation(study))["structures"][1]
     centroid = decoded(shape["centroid"], "<f4").reshape(-1, 2)
     owner = decoded(shape["owner"], "<i4")
     corners = decoded(shape["arm"], "<f4").reshape(-1, 2) + centroid[owner]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from reports import kinds, page, style
 from reports.facts import Fact
+from reports.player import payload
 from reports.recorded import LABEL
 from reports.study import Study, load
 from tests.reports import compared, pictures, static
@@ -97,7 +98,7 @@ def test_the_player_shows_it_under_its_own_load_with_the_residual(
     filmed: dict[str, Study],
 ) -> None:
     study = filmed["shaken"]
-    data = kinds.of(study.problem).animation(study)
+    data = payload(kinds.of(study.problem).animation(study))
     names = [clip["name"] for clip in data["structures"]]
     assert names[:2] == [f"Altered, experiment ({LABEL})", "Altered"]
     cases = data["motion"][0]

@@ -1,0 +1,1 @@
+"""Movies of the studies: structures side by side under their loads."""
