@@ -6,10 +6,14 @@ BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
 PAGES := all index movies
 PRODUCTS := $(foreach product,fabrication recordings spectrum,$(addsuffix _$(product),$(STUDIES)))
+# A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
+WHEELS ?=
+OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
+PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup test test-slow clients lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup wheels test test-slow pythons clients docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
@@ -26,7 +30,10 @@ help:
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
-	@echo "make setup     only make .venv from requirements.lock"
+	@echo "make setup     only make .venv from requirements.lock; with WHEELS=folder, from that folder alone"
+	@echo "make wheels WHEELS=folder   download what make setup needs into the folder"
+	@echo "make docs      the documentation as a site: results/docs/index.html"
+	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make lock      renew requirements.lock from pyproject.toml (with Python 3.11)"
 	@echo "make clean     remove results and caches (.venv stays)"
 
@@ -42,8 +49,13 @@ setup: .venv/requirements.lock
 	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE) -r requirements.lock
 	@cp requirements.lock $@
+
+# Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
+wheels:
+	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements.lock \
+	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
 	@exec $(BIN)/python -m pipeline.run $@
@@ -57,7 +69,13 @@ $(foreach study,$(STUDIES),$(study)@%): setup
 	@exec $(BIN)/python -m pipeline.run $@
 
 test: setup
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/slow
+	$(BIN)/python -m pytest $(PYTEST)
+
+pythons:
+	@.ci/pythons
+
+docs: setup
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 test-slow: setup
 	$(BIN)/python -m pytest tests/slow

@@ -15,3 +15,10 @@ wildcard_constraints:
 
 onstart:
     check_room("results")
+
+
+# What was built, and the caches of compiled solvers and plots.
+rule clean:
+    localrule: True
+    shell:
+        "rm -rf results .cache"

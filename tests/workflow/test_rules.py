@@ -153,3 +153,10 @@ def test_full_disk_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     with pytest.raises(SystemExit, match="No space left on device"):
         check_room(str(tmp_path))
     assert not list(tmp_path.iterdir())
+
+
+def test_clean_removes_what_was_built_and_nothing_else(built: Sandbox) -> None:
+    ended = built.run("clean")
+    assert ended.returncode == 0, ended.stderr
+    assert not (built.root / "results").exists()
+    assert built.problem.exists()

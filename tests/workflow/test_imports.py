@@ -1,0 +1,21 @@
+"""Every module can be imported, on each Python."""
+
+from __future__ import annotations
+
+import importlib
+
+import pytest
+
+from pipeline.environment import ROOT
+
+MODULES = sorted(
+    ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    for room in ("sim", "pipeline", "reports", "benchmarks")
+    for path in (ROOT / room).rglob("*.py")
+    if path.name not in ("__init__.py", "__main__.py")
+)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_import(module: str) -> None:
+    assert importlib.import_module(module).__name__ == module
