@@ -98,8 +98,8 @@ class Checkout:
     def make(self, target: str = STUDY, first: str = "") -> Ended:
         return self._run(["make", *_NO_SETUP, target], first)
 
-    def snakemake(self, target: str = STUDY) -> Ended:
-        return self._run([".venv/bin/snakemake", target])
+    def snakemake(self, *words: str) -> Ended:
+        return self._run([".venv/bin/snakemake", *(words or (STUDY,))])
 
     def stage(self, module: str, *words: str, first: str = "") -> Ended:
         problem = f"experiments/{STUDY}/problem.yaml"

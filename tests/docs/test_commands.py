@@ -1,0 +1,117 @@
+"""No page tells a command that there is not: every one is run, or planned as far as it can be.
+
+Pages that are walked through (tests/e2e/test_pages.py, tests/slow/test_pages.py) have all
+commands run. Of every other page, targets are planned by make and by Snakemake, and the options of
+stages are read by their own parsers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import runpy
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from pipeline import new
+from pipeline.environment import ROOT
+from tests.docs.pages import WALKED, Command, commands, inline
+from tests.e2e.checkout import Checkout
+
+COMMANDS = list(commands())
+PYTHON = (".venv/bin/python", "-m")
+REFUSED = "fig2@edge4"
+"""A preset that is not there, for the message that it is told with."""
+
+
+def of(*programs: str) -> list[Command]:
+    return [each for each in COMMANDS if each.words[0] in programs]
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
+    """The repository with the study that the tutorials make."""
+    made = Checkout.made(tmp_path_factory.mktemp("docs") / "checkout")
+    shutil.rmtree(made.root / "experiments/logo", ignore_errors=True)
+    assert new.main(["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
+    (made.root / "experiments/logo/recordings").mkdir()
+    return made
+
+
+def test_there_are_commands_to_test() -> None:
+    assert len(COMMANDS) > 40
+    assert {"README.md", "docs/tutorial.md", "docs/install.md"} <= {each.page for each in COMMANDS}
+
+
+@pytest.mark.parametrize("command", of("make"), ids=lambda each: each.text[:40])
+def test_make_knows_its_targets(command: Command, checkout: Checkout) -> None:
+    planned = subprocess.run(
+        ["make", "--dry-run", *command.words[1:]],
+        cwd=checkout.root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert planned.returncode == 0, planned.stderr
+
+
+def test_snakemake_plans_its_targets(checkout: Checkout) -> None:
+    known = set(checkout.snakemake("--list-target-rules").stdout.split())
+    asked = {
+        target
+        for command in COMMANDS
+        if command.words[0].endswith(("make", "snakemake"))
+        for target in command.targets
+    }
+    built = (asked & known) - {"clean"}
+    planned = checkout.snakemake("--dry-run", *sorted(built))
+    assert planned.returncode == 0, planned.stderr
+    assert len(built) > 12
+    for command in of(".venv/bin/snakemake", "snakemake"):
+        assert set(command.targets) <= known
+
+
+class ReadError(Exception):
+    """The parser has read its options: enough."""
+
+
+@pytest.mark.parametrize(
+    "command",
+    [each for each in COMMANDS if tuple(each.words[:2]) == PYTHON],
+    ids=lambda each: each.text[17:70],
+)
+def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: Callable[..., Any] = argparse.ArgumentParser.parse_args
+
+    def only_read(parser: argparse.ArgumentParser, *given: Any) -> None:  # noqa: ANN401
+        read(parser, *given)
+        raise ReadError
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", only_read)
+    module, *options = command.words[2:]
+    monkeypatch.setattr(sys, "argv", [module, *options])
+    with pytest.raises((ReadError, SystemExit)) as ended:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    assert getattr(ended.value, "code", 0) == 0
+
+
+def test_all_else_is_run_on_a_page_that_is_walked_through() -> None:
+    known = ("make", ".venv/bin/snakemake", "snakemake")
+    for command in COMMANDS:
+        if command.words[0] not in known and tuple(command.words[:2]) != PYTHON:
+            assert command.page in WALKED, command
+
+
+@pytest.mark.parametrize("module", sorted(set(inline(r"python -m ([\w.]+)"))))
+def test_a_module_in_a_sentence_is_there(module: str) -> None:
+    path = ROOT.joinpath(*module.split("."))
+    assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()
+
+
+def test_files_in_a_sentence_are_there() -> None:
+    for name in set(inline(r"((?:sim|pipeline|reports|tests|experiments|docs)/[a-z_/.]+)")):
+        assert (ROOT / name).exists() or "logo" in name, name

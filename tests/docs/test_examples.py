@@ -1,0 +1,75 @@
+"""YAML on the pages is what the pages say of it; messages are the code's own."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import shutil
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from pipeline import failures, run
+from pipeline.environment import ROOT
+from pipeline.errors import UserError
+from pipeline.tracking import recognition
+from tests.docs.pages import Block, blocks, text
+from tests.docs.walk import LAID_OVER, check_recording, checked
+
+FAQ = blocks("docs/faq.md")
+MISTAKES = [
+    (block, told)
+    for block, told in pairwise(FAQ)
+    if (block.language, told.language) == ("yaml", "text")
+]
+_PLACE = re.compile(r"^  file:.*\n", re.MULTILINE)
+
+
+@pytest.mark.parametrize(("block", "told"), MISTAKES, ids=lambda each: each.text[:60])
+def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, tmp_path: Path) -> None:
+    shown = block.place.removeprefix(LAID_OVER)
+    problem = tmp_path / "problem.yaml"
+    shutil.copy(ROOT / shown, problem)
+    with pytest.raises(UserError) as caught:
+        checked(block, problem)
+    assert _PLACE.sub("", f"error: {caught.value}\n") == _PLACE.sub("", told.text)
+    assert f"  file:   {shown}, line " in told.text
+
+
+@pytest.mark.parametrize(
+    ("phrase", "module"),
+    [
+        ("beyond a driven displacement of", failures),
+        ("the first frame does not show this design", recognition),
+        ("snakemake is already at work in this folder", run),
+    ],
+)
+def test_a_message_within_a_sentence_is_the_codes(phrase: str, module: ModuleType) -> None:
+    assert f"`{phrase}`" in text("docs/faq.md")
+    assert phrase in inspect.getsource(module)
+
+
+@pytest.mark.parametrize(
+    "block",
+    [block for block in blocks("docs/tracking.md") if block.language == "yaml"],
+    ids=lambda block: block.place,
+)
+def test_a_recording_is_valid(block: Block, tmp_path: Path) -> None:
+    check_recording(block, tmp_path)
+
+
+def test_the_workshops_keys_are_valid(tmp_path: Path) -> None:
+    problem = tmp_path / "problem.yaml"
+    shutil.copy(ROOT / "experiments/fig5/problem.yaml", problem)
+    (block,) = (block for block in blocks("docs/printer.md") if block.language == "yaml")
+    checked(block, problem)
+
+
+def test_the_paper_is_cited_as_in_the_citation_file() -> None:
+    cited = text("docs/cite.md")
+    for line in text("CITATION.cff").splitlines():
+        key, _, value = line.strip(" -").partition(": ")
+        if key in ("family-names", "doi", "journal", "version", "value"):
+            assert value in cited, line

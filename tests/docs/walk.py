@@ -1,0 +1,92 @@
+"""A reader who does all that the pages say, in their order, in one checkout."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from pipeline.problem import load
+from pipeline.problem.loading import overlaid
+from pipeline.tracking import points, recording
+from tests.docs.pages import Block, blocks, text
+from tests.e2e.checkout import Checkout, Ended
+
+LAID_OVER = "laid over "
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Who reads, where, and whether the study `logo` is built as a draft in its place."""
+
+    checkout: Checkout
+    draft: bool = True
+
+    def told(self, page: str) -> str:
+        """Does what a page says; all that its commands and scripts then say themselves.
+
+        A block before a message that begins with `error:` has to fail, every other to succeed.
+        """
+        said = ""
+        for block, ended in self._read(page):
+            fails = f"{block.text}```\n\n```text\nerror: " in text(page)
+            assert (ended.returncode != 0) == fails, block.text + ended.stdout + ended.stderr
+            said += ended.stdout + ended.stderr
+        return said
+
+    def _read(self, page: str) -> Iterator[tuple[Block, Ended]]:
+        for block in blocks(page):
+            if block.language == "bash":
+                yield block, self.checkout.shell(self._meant(block.text))
+            elif block.language == "python":
+                yield block, self.checkout.script(self._meant(block.text))
+            elif block.language == "yaml":
+                self._write(block)
+
+    def _meant(self, words: str) -> str:
+        """The text with the draft in the place of the study, the one substitution there is."""
+        if not self.draft:
+            return words
+        meant = words.replace("results/logo/", "results/logo@quick/")
+        return re.sub(r"^make logo(?=_|$)", "make logo@quick", meant, flags=re.MULTILINE)
+
+    def _write(self, block: Block) -> None:
+        """Writes a file that a page shows, or checks what it lays over one."""
+        place = self.checkout.root / block.place.removeprefix(LAID_OVER)
+        if block.place.startswith(LAID_OVER):
+            checked(block, place)
+        else:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(block.text)
+
+
+def checked(block: Block, problem: Path) -> None:
+    """Checks a problem file with the keys of a block laid over it.
+
+    Raises:
+        UserError: as for any problem file.
+    """
+    changed = problem.with_name("changed.yaml")
+    asked = overlaid(yaml.safe_load(problem.read_text()), yaml.safe_load(block.text))
+    changed.write_text(yaml.safe_dump(asked, sort_keys=False))
+    try:
+        load(changed)
+    finally:
+        changed.unlink()
+
+
+def check_recording(block: Block, folder: Path) -> None:
+    """Checks the YAML of a recording, or of points, that a page shows.
+
+    Raises:
+        UserError: as for any such file.
+    """
+    path = folder / block.place
+    path.write_text(block.text)
+    if "points" in yaml.safe_load(block.text):
+        points.load(path)
+    else:
+        recording.load(path)
