@@ -49,11 +49,11 @@ def work(args: argparse.Namespace) -> None:
         UserError: a fault of the problem, no feasible start, or a start that cannot be simulated.
     """
     from pipeline import datasets, provenance
-    from pipeline.scenes import scene_of
+    from pipeline.robust import design_scene
     from sim.plan import make_plan
 
     asked = problem.load(args.problem, args.preset)
-    scene = scene_of(asked, args.problem.parent)
+    scene = design_scene(asked, args.problem.parent)
     _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
@@ -186,7 +186,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))
     found = margins(lattice, vertices, limits_of(asked))
-    cases = len(scene.motions)
+    cases = len(case_directions(asked))
     nothing = np.full(cases, np.nan)
 
     def whole(values: Floats) -> Floats:
@@ -206,7 +206,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         "loss": (("evaluation",), [e.loss for e in history]),
         "loss_case": (
             ("evaluation", "case"),
-            np.stack([e.aux if e.failure is None else nothing for e in history]),
+            np.stack([nothing if e.failure else e.aux[:cases] for e in history]),
         ),
         "violation": (("evaluation",), [e.violation for e in history]),
         "accepted": (("evaluation",), [int(e.accepted) for e in history]),

@@ -50,7 +50,7 @@ def work(args: argparse.Namespace) -> None:
         UserError: neither the design nor the initial lattice can be simulated with that contact.
     """
     from pipeline import datasets, provenance
-    from pipeline.scenes import scene_of
+    from pipeline.robust import design_scene
     from sim.plan import make_plan
 
     asked = problem.load(args.problem, args.preset)
@@ -61,7 +61,7 @@ def work(args: argparse.Namespace) -> None:
         "loss %.5g by angles, %.5g by distances: %s", angle, distance, "kept" if alike else "again"
     )
     posed = again(asked, 1 if alike else asked.optimiser.geometric.evaluations)
-    scene = scene_of(posed, args.problem.parent)
+    scene = design_scene(posed, args.problem.parent)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
     start = None if np.isnan(distance) else shipped_vector(design)

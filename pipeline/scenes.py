@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline import problem as problems
 from pipeline.errors import UserError
 from pipeline.problem import Problem
-from pipeline.problem.drives import Harmonic, LinearRamp, RampHarmonic, TanhRamp, TimeSeries
+from pipeline.problem.drives import Harmonic, LinearRamp, Pulse, RampHarmonic, TanhRamp, TimeSeries
 from sim import loads
 from sim.contact import activation_distance
 from sim.lattice import Lattice
@@ -170,6 +170,10 @@ def motions_of(problem: Problem, folder: Path) -> tuple[loads.Motion, ...]:
         case Harmonic():
             return tuple(
                 loads.Harmonic(drive.amplitude, drive.frequency, a) for a in drive.directions
+            )
+        case Pulse():
+            return tuple(
+                loads.Pulse(drive.amplitude, drive.width, a, drive.delay) for a in drive.directions
             )
         case TanhRamp():
             return tuple(

@@ -21,6 +21,7 @@ from sim.objectives import (
     DisplacementMimicking,
     RelativeMimicking,
     StrainEnergyMimicking,
+    combined,
     extent,
 )
 from sim.plan import Plan, concrete_parameters, make_plan
@@ -79,12 +80,16 @@ def target_motion(scene: Scene, threads: int = 1) -> Floats:
     return motion[:, :, reference.region]
 
 
-def structure(scene: Scene) -> Callable[[Array], Parameters]:
-    """Compiled map from a design vector to the parameters of its structure."""
+def structure(scene: Scene, shifts: Floats | None = None) -> Callable[[Array], Parameters]:
+    """Compiled map from a design vector to the parameters of its structure.
+
+    With ``shifts`` (n_groups, 2) in mm, to those of an imperfect copy of it.
+    """
+    off = 0.0 if shifts is None else jnp.asarray(shifts)[scene.lattice.group]
 
     @jax.jit
     def of_design(design: Array) -> Parameters:
-        made = shape(scene.lattice, scene.space.vertices(design))
+        made = shape(scene.lattice, scene.space.vertices(design) + off)
         return parameters(scene.lattice, made, scene.material)
 
     return of_design
@@ -121,7 +126,8 @@ def evaluator(
 ) -> Callable[[Floats], tuple[float, Floats, Floats]]:
     """Function from a design vector to loss, gradient (n_variables,) and losses of all cases.
 
-    With a ``memory`` the paths of a static scene start from those that it offers.
+    With a ``memory`` the paths of a static scene start from those that it offers; where imperfect
+    copies are simulated, none does.
 
     It raises ``SimulationError`` where the simulation fails.
     """
@@ -130,9 +136,20 @@ def evaluator(
 
     def mean(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
         each = measure(displacement, values)[place]
-        return weights @ each, each
+        return combined(each, weights, scene.sharpness), each
 
-    return value_and_gradient(structure(scene), mean, plan.solver, drives, memory)
+    if scene.copies is None:
+        return value_and_gradient(structure(scene), mean, plan.solver, drives, memory)
+    made = [
+        value_and_gradient(structure(scene, shifts), mean, plan.solver, drives)
+        for shifts in scene.copies
+    ]
+    return lambda design: _averaged([copy(design) for copy in made])
+
+
+def _averaged(found: list[tuple[float, Floats, Floats]]) -> tuple[float, Floats, Floats]:
+    value, gradient, each = (np.mean(part, axis=0) for part in zip(*found, strict=True))
+    return float(value), gradient, each
 
 
 def _simulated(scene: Scene, plan: Plan) -> tuple[tuple[Drive, ...], Ints]:

@@ -49,6 +49,20 @@ class Harmonic(NamedTuple):
         return _along(self.direction, wave)
 
 
+class Pulse(NamedTuple):
+    """A exp(-((t - delay) / width)^2) along a direction."""
+
+    amplitude: float | Array
+    width: float
+    direction: float | Array = 0.0
+    delay: float = 0.0
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        phase = (jnp.asarray(times) - self.delay) / self.width
+        return _along(self.direction, self.amplitude * jnp.exp(-(phase**2)))
+
+
 class TanhRamp(NamedTuple):
     """A (1 + tanh(6 (2 t / T - 1))) / 2 along a direction, the authors' quasi-static ramp."""
 

@@ -58,6 +58,14 @@ class RelativeMimicking(NamedTuple):
         return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
 
 
+def combined(losses: Array, weights: Array, sharpness: float) -> Array:
+    """Weighted p-mean of losses (n_cases,): their mean for 1, towards the largest for a large p."""
+    if sharpness == 1.0:
+        return weights @ losses
+    largest = jax.lax.stop_gradient(jnp.max(losses))
+    return largest * (weights @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
+
+
 def scales(spacing: float) -> Floats:
     """(3,) divisors of ux, uy (mm) and theta (rad) that make them comparable."""
     return np.array([spacing, spacing, 1.0])

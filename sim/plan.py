@@ -14,7 +14,7 @@ from sim.dynamics import Solver
 from sim.explicit import ExplicitSolver
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
-from sim.loads import Harmonic, LinearRamp, TanhRamp
+from sim.loads import Harmonic, LinearRamp, Pulse, TanhRamp
 from sim.model import Values, parameters
 from sim.modes import highest_frequency, lowest_frequency
 from sim.scene import Accuracy, Scene
@@ -31,6 +31,8 @@ SLOW = 0.75
 STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
 STIFFENING = 1.7
 """Highest eigenfrequency in motion over that at rest (4.6 -> 7 kHz for the paper's lattices)."""
+
+_DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,8 @@ def make_plan(
     decisions: list[str] = []
     skipped = [_reference_line(scene)]
 
-    may_repeat = not every_case and (vertices is not None or scene.symmetry == "C4")
+    symmetric = scene.symmetry == "C4" and scene.copies is None
+    may_repeat = not every_case and (vertices is not None or symmetric)
     case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.motions))
     if len(np.unique(case_of)) < len(case_of):
         skipped.append(
@@ -181,9 +184,8 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> Values:
 
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
     every = np.arange(len(scene.motions))
-    directed = [m for m in scene.motions if isinstance(m, Harmonic | LinearRamp | TanhRamp)]
-    besides = {motion._replace(direction=0.0) for motion in directed}
-    if len(directed) < len(scene.motions) or len(besides) > 1 or scene.reference is not None:
+    directed = [m for m in scene.motions if isinstance(m, _DIRECTED)]
+    if len(directed) < len(scene.motions) or scene.reference is not None:
         return every
     image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
     clamped_units = np.unique(scene.clamped // 3)
@@ -192,7 +194,9 @@ def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
         return every
     if not is_invariant(image, clamped_units, scene.driven, scene.region):
         return every
-    return equal_directions(np.array([motion.direction for motion in directed], dtype=float))
+    besides = [motion._replace(direction=0.0) for motion in directed]
+    kind = np.array([besides.index(other) for other in besides])
+    return equal_directions(np.array([motion.direction for motion in directed], dtype=float), kind)
 
 
 def _choose(scene: Scene, values: Values, decisions: list[str]) -> Literal["implicit", "explicit"]:

@@ -45,6 +45,10 @@ class Scene:
             compare with rest.
         frozen: units whose vertices stay, whoever shares them; None for the driven ones.
         symmetry: imposed on the design.
+        sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
+            a large one a smooth maximum.
+        copies: (n_copies, n_groups, 2) shifts (mm) of imperfect copies over which the loss is then
+            averaged; None for the structure alone.
         accuracy, integrator: as asked for.
     """
 
@@ -68,6 +72,8 @@ class Scene:
     contact_distance: float | None = None
     frozen: Ints | None = None
     symmetry: Symmetry = "none"
+    sharpness: float = 1.0
+    copies: Floats | None = None
     accuracy: Accuracy = "default"
     integrator: Integrator = "auto"
 

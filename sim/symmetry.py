@@ -40,12 +40,17 @@ def is_invariant(image: Ints, *sets: Ints) -> bool:
     return all(np.array_equal(np.sort(image[units]), np.sort(units)) for units in sets)
 
 
-def equal_directions(directions: Floats) -> Ints:
+def equal_directions(directions: Floats, kind: Ints) -> Ints:
     """First case equal to each case when a quarter turn leaves the structure alone.
 
     Directions (n_cases,) in rad that differ by multiples of 90 deg give turned copies of one
-    response.
+    response, if the drives are otherwise of one ``kind`` (n_cases,).
     """
     quarter = np.pi / 2
     reduced = np.mod(np.asarray(directions) + 1e-9, quarter)
-    return np.array([int(np.flatnonzero(np.abs(reduced - r) < 1e-8)[0]) for r in reduced])
+    return np.array(
+        [
+            int(np.flatnonzero((np.abs(reduced - r) < 1e-8) & (kind == k))[0])
+            for r, k in zip(reduced, kind, strict=True)
+        ]
+    )

@@ -115,6 +115,13 @@ def _horizon(problem: Problem) -> Findings:
         yield Finding(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
 
+def _robust(problem: Problem) -> Findings:
+    robust = problem.objective.robust
+    if robust is not None and robust.loads and problem.frequency is None:
+        what = f"a {problem.drive.kind} drive has no frequency to vary"
+        yield Finding(what, ("objective", "robust", "loads"), "leave them out")
+
+
 def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     lattice = problem.lattice
     if region.bounds is None:
@@ -280,6 +287,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _units_exist,
     _drive_is_free,
     _horizon,
+    _robust,
     _void,
     _inclusion,
     _target,

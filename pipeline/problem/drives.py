@@ -78,6 +78,19 @@ class RampHarmonic(_Directed):
     delay: Delay = 0.0
 
 
+class Pulse(_Directed):
+    """A exp(-((t - delay)/width)^2), a single push there and back.
+
+    Attributes:
+        width: half the time in which it is above 37 % of its peak.
+        delay: until its peak; three widths or more, for it to begin at rest.
+    """
+
+    kind: Literal["pulse"]
+    width: Duration
+    delay: Duration
+
+
 class TanhRamp(_Directed):
     """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression.
 
@@ -122,5 +135,6 @@ class TimeSeries(Section):
 
 
 Drive = Annotated[
-    Harmonic | RampHarmonic | TanhRamp | LinearRamp | TimeSeries, Field(discriminator="kind")
+    Harmonic | RampHarmonic | Pulse | TanhRamp | LinearRamp | TimeSeries,
+    Field(discriminator="kind"),
 ]

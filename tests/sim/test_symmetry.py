@@ -35,4 +35,7 @@ def test_mixed_polygons_have_no_quarter_turn() -> None:
 
 def test_directions_a_quarter_turn_apart_are_one_case() -> None:
     directions = np.deg2rad([0.0, 45.0, 90.0, 135.0, 180.0, 10.0])
-    np.testing.assert_array_equal(equal_directions(directions), [0, 1, 0, 1, 0, 5])
+    one = np.zeros(6, dtype=int)
+    np.testing.assert_array_equal(equal_directions(directions, one), [0, 1, 0, 1, 0, 5])
+    two = np.array([0, 0, 1, 0, 1, 0])
+    np.testing.assert_array_equal(equal_directions(directions, two), [0, 1, 2, 1, 2, 5])

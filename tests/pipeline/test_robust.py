@@ -1,0 +1,65 @@
+"""Designs for more than one load, and for imperfect copies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets, design
+from pipeline.errors import UserError
+from pipeline.problem import load
+from pipeline.robust import design_scene
+from sim.loads import Harmonic
+
+ROBUST = """  region: surroundings
+  robust:
+    loads:
+      - { frequency: 8 Hz }
+      - { amplitude: 3 mm, weight: 0.5 }
+    sharpness: 8
+    copies: 2
+    geometry: 0.02
+"""
+
+
+@pytest.fixture
+def robust(fig2: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "problem.yaml"
+    path.write_text(fig2.read_text().replace("  region: surroundings\n", ROBUST, 1))
+    return path
+
+
+def test_the_drives_own_cases_come_first(robust: Path) -> None:
+    scene = design_scene(load(robust), robust.parent)
+    drives = [motion for motion in scene.motions if isinstance(motion, Harmonic)]
+    assert [each.frequency for each in drives] == [2.0] * 4 + [8.0] * 4 + [2.0] * 4
+    assert [each.amplitude for each in drives] == [4.5] * 8 + [3.0] * 4
+    np.testing.assert_allclose(scene.weights, np.repeat([0.1, 0.1, 0.05], 4))
+    assert scene.frequency == 8.0
+    assert scene.copies is not None
+    assert scene.copies.shape == (2, scene.lattice.n_groups, 2)
+    assert 0.29 < np.abs(scene.copies).max() <= 0.3
+
+
+def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
+    robust: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "design_sqp.nc"
+    words = ["--problem", str(robust), "--preset", "quick", "--method", "sqp", "--quiet"]
+    assert design.main([*words, "--out", str(out)]) == 0
+    made = datasets.read(out, "design_method")
+    assert made.sizes["case"] == 4
+    assert float(made["best_loss"]) < float(made["loss"][0])
+    assert (made["loss"] > 0).all()
+
+
+def test_a_drive_without_a_frequency_has_no_other_loads(robust: Path) -> None:
+    text = robust.read_text().replace("kind: harmonic", "kind: linear_ramp\n  duration: 1 s")
+    text = text.replace("  frequency: 2 Hz\n", "").replace("  periods: 2\n", "  duration: 1 s\n", 1)
+    before, _, rest = text.partition("\nsweep:\n")
+    robust.write_text(before + rest[rest.index("\nreport:") :].partition("\npresets:")[0])
+    with pytest.raises(UserError, match="no frequency to vary") as caught:
+        load(robust)
+    assert caught.value.key == "objective.robust.loads"
