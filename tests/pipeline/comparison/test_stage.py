@@ -1,0 +1,159 @@
+"""The stage on small studies whose tracks are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import compare, datasets, simulate
+from pipeline.comparison.measurement import measurement
+from pipeline.comparison.registration import pixel_size
+from tests.pipeline.comparison.recorded import PIXEL, SIGMA, track, written
+
+Change = Callable[[xr.Dataset], xr.Dataset]
+
+THERE = np.linspace(0.0, 1.0, 25)
+BACK = np.concatenate([THERE, THERE[-2:12:-1]])
+TIME = np.arange(len(BACK)) / 30
+
+
+@pytest.fixture(scope="module")
+def study(hole: list[str], tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Options that name a small static study with its datasets."""
+    problem, design = hole[1], str(Path(hole[1]).with_name("design.nc"))
+    response = str(tmp_path_factory.mktemp("study") / "response.nc")
+    given = ["--problem", problem, "--quiet", "--design", design]
+    assert simulate.main([*given, "--out", response]) == 0
+    return [*given, "--response", response]
+
+
+@pytest.fixture(scope="module")
+def film(study: list[str]) -> xr.Dataset:
+    """The cloaked structure, loaded and then halfway unloaded."""
+    design = datasets.read(study[study.index("--design") + 1], "design")
+    response = datasets.read(study[study.index("--response") + 1], "response")
+    return track(design, response, "cloaked", TIME, BACK)
+
+
+def run(study: list[str], options: list[str], folder: Path) -> int:
+    return compare.main([*study, *options, "--out", str(folder / "comparison.nc")])
+
+
+@pytest.fixture(scope="module")
+def folder(study: list[str], film: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where that film was compared."""
+    made = tmp_path_factory.mktemp("whole")
+    assert run(study, written(film, made), made) == 0
+    return made
+
+
+@pytest.fixture
+def whole(folder: Path) -> xr.Dataset:
+    """Its comparison."""
+    return datasets.read(folder / "comparison.nc", "comparison")
+
+
+def test_a_simulation_that_is_right_leaves_noise_alone(whole: xr.Dataset) -> None:
+    for side in whole["side"].values:
+        found = whole.sel(side=side, estimate="value")
+        np.testing.assert_allclose(found["rmse"], SIGMA, rtol=0.25)  # some of it by the drive
+        np.testing.assert_allclose(found["noise_share"], 1.0, atol=0.4)
+        assert (found["correlation"] > 0.99).all()
+    value, low, high = whole["rmse"].sel(side="simulated").transpose("estimate", "dof").values
+    assert ((low < value) & (value < high)).all()
+
+
+def test_both_branches_lie_on_the_load_axis(whole: xr.Dataset) -> None:
+    assert whole.attrs["axis"] == "load"
+    assert np.isnan(float(whole["time_lag"]))
+    np.testing.assert_array_equal(whole["branch"][[5, 20]], 1)
+    np.testing.assert_array_equal(whole["branch"][[28, -2]], 2)
+    np.testing.assert_allclose(
+        whole["nominal_drive"].sel(xy="x"), whole["drive_displacement"].sel(xy="x"), atol=0.02
+    )
+
+
+def test_units_that_are_held_or_absent_are_not_compared(whole: xr.Dataset) -> None:
+    counts = np.bincount(whole["use"].values, minlength=5).tolist()
+    assert counts == [14, 5, 5, 1, 0]
+    apart = whole["rmse_map"].sel(side="simulated").isnull().any("dof").values
+    np.testing.assert_array_equal(apart, whole["use"].values != 0)
+
+
+def test_the_band_holds_the_noisy_measurement(whole: xr.Dataset) -> None:
+    assert int(whole["band_samples"]) == 64
+    assert (whole["band_coverage"] > 0.95).all()
+    assert (whole["band_low"].isel(time=-1) <= whole["band_high"].isel(time=-1)).sum() > 14
+
+
+def test_curves_are_those_of_both_sides(whole: xr.Dataset) -> None:
+    turn = whole["mean_rotation"].sel(estimate="value").values
+    np.testing.assert_allclose(turn[0], turn[2], atol=3 * SIGMA[2])
+    np.testing.assert_allclose(turn[1], turn[2], atol=3 * SIGMA[2])
+    assert turn[2].max() > 10 * SIGMA[2]
+    peaks = whole["peak_to_peak"].sel(estimate="value").where(whole["use"] == 0)
+    np.testing.assert_allclose(peaks.sel(source="measured"), peaks.sel(source="nominal"), atol=0.03)
+
+
+def test_the_same_files_give_the_same_bytes(
+    study: list[str], film: xr.Dataset, folder: Path, tmp_path: Path
+) -> None:
+    assert run(study, written(film, tmp_path), tmp_path) == 0
+    name = "comparison.nc"
+    assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_turned_camera_is_told_and_taken_out_and_a_scale_is_left_in(
+    study: list[str], film: xr.Dataset
+) -> None:
+    turn, scale = 0.01, 1.002
+    cos, sin = np.cos(turn), np.sin(turn)
+    matrix = np.array([[cos, sin], [-sin, cos]])  # of rows
+    motion = film["displacement"].values.copy()
+    motion[..., :2] = scale * motion[..., :2] @ matrix
+    centre = film["vertices"].mean("vertex").values
+    middle = np.nanmean(centre, axis=0)
+    missed = (scale * (centre - middle) @ matrix + middle - centre) / PIXEL
+    tilted = film.assign(
+        displacement=(film["displacement"].dims, motion),
+        camera_residual=(("unit", "xy"), missed),
+    )
+    found = measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
+    assert found.registration.rotation == pytest.approx(turn, abs=1e-4)
+    assert found.registration.scale == pytest.approx(scale, abs=1e-4)
+    assert pixel_size(tilted, middle) == pytest.approx(PIXEL)
+    upright = film["displacement"].values[..., :2]
+    np.testing.assert_allclose(found.displacement[..., :2], scale * upright, atol=1e-3)
+
+
+def _hiding_the_drive(film: xr.Dataset) -> xr.Dataset:
+    return film.assign(displacement=film["displacement"].where(film["i"] < film["i"].max()))
+
+
+@pytest.mark.parametrize(
+    ("change", "more", "told"),
+    [
+        (lambda film: film.isel(unit=slice(1, None)), "", "not of this study's design: it has 24"),
+        (lambda film: film, "structure: intact\n", "other units are absent"),
+        (lambda film: film.assign(vertices=film["vertices"] + 0.7), "", "up to 0.70 mm from"),
+        (lambda film: film.isel(time=slice(0, 6)), "", "too few frames"),
+        (_hiding_the_drive, "", "no driven unit is seen"),
+        (lambda film: film.assign(displacement=-film["displacement"]), "", "cannot be aligned"),
+        (lambda film: film, "case: 3\n", "no such load case"),
+    ],
+    ids=["units", "void", "vertices", "frames", "drive", "direction", "case"],
+)
+def test_what_does_not_belong_together_is_refused(
+    study: list[str], film: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    change: Change, more: str, told: str,
+) -> None:  # fmt: skip
+    assert run(study, written(change(film), tmp_path, more), tmp_path) == 2
+    error = capsys.readouterr().err
+    assert error.count("error: ") == 1
+    assert told in error
+    assert "remedy:" in error
+    assert not (tmp_path / "comparison.nc").exists()
