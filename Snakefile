@@ -9,18 +9,11 @@ from snakemake.utils import min_version
 from pipeline.calibrated import calibrations, description, measurements
 from pipeline.filmed import compared, recording_pages, tracked
 from pipeline.sources import source_hash
-from pipeline.workflow import (
-    check_problems,
-    check_room,
-    chunks,
-    copies,
-    designs,
-    figures,
-)
-from pipeline.workflow import joints, member_hashes, members, options, prepare_jobs
-from pipeline.workflow import movies, packages, product_pages, section, shown
-from pipeline.workflow import screened, screened_comparisons, screened_hashes
-from pipeline.workflow import shown_options, targets
+from pipeline.workflow import FRAMED, check_problems, check_room, chunks
+from pipeline.workflow import comparisons_of, copies, datasets_of, designs, figures
+from pipeline.workflow import hashes_of, joints, member_hashes, members, movies
+from pipeline.workflow import options, packages, prepare_jobs, product_pages, section
+from pipeline.workflow import shown, shown_options, targets
 
 min_version("9.20")
 
@@ -67,5 +60,6 @@ include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/calibrate.smk"
 include: "pipeline/rules/compare.smk"
 include: "pipeline/rules/report.smk"
+include: "pipeline/rules/framework.smk"
 include: "pipeline/rules/movies.smk"
 include: "pipeline/rules/index.smk"

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -70,6 +70,10 @@ class Study:
         return f"--problem {self.problem}" + (f" --preset {self.preset}" if self.preset else "")
 
 
+FRAMED = (Study("fig2"),)
+"""From which the framework is drawn, Figure 1."""
+
+
 def studies(root: Path = ROOT) -> list[Study]:
     """Every study below experiments/, each followed by its presets.
 
@@ -126,37 +130,28 @@ def movies() -> dict[str, list[Study]]:
     }
 
 
-def screened(wildcards: Wildcards) -> list[str]:
-    """The datasets that a movie shows."""
-    return [
-        f"results/{study}/{name}.nc"
-        for study in movies()[wildcards.movie]
-        for name in outputs(problem_of(study))
-    ]
+def datasets_of(shown: Sequence[Study]) -> list[str]:
+    """The datasets that are shown of some studies."""
+    return [f"results/{study}/{name}.nc" for study in shown for name in outputs(problem_of(study))]
 
 
-def screened_comparisons(wildcards: Wildcards) -> list[str]:
-    """Its recordings beside their simulation."""
+def comparisons_of(shown: Sequence[Study]) -> list[str]:
+    """Their recordings beside their simulation."""
     return [
         f"results/{study}/recordings/{name}/comparison.nc"
-        for study in movies()[wildcards.movie]
+        for study in shown
         for name in shown_recordings(str(study))
     ]
 
 
-def screened_hashes(wildcards: Wildcards) -> str:
-    """Hash of what it depends on in the problem files of its studies."""
-    of_each = (problem_of(study) for study in movies()[wildcards.movie])
-    return " ".join(section_hash(problem, "report") for problem in of_each)
+def hashes_of(shown: Sequence[Study]) -> str:
+    """Hash of what pictures of them depend on in their problem files."""
+    return " ".join(section_hash(problem_of(study), "report") for study in shown)
 
 
 def members(wildcards: Wildcards) -> list[str]:
     """The datasets that a figure of several studies shows."""
-    return [
-        f"results/{study}/{name}.nc"
-        for study in joints()[f"{wildcards.name}{wildcards.preset}"]
-        for name in outputs(problem_of(study))
-    ]
+    return datasets_of(joints()[f"{wildcards.name}{wildcards.preset}"])
 
 
 def product_pages(built: str, product: str) -> list[str]:
@@ -182,8 +177,7 @@ def structures_built(problem: Problem) -> tuple[str, ...]:
 
 def member_hashes(wildcards: Wildcards) -> str:
     """Hash of what the figure depends on in the problem files of its studies."""
-    of_each = (problem_of(study) for study in joints()[f"{wildcards.name}{wildcards.preset}"])
-    return " ".join(section_hash(problem, "report") for problem in of_each)
+    return hashes_of(joints()[f"{wildcards.name}{wildcards.preset}"])
 
 
 def asked_for(words: Collection[str]) -> list[Study]:

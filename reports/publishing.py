@@ -45,7 +45,7 @@ def publish(parts: Parts, folder: Path) -> list[Path]:
     Raises:
         UserError: the folder is full, read-only or not ours.
     """
-    return _published(lambda aside: write(parts, aside), folder)
+    return published(lambda aside: write(parts, aside), folder)
 
 
 def draw(figure: Callable[[], Figure], name: str, folder: Path) -> list[Path]:
@@ -59,10 +59,15 @@ def draw(figure: Callable[[], Figure], name: str, folder: Path) -> list[Path]:
         with style.styled():
             return style.save(figure(), aside / name)
 
-    return _published(drawn, folder)
+    return published(drawn, folder)
 
 
-def _published(make: Callable[[Path], list[Path]], folder: Path) -> list[Path]:
+def published(make: Callable[[Path], list[Path]], folder: Path) -> list[Path]:
+    """Let `make` write files into a folder aside, and move them into `folder` in their order.
+
+    Raises:
+        UserError: the folder is full, read-only or not ours.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with _aside(folder) as aside:

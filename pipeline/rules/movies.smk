@@ -1,8 +1,8 @@
 # The paper's movies, of the studies that there are; every study in full, with its recordings.
 rule movie:
     input:
-        datasets=screened,
-        comparisons=screened_comparisons,
+        datasets=lambda wildcards: datasets_of(movies()[wildcards.movie]),
+        comparisons=lambda wildcards: comparisons_of(movies()[wildcards.movie]),
     output:
         "results/movies/{movie}.mp4",
     log:
@@ -12,7 +12,7 @@ rule movie:
         problems=lambda wildcards: [
             study.problem for study in movies()[wildcards.movie]
         ],
-        problem=screened_hashes,
+        problem=lambda wildcards: hashes_of(movies()[wildcards.movie]),
         source=source_hash("reports.movie.build"),
     message:
         "Drawing movie {wildcards.movie}"

@@ -1,0 +1,47 @@
+"""Figure 1: the framework, drawn from the geometry of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from reports import style
+from reports.framework import build, figure
+from reports.study import Study
+from tests.reports import compared, pictures
+from tests.reports.test_page import Links
+
+
+@pytest.fixture(scope="module")
+def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("framework")
+    build.publish(study, made)
+    return made
+
+
+def test_it_is_legible_and_tells_of_every_step(study: Study) -> None:
+    with style.styled():
+        made = pictures.drawn(figure.build(study))
+    pictures.assert_legible(made)
+    wanted = {"Reference", "Altered", "simulate", "optimised cloak", "filmed and tracked", *"abcd"}
+    assert wanted <= pictures.words(made)
+
+
+def test_its_page_works_from_disk(folder: Path) -> None:
+    html = (folder / "index.html").read_text(encoding="utf-8")
+    links = Links(html)
+    assert all(address.startswith("data:") for address in links.loaded)
+    assert {"fig1.pdf", "fig1.svg", "fig1.png"} <= set(links.hrefs.values())
+    assert "SYNTHETIC" not in html
+
+
+def test_it_is_the_same_again(study: Study, folder: Path, tmp_path: Path) -> None:
+    for path in build.publish(study, tmp_path):
+        assert path.read_bytes() == (folder / path.name).read_bytes()
+
+
+def test_a_recording_that_it_shows_is_called_synthetic(study: Study, tmp_path: Path) -> None:
+    filmed = compared.with_recordings(study, tmp_path / "recordings", ("cloaked", 1))
+    build.publish(filmed, tmp_path / "report")
+    assert "SYNTHETIC" in (tmp_path / "report/index.html").read_text(encoding="utf-8")
