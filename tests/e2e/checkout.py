@@ -33,7 +33,7 @@ SMALLER = {
     "presets": {},
 }
 ROOMS = ("experiments", "pipeline", "profiles", "reports", "sim")
-FILES = ("Snakefile", "Makefile", "requirements.lock", ".gitignore")
+FILES = ("Snakefile", "Makefile", "CITATION.cff", "requirements.lock", ".gitignore")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
 
