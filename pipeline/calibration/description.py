@@ -36,14 +36,25 @@ Amplitude = Annotated[Angle, Field(gt=0.0)]
 
 
 class ForceColumns(Section):
-    """Names of the columns; their units stand in brackets behind them in the file."""
+    """Names of the columns; their units stand in brackets behind them in the file.
+
+    Attributes:
+        displacement: of the top row.
+        force: on it.
+    """
 
     displacement: str = "displacement"
     force: str = "force"
 
 
 class VirtualForces(Section):
-    """A test that is computed: up to a displacement, with white noise of the load cell."""
+    """A test that is computed.
+
+    Attributes:
+        end: displacement up to which it goes.
+        points: along the way.
+        noise: standard deviation of the load cell's white noise.
+    """
 
     end: Length
     points: Samples = 40
@@ -81,14 +92,26 @@ class ForceDisplacement(Section):
 
 
 class DecayColumns(Section):
-    """Names of the columns; their units stand in brackets behind them in the file."""
+    """Names of the columns; their units stand in brackets behind them in the file.
+
+    Attributes:
+        time: of the readings.
+        angle: between the units.
+    """
 
     time: str = "time"
     angle: str = "angle"
 
 
 class VirtualDecay(Section):
-    """A trace that is computed: a damped oscillation at the authors' frequency of one hinge."""
+    """A trace that is computed: a damped oscillation at the authors' frequency of one hinge.
+
+    Attributes:
+        amplitude: at the start.
+        duration: of the trace.
+        rate: of its readings.
+        noise: standard deviation of the angles.
+    """
 
     amplitude: Amplitude
     duration: Duration
@@ -121,14 +144,25 @@ class FreeDecay(Section):
 
 
 class Error(Section):
-    """A standard deviation of places and of rotations."""
+    """Standard deviations.
+
+    Attributes:
+        displacement: of places.
+        rotation: of rotations.
+    """
 
     displacement: Length
     rotation: Amplitude
 
 
 class VirtualTrack(Section):
-    """A track that is computed: noise of every frame, and a bias that stays with each unit."""
+    """A track that is computed.
+
+    Attributes:
+        rate: frames per second.
+        noise: of every frame.
+        bias: that stays with each unit.
+    """
 
     rate: Frequency
     noise: Error
@@ -174,7 +208,13 @@ Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminat
 
 
 class Virtual(Section):
-    """What computed data are made with: the true constants and the seed of the noise."""
+    """What computed data are made with.
+
+    Attributes:
+        truth: the true constants.
+        cutoff_angle: the true one, where it is not that of `contact`.
+        seed: of the noise.
+    """
 
     truth: Material
     cutoff_angle: Angle | None = None

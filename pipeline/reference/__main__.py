@@ -14,7 +14,7 @@ def pages() -> dict[str, str]:
     """The pages, by the names of their files."""
     from pipeline.reference import contents, keys
 
-    return {"keys.md": keys.page(), "datasets.md": contents.page()}
+    return {**keys.pages(), "datasets.md": contents.page()}
 
 
 def work(args: argparse.Namespace) -> None:

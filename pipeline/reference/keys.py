@@ -1,4 +1,4 @@
-"""The page on the YAML files: every key with its type, its default and its meaning."""
+"""The pages on the YAML files: every key with its type, its default and its meaning."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import json
 import math
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 from pipeline import units
+from pipeline.problem.section import Section
 from pipeline.reference.markdown import table
-from pipeline.tracking.recording import Recording
 
 Node = dict[str, Any]
 
 HEAD = """\
-# Keys of the YAML files
+# Keys of {title}
 
 <!-- Made by `python -m pipeline.reference` from the models that check the files. -->
 
@@ -40,21 +40,46 @@ _PLAIN = {
 }
 
 
-def page() -> str:
-    """The page, in Markdown."""
+class File(NamedTuple):
+    """A YAML file: its name, the model that checks it, where it is, and more about it."""
+
+    name: str
+    model: type[Section]
+    place: str
+    more: str = ""
+
+
+def pages() -> dict[str, str]:
+    """The pages, in Markdown, by the names of their files."""
+    from pipeline.calibration.description import Calibration
     from pipeline.problem import Problem
     from pipeline.problem.joint import Joint
+    from pipeline.tracking.points import Points
+    from pipeline.tracking.recording import Recording
 
-    files = (
-        ("problem.yaml", Problem, "`experiments/STUDY/problem.yaml`", PRESETS),
-        ("figure.yaml", Joint, "`experiments/FIGURE/figure.yaml`", ""),
-        ("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`", ""),
+    studies = (
+        File("problem.yaml", Problem, "`experiments/STUDY/problem.yaml`", PRESETS),
+        File("figure.yaml", Joint, "`experiments/FIGURE/figure.yaml`"),
     )
+    recordings = (
+        File("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`"),
+        File("Points", Points, "In place of a video, for `python -m pipeline.track points`"),
+    )
+    calibrations = (File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),)
+    return {
+        "keys.md": _page("problem files", studies),
+        "keys_recordings.md": _page("recordings", recordings),
+        "keys_calibrations.md": _page("calibrations", calibrations),
+    }
+
+
+def _page(title: str, files: tuple[File, ...]) -> str:
     told: set[str] = set()
-    parts = [HEAD]
-    for name, model, place, more in files:
-        schema = model.model_json_schema(mode="validation")
-        parts += [f"\n## {name}\n\n{place}. {schema['description']}\n{more}\n", _keys(schema)]
+    parts = [HEAD.format(title=title)]
+    for file in files:
+        schema = file.model.model_json_schema(mode="validation")
+        lead = f"{file.place}. {schema['description']}"
+        parts += [f"\n## {file.name}\n\n{lead}\n{file.more}\n", _keys(schema)]
         parts += _sections(schema, told)
     return "".join(parts)
 
@@ -88,7 +113,7 @@ def _keys(section: Node) -> str:
             f"`{key}`",
             kind(node),
             "" if key in needed else _default(node.get("default"), node),
-            node.get("description", ""),
+            node.get("description") or ("tells the form" if "const" in node else ""),
         )
         for key, node in section["properties"].items()
     ]

@@ -28,7 +28,15 @@ Name = Annotated[str, Field(min_length=1)]
 
 
 class Columns(Section):
-    """Names of the columns: time in s, places at rest and displacements in mm."""
+    """Names of the columns.
+
+    Attributes:
+        time: in s.
+        x: place at rest, mm.
+        y: likewise.
+        ux: displacement, mm.
+        uy: likewise.
+    """
 
     time: Name = "time"
     x: Name = "x"
@@ -41,6 +49,7 @@ class Points(Section):
     """A file of points, and how its axes lie on the specimen.
 
     Attributes:
+        title: one line about it.
         points: the CSV, as seen from this file: one line a point and time.
         columns: their names.
         origin: place of unit (0, 0)'s lattice point on the file's axes.

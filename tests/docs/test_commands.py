@@ -93,6 +93,7 @@ def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(argparse.ArgumentParser, "parse_args", only_read)
     module, *options = command.words[2:]
+    monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(sys, "argv", [module, *options])
     with pytest.raises((ReadError, SystemExit)) as ended:
         runpy.run_module(module, run_name="__main__", alter_sys=True)

@@ -10,7 +10,10 @@ from pipeline.environment import ROOT
 from pipeline.reference.__main__ import main, pages
 
 
-@pytest.mark.parametrize("name", ["datasets.md", "keys.md"])
+NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_the_committed_page_is_up_to_date(name: str) -> None:
     committed = (ROOT / "docs" / name).read_text(encoding="utf-8")
     assert committed == pages()[name], "run python -m pipeline.reference"
@@ -26,7 +29,7 @@ def test_every_variable_and_every_section_has_its_place() -> None:
         "| `displacement` | structure, case, time, unit, dof | mm (ux, uy), rad (theta) |"
         in (pages()["datasets.md"])
     )
-    keys = pages()["keys.md"]
+    keys = pages()["keys.md"] + pages()["keys_recordings.md"]
     for row in (
         "| `spacing` | length (`mm`) |  | of the units, or of the cells. |",
         "| `cell_angle` | angle (`deg`) | `90 deg` |",
@@ -35,3 +38,12 @@ def test_every_variable_and_every_section_has_its_place() -> None:
         "| `geometric` | [Method](#method) | `evaluations: 60` |",
     ):
         assert row in keys
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name.startswith("keys")])
+def test_every_key_has_a_meaning(name: str) -> None:
+    for line in pages()[name].splitlines():
+        if line.startswith("| `"):
+            meaning = line.rsplit("|", 2)[1].strip()
+            assert meaning, line
+            assert not meaning.endswith("with its unit"), line
