@@ -312,7 +312,13 @@ class Response(Section):
 
 
 class DirectionAxis(Section):
-    """Equally spaced directions, both ends included."""
+    """Equally spaced directions, both ends included.
+
+    Attributes:
+        start: the first.
+        stop: the last.
+        points: how many.
+    """
 
     start: Angle = Field(alias="from")
     stop: Angle = Field(alias="to")
@@ -320,7 +326,13 @@ class DirectionAxis(Section):
 
 
 class FrequencyAxis(Section):
-    """Equally spaced frequencies, both ends included."""
+    """Equally spaced frequencies, both ends included.
+
+    Attributes:
+        start: the first.
+        stop: the last.
+        points: how many.
+    """
 
     start: Frequency = Field(alias="from")
     stop: Frequency = Field(alias="to")
@@ -328,7 +340,13 @@ class FrequencyAxis(Section):
 
 
 class Sweep(Section):
-    """The robustness map: the loss over load direction and frequency."""
+    """The robustness map: the loss over load direction and frequency.
+
+    Attributes:
+        direction: along one side of the map.
+        frequency: along the other.
+        periods: of the drive over which the loss is taken.
+    """
 
     direction: DirectionAxis
     frequency: FrequencyAxis

@@ -9,7 +9,6 @@ import pytest
 from pipeline.environment import ROOT
 from pipeline.reference.__main__ import main, pages
 
-
 NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
 
 
