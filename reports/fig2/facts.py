@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from pipeline.comparison.reduction import reduction
 from reports import checks, experiment, measures
 from reports.claims import MEASURED
 from reports.facts import ABSENT, Fact, grouped, number, percent, share, worded
-from reports.recorded import Recorded
+from reports.recorded import Array, Recorded
 from reports.scene import Scene, cycles
 from reports.structure import CLOAK, from_dataset, middle_of_top_edge
 from reports.study import Study
@@ -191,19 +192,19 @@ def monitored_recordings(study: Study) -> list[Recorded]:
 def recorded_facts(study: Study) -> Iterator[Fact]:
     """Peak-to-peak u_y of the same unit as it was measured."""
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
-    spans: dict[str, float] = {}
+    spans: dict[str, Array] = {}
     for each in monitored_recordings(study):
         found = each.data["peak_to_peak"].isel(unit=unit).sel(source="measured", dof="uy")
-        value, low, high = (float(found.sel(estimate=name)) for name in ("value", "low", "high"))
-        spans[each.structure] = value
+        value, low, high = spans[each.structure] = found.values
         note = f"{each.source}; 95 %: {low:.3g} to {high:.3g} mm"
         label = f"u_y peak-to-peak, {each.structure}, measured"
         key = f"{MEASURED}peak_to_peak_{each.structure}"
-        yield number(key, label, value, "mm", digits=3, note=note)
+        yield number(key, label, float(value), "mm", digits=3, note=note)
     if {"altered", "cloaked"} <= spans.keys():
         label = "u_y peak-to-peak reduced by, measured"
-        gain = 1.0 - spans["cloaked"] / spans["altered"]
-        yield share(f"{MEASURED}peak_to_peak_reduction", label, gain)
+        gain, low, high = reduction(spans["altered"], spans["cloaked"])
+        note = f"95 %: {100 * low:.3g} to {100 * high:.3g} %"
+        yield share(f"{MEASURED}peak_to_peak_reduction", label, float(gain), note=note)
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:

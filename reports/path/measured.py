@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from pipeline.comparison.reduction import reduction
 from reports import beside, style
 from reports.claims import MEASURED
 from reports.facts import Fact, number, share
@@ -113,4 +114,15 @@ def _measure_facts(study: Study, path: Course, measure: Measure) -> Iterator[Fac
     if {"altered", "cloaked"} <= ends.keys():
         gain = 1.0 - ends["cloaked"] / ends["altered"]
         label = f"{measure.label} reduced by, measured"
-        yield share(f"{MEASURED}{measure.key}_reduction", label, gain)
+        note = _interval(study, path) if measure.key == "rotation" else ""
+        yield share(f"{MEASURED}{measure.key}_reduction", label, gain, note=note)
+
+
+def _interval(study: Study, path: Course) -> str:
+    """The interval of the reduction of mean |theta| at the end of the path, in words."""
+    ends = {
+        each.structure: each.at(each.data["mean_rotation"].sel(source="measured"), path.values)[-1]
+        for each in study.recordings
+    }
+    _, low, high = reduction(ends["altered"], ends["cloaked"])
+    return f"95 %: {100 * low:.3g} to {100 * high:.3g} %"
