@@ -13,7 +13,7 @@ PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients 
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup wheels test test-slow pythons clients docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup reproduce wheels test test-slow pythons clients docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
@@ -24,6 +24,7 @@ help:
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make index     that page alone, over what is there"
 	@echo "make movies    the paper's movies: results/movies"
+	@echo "make reproduce build fig2@quick (or STUDY=...) twice from nothing, and compare all bytes"
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
@@ -67,6 +68,9 @@ $(PRODUCTS): setup
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
 	@exec $(BIN)/python -m pipeline.run $@
+
+reproduce: setup
+	@$(BIN)/python -m pipeline.reproduce $(STUDY)
 
 test: setup
 	$(BIN)/python -m pytest $(PYTEST)
