@@ -13,7 +13,7 @@ from pipeline.workflow import FRAMED, check_problems, check_room, chunks
 from pipeline.workflow import comparisons_of, copies, datasets_of, designs, figures
 from pipeline.workflow import hashes_of, joints, member_hashes, members, movies
 from pipeline.workflow import options, packages, prepare_jobs, product_pages, section
-from pipeline.workflow import shown, shown_options, targets
+from pipeline.workflow import robust_designs, shown, shown_options, targets
 
 min_version("9.20")
 
@@ -49,12 +49,22 @@ for target, built in targets().items():
             recording_pages(built),
 
 
+for study in sorted({built.partition("@")[0] for built in targets().values()}):
+
+    rule:
+        name:
+            f"{study}_gains"
+        input:
+            f"results/{study}/gains.csv",
+
+
 include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"
 include: "pipeline/rules/sweep.smk"
 include: "pipeline/rules/robustness.smk"
 include: "pipeline/rules/spectrum.smk"
+include: "pipeline/rules/gains.smk"
 include: "pipeline/rules/fabrication.smk"
 include: "pipeline/rules/tracking.smk"
 include: "pipeline/rules/calibrate.smk"

@@ -33,7 +33,8 @@ from pipeline.problem import (
     section_hash,
 )
 
-PRODUCTS = ("_fabrication", "_spectrum", RECORDINGS)  # end the targets of more than the report
+PRODUCTS = ("_fabrication", "_spectrum", "_gains", RECORDINGS)
+"""Ends of the targets of a study beside its report."""
 ALL = "all"  # the target that builds every figure of the paper
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -259,6 +260,14 @@ def designs(wildcards: Wildcards) -> list[str]:
         f"results/{study}/design_{method}.nc"
         for method in problem_of(study).optimiser.methods.chosen
     ]
+
+
+def robust_designs(wildcards: Wildcards) -> dict[str, str]:
+    """The study's own design ("plain") and those of its presets with objective.robust."""
+    mine = [study for study in studies() if study.name == wildcards.name and study.preset]
+    held = [study for study in mine if problem_of(study).objective.robust is not None]
+    named = {study.preset: f"results/{study}/design.nc" for study in held}
+    return {"plain": f"results/{wildcards.name}/design.nc", **named}
 
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:

@@ -58,12 +58,12 @@ class RelativeMimicking(NamedTuple):
         return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
 
 
-def combined(losses: Array, weights: Array, sharpness: float) -> Array:
+def combined(losses: Array, weights: Numbers, sharpness: float) -> Array:
     """Weighted p-mean of losses (n_cases,): their mean for 1, towards the largest for a large p."""
     if sharpness == 1.0:
-        return weights @ losses
+        return jnp.asarray(weights) @ losses
     largest = jax.lax.stop_gradient(jnp.max(losses))
-    return largest * (weights @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
+    return largest * (jnp.asarray(weights) @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
 
 
 def scales(spacing: float) -> Floats:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline import datasets, design
+from pipeline import datasets, design, gains
 from pipeline.errors import UserError
 from pipeline.problem import load
 from pipeline.robust import design_scene
 from sim.loads import Harmonic
+from tests.pipeline.static import HOLE, write
 
 ROBUST = """  region: surroundings
   robust:
@@ -63,3 +65,28 @@ def test_a_drive_without_a_frequency_has_no_other_loads(robust: Path) -> None:
     with pytest.raises(UserError, match="no frequency to vary") as caught:
         load(robust)
     assert caught.value.key == "objective.robust.loads"
+
+
+PRESETS = """
+presets:
+  tolerant:
+    objective:
+      robust: { copies: 2 }
+"""
+
+
+def test_the_gain_of_a_preset_is_over_the_studys_own_design(
+    hole: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, HOLE + PRESETS, size=5, amplitude=3.0)
+    shipped, out = Path(hole[1]).with_name("design.nc"), tmp_path / "gains.csv"
+    words = ["--problem", str(path), "--quiet", "--out", str(out), "--designs"]
+    assert gains.main([*words, f"plain={shipped}", f"tolerant={shipped}"]) == 0
+    (row,) = csv.DictReader(out.read_text().splitlines())
+    assert (row["preset"], row["loads"], row["copies"]) == ("tolerant", "1", "16")
+    assert row["plain_design"] == row["own_design"]
+    assert row["gain"] == "0.0%"
+    best = float(datasets.read(shipped, "design")["best_loss"].min())
+    assert float(row["own_under_drive"]) == pytest.approx(best, rel=1e-4)
+    assert gains.main([*words, f"plain={shipped}"]) == 2
+    assert "one of a preset" in capsys.readouterr().err
