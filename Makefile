@@ -9,11 +9,11 @@ PRODUCTS := $(foreach product,fabrication recordings spectrum,$(addsuffix _$(pro
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
-PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/slow
+PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
-.PHONY: help setup reproduce wheels test test-slow pythons clients docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
@@ -28,6 +28,7 @@ help:
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
+	@echo "make cluster   make this machine a SLURM of one node (as root) and run the tests on it"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
@@ -86,6 +87,10 @@ test-slow: setup
 
 clients: setup
 	$(BIN)/python -m pytest tests/clients
+
+cluster: setup
+	tests/cluster/start.sh
+	$(BIN)/python -m pytest tests/cluster
 
 lint: setup
 	$(BIN)/ruff check

@@ -9,9 +9,9 @@ from snakemake.utils import min_version
 from pipeline.calibrated import calibrations, description, measurements
 from pipeline.filmed import compared, recording_pages, tracked
 from pipeline.sources import source_hash
-from pipeline.workflow import FRAMED, check_problems, check_room, chunks
-from pipeline.workflow import comparisons_of, copies, datasets_of, designs, figures
-from pipeline.workflow import hashes_of, joints, member_hashes, members, movies
+from pipeline.workflow import FRAMED, any_of, check_problems, check_room, chunks
+from pipeline.workflow import comparisons_of, copies, datasets_of, designs, families
+from pipeline.workflow import figures, hashes_of, joints, member_hashes, members, movies
 from pipeline.workflow import options, packages, prepare_jobs, product_pages, section
 from pipeline.workflow import robust_designs, shown, shown_options, targets
 

@@ -53,6 +53,13 @@ def work(args: argparse.Namespace) -> None:
     from sim.plan import make_plan
 
     asked = problem.load(args.problem, args.preset)
+    if asked.designs is not None:
+        raise UserError(
+            "the problem asks for several designs",
+            file=args.problem,
+            key="designs",
+            remedy="name one by its number, as in --preset 1",
+        )
     scene = design_scene(asked, args.problem.parent)
     _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)

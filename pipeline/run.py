@@ -1,7 +1,8 @@
 """`python -m pipeline.run TARGET...`: snakemake, started so that it goes on after any kind of end.
 
-A `kill -9` leaves a lock in the folder and may leave jobs running. Both are cleared first, unless
-another snakemake is at work here; snakemake itself then continues what is incomplete.
+A `kill -9` leaves a lock in the folder and may leave jobs running, here or on a cluster. They are
+cleared first, unless another snakemake is at work here; snakemake itself then continues what is
+incomplete.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import psutil
 
+from pipeline import leftovers
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
 from pipeline.workflow import check_problems
@@ -40,7 +42,7 @@ def _clear_the_ground() -> None:
     """Ends left-over jobs and removes the lock of a killed run.
 
     Raises:
-        UserError: a snakemake is at work in this folder.
+        UserError: a snakemake is at work in this folder, or the cluster does not answer.
     """
     active = [process for process in _others() if _is_snakemake(process)]
     if active:
@@ -55,6 +57,8 @@ def _clear_the_ground() -> None:
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
     for process in stubborn:
         process.kill()
+    for number in leftovers.cancel(ROOT):
+        print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
     shutil.rmtree(ROOT / ".snakemake/locks", ignore_errors=True)
 
 

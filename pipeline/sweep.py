@@ -1,148 +1,145 @@
-"""Stage: the loss of a design over load direction and frequency, in parts that are then joined."""
+"""Stage: the losses of a design and of the altered structure over a sweep, in parts then joined."""
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import logging
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline import cli, parts, problem
 from pipeline.errors import UserError
+from pipeline.problem import settings
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.casebook import Casebook, Found
     from pipeline.problem import Problem
-    from sim.batch import Outcome, Solved
-    from sim.scene import Scene
+    from pipeline.problem.settings import Group
+    from pipeline.problem.sweeping import Word
 
 LOG = logging.getLogger(__name__)
-
-Floats = NDArray[np.float64]
 
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
-    return parts.parser("pipeline.sweep", "Map the loss over direction and frequency.")
+    return parts.parser("pipeline.sweep", "Simulate a design at many settings of parameters.")
 
 
 def work(args: argparse.Namespace) -> None:
-    """Computes a part of the map, or joins all parts."""
-    parts.work(args, _run, "sweep", "frequency")
+    """Computes a part of the cases, or joins all parts."""
+    parts.work(args, _run, "sweep", "case")
 
 
 def _run(args: argparse.Namespace) -> None:
-    from pipeline import datasets, provenance
-    from pipeline.scenes import scene_of
-    from pipeline.structures import flat_vertices
+    from pipeline import casebook, datasets, provenance
+    from pipeline.sources import source_hash
 
     asked = problem.load(args.problem, args.preset)
-    if asked.sweep is None or asked.frequency is None:
+    if asked.sweep is None:
         raise UserError(
-            "the problem has no sweep over direction and frequency",
+            "the problem asks for no sweep",
             file=args.problem,
             key="sweep",
-            remedy="add sweep.direction and sweep.frequency, and a harmonic drive",
+            remedy="add sweep.grid, sweep.list or sweep.random",
         )
     design = datasets.read(args.design, "design")
-    scene = scene_of(asked, args.problem.parent)
-    shapes = {
-        "loss_altered": scene.lattice.vertices,
-        "loss": flat_vertices(scene.lattice, design["vertices"]),
-    }
-    directions, frequencies = axes(asked)
-    here = np.array_split(frequencies, args.chunks)[args.chunk]
-    made = part(asked, scene, shapes, directions, here, args.threads)
-    origin = provenance.attributes(asked, "sweep", parents={"design": args.design})
+    if design.sizes["unit"] != asked.lattice.n_units:
+        raise UserError("the design is of another lattice", file=args.design)
+    parents = {"design": args.design}
+    words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.sweep"))
+    key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())
+    folder = args.out.parent / ".journal" / f"sweep_{key.hexdigest()[:16]}"
+    here = settings.part(asked.sweep, args.chunk, args.chunks)
+    found = casebook.known(folder)
+    path = folder / f"part_{args.chunk}.csv"
+    with casebook.Casebook(path, asked.sweep.keys) as book:
+        LOG.info("results as they come: %s", path)
+        _simulate(args, asked, design["vertices"], here, found, book)
+    made = dataset(asked, [case for group in here for case in group.cases], found)
+    LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
+    origin = provenance.attributes(asked, "sweep", parents=parents)
     datasets.write(made, args.out, "sweep", origin)
 
 
-def axes(asked: Problem) -> tuple[Floats, Floats]:
-    """Directions (rad) and frequencies (Hz) of the map."""
-    assert asked.sweep is not None
-    wanted = asked.sweep
-    return (
-        np.linspace(wanted.direction.start, wanted.direction.stop, wanted.direction.points),
-        np.linspace(wanted.frequency.start, wanted.frequency.stop, wanted.frequency.points),
-    )
-
-
-def part(
+def _simulate(
+    args: argparse.Namespace,
     asked: Problem,
-    scene: Scene,
-    shapes: dict[str, Floats],
-    directions: Floats,
-    frequencies: Floats,
-    threads: int,
+    vertices: xr.DataArray,
+    groups: Sequence[Group],
+    found: dict[int, Found],
+    book: Casebook,
+) -> None:
+    """Adds what is missing to ``found`` and to the casebook."""
+    failed = 0
+    with cli.progress(sum(len(group.numbers) for group in groups), "cases") as bar:
+        for group in groups:
+            if not found.keys() >= set(group.numbers):
+                rows = _results(args, asked, vertices, group)
+                found.update(zip(group.numbers, rows, strict=True))
+                words = [list(each.values()) for each in group.settings]
+                book.add(zip(group.numbers, words, rows, strict=True))
+            for number in group.numbers:
+                failed += found[number].status != "ok"
+                bar.update(failed=failed)
+
+
+def _results(
+    args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: Group
+) -> list[Found]:
+    from pipeline import forward
+    from pipeline.casebook import Found
+    from sim.errors import SimulationError
+
+    setting = group.together
+    try:
+        found = forward.results(asked, setting, args.problem.parent, vertices, args.threads)
+    except (forward.UnposedError, SimulationError) as error:
+        return [Found.failed(str(error))] * len(group.numbers)
+    if settings.DIRECTIONS in setting:
+        return found
+    return [forward.mean(found, np.array(asked.drive.case_weights))]
+
+
+def dataset(
+    asked: Problem, cases: Sequence[tuple[int, dict[str, Word]]], found: dict[int, Found]
 ) -> xr.Dataset:
-    """The map of both structures at some of the frequencies."""
+    """The dataset ``sweep`` of some cases."""
     import xarray as xr
 
-    size = (len(directions), len(frequencies))
-    variables: dict[str, tuple[tuple[str, str], NDArray[np.generic]]] = {}
-    with cli.progress(len(shapes) * len(frequencies), "map") as bar:
-        for name, vertices in shapes.items():
-            losses, voids = np.full(size, np.nan), np.full(size, np.nan)
-            status = np.full(size, "ok", dtype=object)
-            for column, frequency in enumerate(frequencies):
-                for row, outcome in enumerate(
-                    _column(asked, scene, vertices, directions, float(frequency), threads)
-                ):
-                    if outcome.value is None:
-                        status[row, column] = outcome.failure
-                    else:
-                        losses[row, column], voids[row, column] = outcome.value
-                bar.update(largest=float(np.nanmax(losses[:, : column + 1])))
-            variables[name] = (("direction", "frequency"), losses)
-            variables["status"] = (("direction", "frequency"), status)
-            variables["min_void_angle"] = (("direction", "frequency"), voids)
-    coordinates = {"direction": np.rad2deg(directions), "frequency": frequencies}
-    return xr.Dataset(variables, coordinates)
-
-
-def _column(
-    asked: Problem,
-    scene: Scene,
-    vertices: Floats,
-    directions: Floats,
-    frequency: float,
-    threads: int,
-) -> Iterator[Outcome[tuple[float, float]]]:
-    """Loss and smallest void angle for each direction at one frequency."""
-    from sim.batch import Case, run_batch
-    from sim.evaluation import objective, target_motion
-    from sim.loads import Harmonic
-    from sim.plan import concrete_parameters, make_plan
+    from pipeline.problem.sweeping import taken_apart
+    from pipeline.responses import loss_units
 
     assert asked.sweep is not None
-    at_frequency = scene.under(
-        tuple(
-            Harmonic(asked.drive.amplitude, frequency, angle)  # type: ignore[union-attr]
-            for angle in directions
-        ),
-        asked.sweep.periods / frequency,
-        frequency,
+    keys = asked.sweep.keys
+    numbers = [number for number, _ in cases]
+    words = [[setting[key] for key in keys] for _, setting in cases]
+    values = [[(taken_apart(word) or (np.nan,))[0] for word in row] for row in words]
+    of_case = {
+        name: ("case", [getattr(found[number], name) for number in numbers])
+        for name in ("loss", "loss_altered", "min_void_angle", "status")
+    }
+    both = ("case", "parameter")
+    made = xr.Dataset(
+        {
+            **of_case,
+            "value": (both, np.array(values)),
+            "setting": (both, np.array([[str(word) for word in row] for row in words])),
+        },
+        {
+            "case": numbers,
+            "parameter": list(keys),
+            "parameter_units": ("parameter", [settings.unit_of(asked.sweep, key) for key in keys]),
+        },
     )
-    plan = make_plan(at_frequency, vertices, threads=threads)
-    LOG.debug("%.6g Hz: %s", frequency, plan.describe())
-    values = concrete_parameters(at_frequency, vertices)
-    target = None if scene.reference is None else target_motion(at_frequency, threads)
-
-    def reduce(solved: Solved) -> tuple[float, float]:
-        number = solved.case.number
-        measure = objective(at_frequency, None if target is None else target[number : number + 1])
-        loss = float(measure(solved.displacement[None], values)[0])
-        voids = at_frequency.topology.smallest_void_angle(values.void, solved.displacement)
-        return loss, float(voids.min())
-
-    cases = (Case(values, at_frequency.drives[k], plan.solver, int(k)) for k in plan.simulated)
-    outcomes = list(run_batch(cases, reduce, threads))
-    return (outcomes[k] for k in np.searchsorted(plan.simulated, plan.case_of))
+    for name in ("loss", "loss_altered"):
+        made[name].attrs["units"] = loss_units(asked)
+    return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:

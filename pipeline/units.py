@@ -84,6 +84,12 @@ def _registry() -> UnitRegistry:
     return UnitRegistry(_DEFINITIONS.strip().splitlines())
 
 
+def take_apart(text: str) -> tuple[float, str] | None:
+    """Number and unit ("" if there is none) of a quantity; None if the text is none."""
+    match = _QUANTITY.fullmatch(text[:_LONGEST])
+    return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
+
+
 def parse(text: object, dimension: Dimension) -> float:
     """The quantity `text` as a float in the working unit of `dimension`.
 

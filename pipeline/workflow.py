@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -32,6 +32,9 @@ from pipeline.problem import (
     preset_names,
     section_hash,
 )
+from pipeline.problem.families import count, numbered
+from pipeline.problem.loading import overlaid
+from pipeline.problem.settings import group_count
 
 PRODUCTS = ("_fabrication", "_spectrum", "_gains", RECORDINGS)
 """Ends of the targets of a study beside its report."""
@@ -75,21 +78,30 @@ FRAMED = (Study("fig2"),)
 """From which the framework is drawn, Figure 1."""
 
 
-def studies(root: Path = ROOT) -> list[Study]:
-    """Every study below experiments/, each followed by its presets.
+def families(root: Path = ROOT) -> dict[Study, list[Study]]:
+    """Every study below experiments/, each followed by its presets, with their several designs.
 
     A file that is no YAML counts as a study without presets: the stage that reads it tells why.
     """
-    found = []
+    found = {}
     for path in sorted(root.glob("experiments/*/problem.yaml")):
         try:
             content = yaml.load(path.read_bytes(), Loader=yaml.CSafeLoader)
         except yaml.YAMLError:
             content = None
-        presets = content.get("presets") if isinstance(content, dict) else None
-        found.append(Study(path.parent.name))
-        found += [Study(path.parent.name, str(preset)) for preset in presets or ()]
+        content = content if isinstance(content, dict) else {}
+        presets = content.pop("presets", None)
+        for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
+            whole = overlaid(content, laid if isinstance(laid, dict) else {})
+            names = (numbered(str(preset), k + 1) for k in range(count(whole)))
+            study = Study(path.parent.name, str(preset))
+            found[study] = [Study(study.name, name) for name in names]
     return found
+
+
+def studies(root: Path = ROOT) -> list[Study]:
+    """Every study with its presets and designs."""
+    return [each for study, designs in families(root).items() for each in (study, *designs)]
 
 
 def joints(root: Path = ROOT) -> dict[str, list[Study]]:
@@ -110,10 +122,15 @@ def joints(root: Path = ROOT) -> dict[str, list[Study]]:
     return found
 
 
+def together() -> dict[str, list[Study]]:
+    """The studies of every page of several, by target."""
+    return joints() | {str(study): designs for study, designs in families().items() if designs}
+
+
 def targets() -> dict[str, str]:
     """What every target builds: the folder of a study or of a figure of several."""
     single = {target: str(study) for study in studies() for target in study.targets}
-    return single | {figure: figure for figure in joints()}
+    return single | {figure: figure for figure in together()}
 
 
 def figures() -> list[str]:
@@ -150,14 +167,19 @@ def hashes_of(shown: Sequence[Study]) -> str:
     return " ".join(section_hash(problem_of(study), "report") for study in shown)
 
 
+def any_of(names: Iterable[str]) -> str:
+    """A pattern that these names match, and nothing else does."""
+    return "|".join(sorted(set(names))) or "(?!)"
+
+
 def members(wildcards: Wildcards) -> list[str]:
     """The datasets that a figure of several studies shows."""
-    return datasets_of(joints()[f"{wildcards.name}{wildcards.preset}"])
+    return datasets_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
 def product_pages(built: str, product: str) -> list[str]:
     """The pages of a product (fabrication, spectrum) of a study, or of all studies of a figure."""
-    names = joints().get(built) or [Study.parse(built)]
+    names = together().get(built) or [Study.parse(built)]
     return [f"results/{study}/{product}/index.html" for study in names]
 
 
@@ -178,7 +200,7 @@ def structures_built(problem: Problem) -> tuple[str, ...]:
 
 def member_hashes(wildcards: Wildcards) -> str:
     """Hash of what the figure depends on in the problem files of its studies."""
-    return hashes_of(joints()[f"{wildcards.name}{wildcards.preset}"])
+    return hashes_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
 def asked_for(words: Collection[str]) -> list[Study]:
@@ -188,10 +210,10 @@ def asked_for(words: Collection[str]) -> list[Study]:
     """
     by_target = {target: study for study in studies() for target in study.targets}
     names = {study.name for study in by_target.values()}
-    together = joints()
+    several = together()
     words = [*words, *(figures() if ALL in words else ())]
     words = [_without_product(word) for word in words]
-    found = [study for word in words for study in together.get(word, ())]
+    found = [study for word in words for study in several.get(word, ())]
     for word in words:
         study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
         if study.name in names:
@@ -271,9 +293,9 @@ def robust_designs(wildcards: Wildcards) -> dict[str, str]:
 
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:
-    """The parts of the map, at most so many and none without a frequency of its own."""
+    """The parts of the sweep, at most so many and none without a case of its own."""
     sweep = problem_of(study_of(wildcards)).sweep
-    return _parts(wildcards, "sweep", min(most, sweep.frequency.points if sweep else 1))
+    return _parts(wildcards, "sweep", min(most, group_count(sweep) if sweep else 1))
 
 
 def copies(wildcards: Wildcards, most: int) -> list[str]:

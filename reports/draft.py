@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, RampHarmonic
+from pipeline.problem.settings import count
 from reports.style import ALTERED
 
 
@@ -33,8 +34,7 @@ def _sizes(problem: Problem) -> dict[str, float]:
         "load steps in the loss": problem.horizon.steps or 0,
         "evaluations of the design": sqp.evaluations if sqp else 0,
         "drive cycles": 0 if static else problem.response.cycles,
-        "angles in the map": sweep.direction.points if sweep else 0,
-        "frequencies in the map": sweep.frequency.points if sweep else 0,
+        "cases in the sweep": count(sweep) if sweep else 0,
         "imperfect copies": robustness.samples if robustness else 0,
     }
 

@@ -12,6 +12,7 @@ from pipeline.problem.drives import Harmonic, RampHarmonic
 from reports import content
 from reports.content import Words
 from reports.facts import Fact
+from reports.mapped import MAPPED
 from reports.page import Page
 from reports.player import Reel, payload
 from reports.study import Study
@@ -47,8 +48,8 @@ class Kind:
 
 def of(problem: Problem) -> Kind:
     """The report of a problem: shielding from a source with its map, of a wave, or of a path."""
-    shaken = isinstance(problem.drive, Harmonic | RampHarmonic)
-    if shaken and problem.sweep is not None:
+    shaken, sweep = isinstance(problem.drive, Harmonic | RampHarmonic), problem.sweep
+    if shaken and sweep is not None and sweep.grid is not None and set(sweep.keys) == {*MAPPED}:
         return _shielding()
     mimics = problem.objective.kind == "displacement" and problem.objective.target == "intact"
     return _of_a_wave() if mimics and not problem.static else _along_a_path()

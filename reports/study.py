@@ -103,7 +103,7 @@ class Study:
 
     @property
     def sweep(self) -> xr.Dataset:
-        """The loss over direction and frequency, of a problem that asks for it."""
+        """The losses over parameters, of a problem that asks for them."""
         return self.datasets["sweep"]
 
     @property

@@ -1,9 +1,9 @@
-"""What datasets hold of simulated motions: of the structures, and of the loss over a map."""
+"""What datasets hold of simulated motions: of the structures, and of their losses over a sweep."""
 
 from __future__ import annotations
 
 from pipeline.datasets.designs import NETWORK
-from pipeline.datasets.variables import CASE, ENERGY, LABELS, UNIT, Table, Variable, label
+from pipeline.datasets.variables import CASE, ENERGY, LABELS, UNIT, Table, Variable, label, names
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
 _STEP = ("structure", "case", "time")
@@ -90,13 +90,23 @@ RESPONSE: Table = (
     }
 )
 
-_MAP = ("direction", "frequency")
+_CASE = ("case",)
 
 SWEEP: Table = {
-    "direction": label(("direction",), "degree", "direction of the drive"),
-    "frequency": label(("frequency",), "Hz", "frequency of the drive"),
-    "loss": Variable(_MAP, "1", "loss of the cloaked structure", gaps=True),
-    "loss_altered": Variable(_MAP, "1", "loss of the structure before optimisation", gaps=True),
-    "status": Variable(_MAP, "1", "ok, or why the case failed", "str"),
-    "min_void_angle": Variable(_MAP, "rad", "smallest void angle of the cloaked case", gaps=True),
+    "case": label(_CASE, "1", "number of the case", "int64"),
+    "parameter": names("parameter", "what the cases set: keys of the problem, joined by dots"),
+    "parameter_units": label(("parameter",), "1", "unit of the parameter's values", "str"),
+    "value": Variable(
+        ("case", "parameter"),
+        "parameter_units (parameter)",
+        "value of a parameter, if a number",
+        gaps=True,
+    ),
+    "setting": Variable(("case", "parameter"), "1", "value of a parameter, in words", "str"),
+    "loss": Variable(_CASE, "1", "loss of the cloaked structure", gaps=True, also=ENERGY),
+    "loss_altered": Variable(
+        _CASE, "1", "loss of the structure before optimisation", gaps=True, also=ENERGY
+    ),
+    "status": Variable(_CASE, "1", "ok, or why the case failed", "str"),
+    "min_void_angle": Variable(_CASE, "rad", "smallest void angle, cloaked structure", gaps=True),
 }

@@ -107,9 +107,6 @@ def _horizon(problem: Problem) -> Findings:
     if problem.horizon.periods is not None and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no period"
         yield Finding(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
-    if problem.sweep is not None and problem.frequency is None:
-        what = f"a {problem.drive.kind} drive has no frequency to sweep"
-        yield Finding(what, ("sweep",), "leave the sweep out, or drive harmonically")
     if problem.horizon.steps is not None and not isinstance(problem.drive, LinearRamp):
         what = f"a {problem.drive.kind} drive does not load in equal steps"
         yield Finding(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
@@ -260,17 +257,6 @@ def _symmetry(problem: Problem) -> Findings:
         yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
 
 
-def _sweep(problem: Problem) -> Findings:
-    if problem.sweep is None:
-        return
-    for name, axis in (
-        ("direction", problem.sweep.direction),
-        ("frequency", problem.sweep.frequency),
-    ):
-        if axis.points > 1 and axis.stop <= axis.start:
-            yield Finding("the axis does not ascend", ("sweep", name, "to"), "end above `from`")
-
-
 def _optimiser(problem: Problem) -> Findings:
     optimiser = problem.optimiser
     if not optimiser.methods.chosen:
@@ -294,6 +280,5 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _regions,
     _start_is_feasible,
     _symmetry,
-    _sweep,
     _optimiser,
 )

@@ -12,19 +12,24 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from pipeline.errors import UserError
-from pipeline.problem import yamlfile
+from pipeline.problem import families, settings, yamlfile
 from pipeline.problem.checks import findings
 from pipeline.problem.drives import TimeSeries
 from pipeline.problem.model import Problem
 from pipeline.problem.quantities import FOLDER
 from pipeline.problem.section import Section
+from pipeline.problem.sweeping import Sweep
 from pipeline.problem.yamlfile import Document, KeyPath
 
 Alone = TypeVar("Alone", bound=Section)
 
 
 def load(path: str | Path, preset: str | None = None) -> Problem:
-    """The problem in a YAML file, with one of its presets laid over it.
+    """The problem in a YAML file, with one of its presets laid over it, or one of its designs.
+
+    Args:
+        path: the file.
+        preset: the name of a preset, the number of a design, or both: "quick", "2", "quick.2".
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
@@ -32,15 +37,45 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     document = yamlfile.read(Path(path))
     data = dict(document.data)
     presets = data.pop("presets", None) or {}
+    preset, number = families.parted(preset)
     if preset is not None:
         data = overlaid(data, _preset(document, presets, preset))
+    if number is not None:
+        data = _design(document, data, number)
     try:
         problem = Problem.model_validate(data, context={FOLDER: document.path.parent})
     except ValidationError as error:
         raise told(error, document, data, preset) from error
+    if problem.sweep is not None:
+        _check_sweep(problem.sweep, document, data, preset)
     for finding in findings(problem):
         raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
     return _with_recording(problem, document)
+
+
+def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[str, Any]:
+    try:
+        return families.chosen(data, number)
+    except LookupError as error:
+        count = families.count(data)
+        remedy = f"give one from 1 to {count}" if count else "name a preset, or none"
+        raise UserError(str(error), file=document.path, key="designs", remedy=remedy) from error
+
+
+def _check_sweep(
+    sweep: Sweep, document: Document, data: Mapping[str, Any], preset: str | None
+) -> None:
+    """Tries the first value of every parameter that a sweep sets, one at a time."""
+    first = next(settings.settings(sweep))
+    for key, word in first.items():
+        try:
+            Problem.model_validate(
+                settings.laid(data, {key: word}), context={FOLDER: document.path.parent}
+            )
+        except ValidationError as error:
+            what, remedy = reason(error)
+            place = ("sweep", sweep.form, key)
+            raise _user_error(document, preset, data, place, what, remedy) from error
 
 
 def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
@@ -110,6 +145,12 @@ def told(
     if others:
         remedy += f" ({len(others)} more after this one)"
     return _user_error(document, preset, data, keys, what, remedy)
+
+
+def reason(error: ValidationError) -> tuple[str, str]:
+    """What is wrong first, and the remedy."""
+    what, remedy, _ = _in_words(error.errors(include_url=False)[0])
+    return what, remedy
 
 
 _WORDS = {

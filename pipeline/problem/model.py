@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from pipeline.problem.drives import Drive, Harmonic, LinearRamp, RampHarmonic, TanhRamp
 from pipeline.problem.fabrication import Fabrication
+from pipeline.problem.families import Designs
 from pipeline.problem.lattices import Lattice
 from pipeline.problem.prediction import Prediction, Tolerances
 from pipeline.problem.quantities import (
@@ -34,6 +35,7 @@ from pipeline.problem.report import Report, Robustness
 from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Selector
 from pipeline.problem.spectrum import Spectrum
+from pipeline.problem.sweeping import Sweep
 
 UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
 UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
@@ -311,48 +313,6 @@ class Response(Section):
     samples: Samples = 401
 
 
-class DirectionAxis(Section):
-    """Equally spaced directions, both ends included.
-
-    Attributes:
-        start: the first.
-        stop: the last.
-        points: how many.
-    """
-
-    start: Angle = Field(alias="from")
-    stop: Angle = Field(alias="to")
-    points: Count
-
-
-class FrequencyAxis(Section):
-    """Equally spaced frequencies, both ends included.
-
-    Attributes:
-        start: the first.
-        stop: the last.
-        points: how many.
-    """
-
-    start: Frequency = Field(alias="from")
-    stop: Frequency = Field(alias="to")
-    points: Count
-
-
-class Sweep(Section):
-    """The robustness map: the loss over load direction and frequency.
-
-    Attributes:
-        direction: along one side of the map.
-        frequency: along the other.
-        periods: of the drive over which the loss is taken.
-    """
-
-    direction: DirectionAxis
-    frequency: FrequencyAxis
-    periods: Positive = 2.0
-
-
 class Problem(Section):
     """A study: what to design, under which loads, to which end; in mm, N, s, tonne, rad.
 
@@ -373,7 +333,8 @@ class Problem(Section):
         optimiser: how to look for the design.
         solver: accuracy of the simulation.
         response: how much of it is shown.
-        sweep: the robustness map, if there is to be one.
+        designs: values of one parameter, named by its keys joined by dots: a design for each.
+        sweep: the losses at many settings of parameters, if they are wanted.
         robustness: trials of imperfect copies, if there are to be any.
         prediction: by how much specimens and constants may be off.
         spectrum: analysis of small vibrations, if there is to be one.
@@ -397,6 +358,7 @@ class Problem(Section):
     optimiser: Optimiser
     solver: Solver = Solver()
     response: Response = Response()
+    designs: Designs | None = None
     sweep: Sweep | None = None
     robustness: Robustness | None = None
     prediction: Prediction = Prediction()

@@ -3,7 +3,7 @@ container: "docker://python:3.13-bookworm"
 
 wildcard_constraints:
     name=r"\w+",
-    preset=r"(@\w+)?",
+    preset=r"(@\w+(\.\d+)?)?",
     method=r"\w+",
     recording=r"\w+",
     calibration=r"\w+",

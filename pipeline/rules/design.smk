@@ -7,6 +7,9 @@ rule design:
     log:
         "results/{name}{preset}/logs/design_{method}.log",
     threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=480,
     params:
         study=options,
         problem=section("design"),
@@ -26,6 +29,7 @@ rule select:
         "results/{name}{preset}/design.nc",
     log:
         "results/{name}{preset}/logs/select.log",
+    localrule: True
     threads: 1
     params:
         study=options,
@@ -49,6 +53,9 @@ rule reconsider:
     log:
         "results/{name}{preset}/logs/geometric_design.log",
     threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=240,
     params:
         study=options,
         problem=section("geometric"),

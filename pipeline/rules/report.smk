@@ -48,7 +48,7 @@ rule joint_report:
     log:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
-        name="|".join(figure for figure in joints() if "@" not in figure) or "(?!)",
+        name=any_of(figure for figure in joints() if "@" not in figure),
     threads: 1
     params:
         preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),
@@ -62,4 +62,36 @@ rule joint_report:
         " --results results --out-dir {params.folder} --log {log}"
 
 
-ruleorder: joint_report > report
+# Several designs of one problem on one page.
+rule family_report:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        datasets=members,
+    output:
+        multiext(
+            "results/{name}{preset}/report/{name}",
+            ".pdf",
+            ".svg",
+            ".png",
+        ),
+        page="results/{name}{preset}/report/index.html",
+        facts="results/{name}{preset}/report/facts.json",
+    log:
+        "results/{name}{preset}/logs/report.log",
+    wildcard_constraints:
+        name=any_of(study.name for study, designs in families().items() if designs),
+        preset=r"(@[A-Za-z_]\w*)?",
+    threads: 1
+    params:
+        study=options,
+        folder=subpath(output.page, parent=True),
+        problem=member_hashes,
+        source=source_hash("reports.family.build"),
+    message:
+        "Drawing figure and page of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m reports.family.build {params.study} --results results"
+        " --out-dir {params.folder} --log {log}"
+
+
+ruleorder: joint_report > family_report > report

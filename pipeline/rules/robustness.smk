@@ -11,6 +11,9 @@ rule scatter:
     log:
         "results/{name}{preset}/logs/scatter_{chunk}.log",
     threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=240,
     params:
         study=options,
         chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
@@ -30,6 +33,7 @@ rule gather_scatter:
         "results/{name}{preset}/scatter.nc",
     log:
         "results/{name}{preset}/logs/scatter.log",
+    localrule: True
     threads: 1
     params:
         problem=section("scatter"),

@@ -7,6 +7,9 @@ rule simulate:
     log:
         "results/{name}{preset}/logs/{law}simulate.log",
     threads: 1
+    resources:
+        mem_mb=4000,
+        runtime=60,
     params:
         study=options,
         law=lambda wildcards: "--geometric" if wildcards.law else "",

@@ -11,13 +11,16 @@ rule sweep:
     log:
         "results/{name}{preset}/logs/sweep_{chunk}.log",
     threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=240,
     params:
         study=options,
         chunks=lambda wildcards: len(chunks(wildcards, MOST_CHUNKS)),
         problem=section("sweep"),
         source=source_hash("pipeline.sweep"),
     message:
-        "Mapping robustness of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
+        "Sweeping parameters of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
         "python -m pipeline.sweep run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
@@ -30,11 +33,12 @@ rule gather_sweep:
         "results/{name}{preset}/sweep.nc",
     log:
         "results/{name}{preset}/logs/sweep.log",
+    localrule: True
     threads: 1
     params:
         problem=section("sweep"),
         source=source_hash("pipeline.sweep"),
     message:
-        "Joining the parts of the map of {wildcards.name}{wildcards.preset}"
+        "Joining the parts of the sweep of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.sweep gather --parts {input} --out {output} --log {log}"

@@ -16,6 +16,7 @@ from pipeline.comparison.reduction import reduction
 from reports import checks, experiment, measures
 from reports.claims import MEASURED
 from reports.facts import ABSENT, Fact, grouped, number, percent, share, worded
+from reports.mapped import mapped
 from reports.recorded import Array, Recorded
 from reports.scene import Scene, cycles
 from reports.structure import CLOAK, from_dataset, middle_of_top_edge
@@ -30,7 +31,7 @@ PAPER_REDUCTION = 0.7
 
 def collect(study: Study) -> list[Fact]:
     """All facts of Figure 2, under headings."""
-    scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
+    scene, design, response, sweep = study.scene, study.design, study.response, mapped(study.sweep)
     return [
         *grouped("Scene", scene_facts(scene, design)),
         *grouped("Shielding", loss_facts(scene, response)),

@@ -14,6 +14,7 @@ from reports.fig2.structures import (
     simulated_rows,
     snapshots_panel,
 )
+from reports.mapped import mapped
 from reports.scene import Scene
 from reports.structure import from_dataset
 from reports.study import Study
@@ -27,7 +28,7 @@ SNAPSHOT = 40.0
 
 def build(study: Study) -> Figure:
     """The whole figure; recorded snapshots stand above the simulated ones of their structure."""
-    scene, design, response, sweep = study.scene, study.design, study.response, study.sweep
+    scene, design, response, sweep = study.scene, study.design, study.response, mapped(study.sweep)
     simulated = simulated_rows(scene, response)
     names = [row.name for row in simulated]
     recordings = monitored_recordings(study)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from reports.mapped import mapped
 from reports.scene import Scene
 from reports.structure import from_dataset, middle_of_top_edge
 from reports.study import Study
@@ -18,7 +19,7 @@ Columns = dict[str, NDArray[Any]]
 
 def build(study: Study) -> list[Table]:
     """All tables, in the order of the panels."""
-    design, response, sweep = study.design, study.response, study.sweep
+    design, response, sweep = study.design, study.response, mapped(study.sweep)
     return [
         Table("design.csv", "vertices of the cloaked and of the initial design", vertices(design)),
         Table("loss_history.csv", "loss against evaluation (panel b)", history(design)),

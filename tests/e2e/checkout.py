@@ -29,7 +29,7 @@ SMALLER = {
     "optimiser": {"methods": {"sqp": {"evaluations": 12}, "mma": {"evaluations": 12}}},
     "solver": {"accuracy": "draft"},
     "response": {"cycles": 1, "samples": 21},
-    "sweep": {"direction": {"points": 3}, "frequency": {"points": 2}, "periods": 1},
+    "sweep": {"grid": {"drive.directions": {"points": 3}, "drive.frequency": {"points": 2}}},
     "presets": {},
 }
 ROOMS = ("experiments", "pipeline", "profiles", "reports", "sim")

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import datasets, problem, provenance, scatter, verify
+from pipeline import datasets, problem, scatter, verify
 from pipeline.copies import noises, simulate
-from pipeline.datasets import TABLES
-from pipeline.scenes import altered_lattice_of, lattice_of, scene_of
-from pipeline.structures import network_variables, spread, unit_coordinates
+from pipeline.scenes import scene_of
 from sim.errors import SimulationError
-from tests.pipeline import static
+from tests.pipeline import static, unchanged
 
 MORE = "robustness: { samples: 4, geometry: [0.05], stiffness: [0.1], seed: 3 }\n"
 
@@ -22,34 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small study with a hole, and the design that changes nothing."""
     folder = tmp_path_factory.mktemp("hole")
     path = static.write(folder, static.HOLE + MORE, size=5, amplitude=3.0)
-    asked = problem.load(path)
-    intact, altered = lattice_of(asked), altered_lattice_of(asked)
-    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
-    labels = {"case": 1, "method": 1, "evaluation": 1, "variable": 1, "constraint": 0}
-    plain = {
-        name: (variable.dims, np.zeros([labels[dim] for dim in variable.dims], variable.dtype))
-        for name, variable in TABLES["design"].items()
-        if set(variable.dims) <= labels.keys() and not variable.coordinate
-    }
-    design = xr.Dataset(
-        plain
-        | network_variables(asked, scene_of(asked, folder))
-        | {
-            "vertices": (("unit", "vertex", "xy"), vertices),
-            "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
-            "centroid": (("unit", "xy"), vertices.mean(axis=1)),
-        },
-        unit_coordinates(intact)
-        | {
-            "direction": ("case", [180.0]),
-            "method": ["sqp"],
-            "evaluation": [0],
-            "constraint": np.zeros(0, "U1"),
-            "constraint_units": ("constraint", np.zeros(0, "U1")),
-        },
-        {"shipped_method": "sqp"},
-    )
-    datasets.write(design, folder / "design.nc", "design", provenance.attributes(asked, "design"))
+    unchanged.write(path)
     return folder
 
 

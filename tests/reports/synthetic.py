@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets, problem, provenance
-from pipeline.problem import Output, Problem
+from pipeline.problem import Output, Problem, settings
 from pipeline.problem.drives import Harmonic
 from reports import study
 from reports.study import Study
@@ -239,18 +239,25 @@ def _motion(chosen: Problem, lattice: Lattice, time: np.ndarray, reach: float) -
 
 def sweep(chosen: Problem) -> xr.Dataset:
     assert chosen.sweep is not None
-    angles, rates = chosen.sweep.direction, chosen.sweep.frequency
-    direction = np.degrees(np.linspace(angles.start, angles.stop, angles.points))
-    frequency = np.linspace(rates.start, rates.stop, rates.points)
-    wave = 1.0 + 0.25 * np.cos(4 * np.radians(direction))[:, None]
+    cases = list(settings.settings(chosen.sweep))
+    words = np.array([[str(case[key]) for key in chosen.sweep.keys] for case in cases])
+    value = np.array([[float(word.split()[0]) for word in row] for row in words])
+    direction, frequency = value.T
+    wave = 1.0 + 0.25 * np.cos(4 * np.radians(direction))
     loss = 0.05 + 0.06 * ((frequency - 2) / 14) ** 2 * wave
-    dims = ("direction", "frequency")
+    both = ("case", "parameter")
     return xr.Dataset(
         {
-            "loss": (dims, loss),
-            "loss_altered": (dims, 20.0 * loss),
-            "status": (dims, np.full(loss.shape, "ok")),
-            "min_void_angle": (dims, np.full(loss.shape, -0.1)),
+            "value": (both, value),
+            "setting": (both, words),
+            "loss": ("case", loss),
+            "loss_altered": ("case", 20.0 * loss),
+            "status": ("case", np.full(loss.shape, "ok")),
+            "min_void_angle": ("case", np.full(loss.shape, -0.1)),
         },
-        {"direction": direction, "frequency": frequency},
+        {
+            "case": np.arange(len(cases)),
+            "parameter": list(chosen.sweep.keys),
+            "parameter_units": ("parameter", ["deg", "Hz"]),
+        },
     )

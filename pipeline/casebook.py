@@ -1,0 +1,84 @@
+"""Cases with their results as they come: a CSV that is read while it grows, and resumed from.
+
+Every part of a sweep appends to a file of its own. A line counts once it is whole: whatever ends a
+process, at most the cases under way are lost.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+COLUMNS = ("loss", "loss_altered", "min_void_angle", "status")
+
+
+class Found(NamedTuple):
+    """What came of a case; NaN where nothing did, and why."""
+
+    loss: float
+    loss_altered: float
+    min_void_angle: float
+    status: str = "ok"
+
+    @classmethod
+    def failed(cls, why: str) -> Found:
+        """A case without a result."""
+        return cls(float("nan"), float("nan"), float("nan"), why)
+
+
+def header(keys: Sequence[str]) -> list[str]:
+    """The names of the columns: the case's number, what it sets, what came of it."""
+    return ["case", *keys, *COLUMNS]
+
+
+def known(folder: Path) -> dict[int, Found]:
+    """The results in all files of a folder, by number of the case."""
+    found = {}
+    for path in sorted(folder.glob("*.csv")):
+        for row in csv.DictReader(_whole_lines(path)):
+            loss, altered, void = (float(row[name]) for name in COLUMNS[:-1])
+            found[int(row["case"])] = Found(loss, altered, void, row["status"])
+    return found
+
+
+def _whole_lines(path: Path) -> Iterator[str]:
+    """The lines of a file but for one that was cut off."""
+    with path.open(encoding="utf-8", newline="") as file:
+        yield from (line for line in file if line.endswith("\n"))
+
+
+class Casebook:
+    """Appends results to a file, which is begun where there is none; a context manager."""
+
+    def __init__(self, path: Path, keys: Sequence[str]) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _cut_off(path)
+        self._file: TextIO = path.open("a", encoding="utf-8", newline="")
+        self._rows = csv.writer(self._file, lineterminator="\n")
+        if path.stat().st_size == 0:
+            self._rows.writerow(header(keys))
+
+    def add(self, rows: Iterable[tuple[int, Sequence[object], Found]]) -> None:
+        """Numbers, settings and results of some cases, on the disk when this returns."""
+        for number, setting, found in rows:
+            status = " ".join(found.status.split())
+            self._rows.writerow([number, *setting, *map(repr, found[:-1]), status])
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def __enter__(self) -> Casebook:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+
+def _cut_off(path: Path) -> None:
+    """Removes a last line that a kill left unfinished."""
+    if path.exists():
+        content = path.read_bytes()
+        with path.open("r+b") as file:
+            file.truncate(content.rfind(b"\n") + 1)

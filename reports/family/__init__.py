@@ -1,0 +1,1 @@
+"""Report of several designs of one problem on one page."""

@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Makes this machine a SLURM cluster of one node, without systemd and without accounting, as root.
+# For the tests of this folder: it replaces /etc/slurm/slurm.conf.
+set -euo pipefail
+
+node=$(hostname -s)
+memory=$(awk '/MemTotal/ { print int($2 / 1024 * 0.9) }' /proc/meminfo)
+
+install -d -m 755 /etc/slurm /var/spool/slurmctld /var/spool/slurmd
+install -d -m 711 -o munge /etc/munge /var/lib/munge /var/log/munge
+install -d -m 755 -o munge /run/munge
+if [ ! -s /etc/munge/munge.key ]; then
+    (umask 077 && head -c 1024 /dev/urandom >/etc/munge/munge.key)
+    chown munge /etc/munge/munge.key
+fi
+
+cat >/etc/slurm/slurm.conf <<EOF
+ClusterName=one
+SlurmctldHost=$node
+SlurmUser=root
+AuthType=auth/munge
+StateSaveLocation=/var/spool/slurmctld
+SlurmdSpoolDir=/var/spool/slurmd
+SlurmctldPidFile=/run/slurmctld.pid
+SlurmdPidFile=/run/slurmd.pid
+SlurmctldLogFile=/var/log/slurmctld.log
+SlurmdLogFile=/var/log/slurmd.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core_Memory
+MpiDefault=none
+MinJobAge=600
+ReturnToService=2
+SchedulerParameters=batch_sched_delay=0,sched_interval=2
+NodeName=$node CPUs=$(nproc) RealMemory=$memory State=UNKNOWN
+PartitionName=all Nodes=$node Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
+EOF
+
+ended() { ! pgrep -x "$1" >/dev/null; }
+
+pgrep -x munged >/dev/null || runuser -u munge -- munged
+for daemon in slurmctld slurmd; do
+    if ! ended "$daemon"; then
+        kill "$(cat "/run/$daemon.pid")"
+        until ended "$daemon"; do sleep 0.1; done
+    fi
+    "$daemon" -c
+done
+for _ in $(seq 100); do
+    if sinfo --noheader --states=idle --format=%n 2>/dev/null | grep -qx "$node"; then exit 0; fi
+    sleep 0.1
+done
+sinfo >&2
+exit 1

@@ -1,0 +1,54 @@
+"""The design that changes nothing, to feed stages that want one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline import datasets, problem, provenance
+from pipeline.datasets import TABLES
+from pipeline.responses import case_directions
+from pipeline.scenes import altered_lattice_of, lattice_of, scene_of
+from pipeline.structures import network_variables, spread, unit_coordinates
+
+
+def write(path: Path) -> Path:
+    """Writes design.nc beside a problem file."""
+    asked = problem.load(path)
+    intact, altered = lattice_of(asked), altered_lattice_of(asked)
+    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
+    labels = {
+        "case": len(case_directions(asked)),
+        "method": 1,
+        "evaluation": 1,
+        "variable": 1,
+        "constraint": 0,
+    }
+    plain = {
+        name: (variable.dims, np.zeros([labels[dim] for dim in variable.dims], variable.dtype))
+        for name, variable in TABLES["design"].items()
+        if set(variable.dims) <= labels.keys() and not variable.coordinate
+    }
+    design = xr.Dataset(
+        plain
+        | network_variables(asked, scene_of(asked, path.parent))
+        | {
+            "vertices": (("unit", "vertex", "xy"), vertices),
+            "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+            "centroid": (("unit", "xy"), vertices.mean(axis=1)),
+        },
+        unit_coordinates(intact)
+        | {
+            "direction": ("case", np.rad2deg(case_directions(asked))),
+            "method": ["sqp"],
+            "evaluation": [0],
+            "constraint": np.zeros(0, "U1"),
+            "constraint_units": ("constraint", np.zeros(0, "U1")),
+        },
+        {"shipped_method": "sqp"},
+    )
+    out = path.with_name("design.nc")
+    datasets.write(design, out, "design", provenance.attributes(asked, "design"))
+    return out
