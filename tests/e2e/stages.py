@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline import datasets, design, reconsider, select, simulate
+from pipeline import datasets, design, reconsider, select, simulate, verify
 from pipeline.problem import load
 
 
@@ -46,6 +46,14 @@ def build_again(problem: Path, preset: str | None, folder: Path) -> Built:
     moved = ["--design", str(second), "--geometric", "--out", str(response)]
     assert simulate.main([*study, *moved]) == 0
     return Built(datasets.read(second, "design"), datasets.read(response, "response"))
+
+
+def build_verification(problem: Path, preset: str | None, folder: Path) -> xr.Dataset:
+    """The checks of a design that was built in the folder."""
+    out = folder / "verification.nc"
+    given = ["--design", str(folder / "design.nc"), "--out", str(out)]
+    assert verify.main([*_options(problem, preset), *given]) == 0
+    return datasets.read(out, "verification")
 
 
 def _options(problem: Path, preset: str | None) -> list[str]:
