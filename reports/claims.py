@@ -130,7 +130,7 @@ def _counted(statuses: Sequence[Status]) -> str:
 
 def _judge(claim: Claim, known: Mapping[str, Fact]) -> Judged:
     prefix, dot, key = claim.fact.rpartition(".")
-    spacing = known.get(f"{prefix}{dot}spacing")
+    spacing = known.get(f"{prefix}{dot}spacing") or known.get("spacing")
     fact = known.get(claim.fact)
     missing = "no result" if known else "study not built"
     simulation = _side(claim, fact, spacing, missing)

@@ -64,6 +64,9 @@ def _design(design: Design) -> Iterator[Fact]:
     key = f"design_{design.number}"
     cloaked, altered = _boundary(design, "cloaked"), _boundary(design, "altered")
     yield number(f"{key}.cloak", "Units in the cloak", design.units)
+    if design.study.problem.cloak.bounds is not None:
+        radius = design.study.problem.cloak.bounds[2]
+        yield number(f"{key}.radius", "Radius of the cloak", radius, "mm")
     yield number(f"{key}.boundary", "Largest |U| on the boundary", cloaked, digits=3)
     yield share(f"{key}.boundary_reduction", "Reduced by", 1.0 - cloaked / altered,
                 note="against the altered structure")  # fmt: skip

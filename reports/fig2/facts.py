@@ -54,6 +54,7 @@ def scene_facts(scene: Scene, design: xr.Dataset) -> Iterator[Fact]:
     yield replace(checks.bias_fact(initial), paper="20°")
     yield number("amplitude", "Amplitude A", scene.amplitude, "mm", paper="4.5 mm")
     yield number("frequency", "Frequency f", scene.frequency, "Hz", paper="2 Hz")
+    yield number("period", "Period T", 1e3 * scene.period, "ms")
     angles = ", ".join(f"{angle:g}" for angle in scene.directions) + "°"
     count = len(scene.directions)
     yield Fact("directions", "Loading angles α", count, "1", angles, "0, 45, 90, 135°")
@@ -160,6 +161,8 @@ def motion_facts(scene: Scene, response: xr.Dataset) -> Iterator[Fact]:
     """Peak-to-peak u_y of the unit in the middle of the top edge."""
     series = monitored(scene, response)
     angle = float(series["direction"])
+    yield number("monitored_angle", "Loading angle α of it", angle, "deg")
+    yield number("monitored_cycles", "Cycles shown", cycles(scene, response), digits=3)
     for suffix, count, paper in (
         ("", cycles(scene, response), ("5.2 mm", "1.9 mm", "63 %")),
         ("_horizon", scene.horizon * scene.frequency, ("—", "—", "—")),
@@ -220,13 +223,15 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
     yield share(
         "map_reduction", "RMS |U| reduced at least by", 1 - float(np.sqrt(ratio.max())), note=note
     )
-    for key, label, axis, unit, paper in (
-        ("map_angles", "Angles α", "direction", "°", "0–180°"),
-        ("map_frequencies", "Frequencies f", "frequency", " Hz", "2–16 Hz"),
+    for key, label, axis, unit, of, paper in (
+        ("map_angles", "Angles α", "direction", "°", "deg", "0–180°"),
+        ("map_frequencies", "Frequencies f", "frequency", " Hz", "Hz", "2–16 Hz"),
     ):
         values = sweep[axis].values
         words = f"{values.min():g}–{values.max():g}{unit}"
         yield Fact(key, label, len(values), "1", words, paper, f"{len(values)} values")
+        for end, edge in (("least", values.min()), ("most", values.max())):
+            yield number(f"{key}_{end}", f"{label}, {end}", float(edge), of)
     failed = int((sweep["status"] != "ok").sum())
     yield number("map_failed", "Points without a result", failed, note=f"of {loss.size}")
 

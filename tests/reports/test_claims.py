@@ -13,7 +13,7 @@ from reports.fig2 import facts as shielding
 from reports.path import facts as along
 from reports.study import Study
 
-UNIT = {"1", "mm", "deg", "%", "Hz", "s"}
+UNIT = {"1", "mm", "ms", "deg", "%", "Hz", "s"}
 
 
 def test_claims_are_in_words_of_their_own_with_a_line_and_a_unit() -> None:
