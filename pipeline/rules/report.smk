@@ -2,6 +2,7 @@ rule report:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
         datasets=shown,
+        comparisons=comparisons,
     output:
         multiext(
             "results/{name}{preset}/report/{name}",
@@ -28,7 +29,7 @@ rule report:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m reports.build {params.study} {params.datasets}"
-        " --out-dir {params.folder} --log {log}"
+        " --comparisons {input.comparisons} --out-dir {params.folder} --log {log}"
 
 
 # Several studies on one page.

@@ -22,6 +22,9 @@ STAGES = (
     "pipeline/scatter",
     "pipeline/verify",
     "pipeline/reconsider",
+    "pipeline/virtual_lab",
+    "pipeline/track",
+    "pipeline/compare",
     "reports/build",
     "reports/joint/build",
 )

@@ -10,12 +10,18 @@ REPORT = (
     *("design.csv", "facts.csv", "loss_history.csv"),
 )
 
+BESIDE = {"virtual_lab": ("{}.yaml", "{}_truth.nc"), "track": ("{}.csv",)}
+"""What a stage writes beside its output, by the name that this has."""
+
 
 def main(words: list[str]) -> None:
     options = {word: words[at + 1] for at, word in enumerate(words) if word.startswith("--")}
     time.sleep(float(os.environ.get("STAGE_SECONDS", "0")))
     if "--out" in options:
-        Path(options["--out"]).write_text(" ".join(words))
+        out = Path(options["--out"])
+        out.write_text(" ".join(words))
+        for name in BESIDE.get(Path(__file__).stem, ()):
+            out.with_name(name.format(out.stem)).write_text("")
     if "--out-dir" in options:
         folder = Path(options["--out-dir"])
         for name in REPORT:
