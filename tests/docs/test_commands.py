@@ -19,13 +19,20 @@ import pytest
 
 from pipeline import new
 from pipeline.environment import ROOT
-from tests.docs.pages import WALKED, Command, commands, inline
+from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
 from tests.e2e.checkout import Checkout
 
 COMMANDS = list(commands())
-PYTHON = (".venv/bin/python", "-m")
 REFUSED = "fig2@edge4"
 """A preset that is not there, for the message that it is told with."""
+
+
+def is_run(command: Command) -> bool:
+    return command.words[:3] == [".venv/bin/python", "-m", "pipeline.run"]
+
+
+def is_stage(command: Command) -> bool:
+    return command.words[:2] == [".venv/bin/python", "-m"] and not is_run(command)
 
 
 def of(*programs: str) -> list[Command]:
@@ -64,7 +71,7 @@ def test_snakemake_plans_its_targets(checkout: Checkout) -> None:
     asked = {
         target
         for command in COMMANDS
-        if command.words[0].endswith(("make", "snakemake"))
+        if command.words[0].endswith(("make", "snakemake")) or is_run(command)
         for target in command.targets
     }
     built = (asked & known) - {"clean"}
@@ -81,7 +88,7 @@ class ReadError(Exception):
 
 @pytest.mark.parametrize(
     "command",
-    [each for each in COMMANDS if tuple(each.words[:2]) == PYTHON],
+    [each for each in COMMANDS if is_stage(each)],
     ids=lambda each: each.text[17:70],
 )
 def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,8 +110,13 @@ def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyP
 def test_all_else_is_run_on_a_page_that_is_walked_through() -> None:
     known = ("make", ".venv/bin/snakemake", "snakemake")
     for command in COMMANDS:
-        if command.words[0] not in known and tuple(command.words[:2]) != PYTHON:
+        if not (is_stage(command) or is_run(command) or command.words[0] in known):
             assert command.page in WALKED, command
+
+
+def test_blocks_are_of_languages_that_are_tested() -> None:
+    found = {block.language for block in blocks(*PAGES)}
+    assert found == {"bash", "python", "yaml", "text", "bibtex", ""}
 
 
 @pytest.mark.parametrize("module", sorted(set(inline(r"python -m ([\w.]+)"))))
