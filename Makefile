@@ -28,7 +28,7 @@ help:
 	@echo "make test      run the tests"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
-	@echo "make cluster   make this machine a SLURM of one node (as root) and run the tests on it"
+	@echo "make cluster   make this machine a SLURM of one node and run the tests on it"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"

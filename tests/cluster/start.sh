@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes this machine a SLURM cluster of one node, without systemd and without accounting, as root.
-# For the tests of this folder: it replaces /etc/slurm/slurm.conf.
+# For the tests of this folder, on a machine to spare: it replaces /etc/slurm/slurm.conf.
 set -euo pipefail
+[ "$(id -u)" -eq 0 ] || exec sudo "$0"
 
 node=$(hostname -s)
 memory=$(awk '/MemTotal/ { print int($2 / 1024 * 0.9) }' /proc/meminfo)
@@ -16,7 +17,7 @@ fi
 
 cat >/etc/slurm/slurm.conf <<EOF
 ClusterName=one
-SlurmctldHost=$node
+SlurmctldHost=$node(127.0.0.1)
 SlurmUser=root
 AuthType=auth/munge
 StateSaveLocation=/var/spool/slurmctld
@@ -35,17 +36,17 @@ MpiDefault=none
 MinJobAge=600
 ReturnToService=2
 SchedulerParameters=batch_sched_delay=0,sched_interval=2
-NodeName=$node CPUs=$(nproc) RealMemory=$memory State=UNKNOWN
+NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc) RealMemory=$memory State=UNKNOWN
 PartitionName=all Nodes=$node Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
 EOF
 
-ended() { ! pgrep -x "$1" >/dev/null; }
+runs() { [ -s "$1" ] && kill -0 "$(cat "$1" 2>/dev/null)" 2>/dev/null; }
 
-pgrep -x munged >/dev/null || runuser -u munge -- munged
+runs /run/munge/munged.pid || runuser -u munge -- munged
 for daemon in slurmctld slurmd; do
-    if ! ended "$daemon"; then
+    if runs "/run/$daemon.pid"; then
         kill "$(cat "/run/$daemon.pid")"
-        until ended "$daemon"; do sleep 0.1; done
+        while runs "/run/$daemon.pid"; do sleep 0.1; done
     fi
     "$daemon" -c
 done

@@ -56,6 +56,15 @@ def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
     assert sandbox.planned("index") == {"index": 1}
 
 
+def test_a_job_for_each_of_several_designs(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig3@quick")
+    assert planned["design"] == planned["simulate"] == 2
+    assert planned["family_report"] == 1
+    assert "report" not in planned
+    alone = sandbox.planned("fig3@quick.2")
+    assert alone["design"] == alone["report"] == 1
+
+
 def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
     before, _, rest = sandbox.problem.read_text().partition("\nsweep:\n")
     sandbox.problem.write_text(
