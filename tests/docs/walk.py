@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
 
+from pipeline.environment import ROOT
 from pipeline.problem import load
 from pipeline.problem.loading import overlaid
 from pipeline.tracking import points, recording
@@ -16,6 +18,7 @@ from tests.docs.pages import Block, blocks, text
 from tests.e2e.checkout import Checkout, Ended
 
 LAID_OVER = "laid over "
+_PLAN = ".venv/bin/snakemake --dry-run"
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,17 @@ class Reader:
     """Who reads, where, and whether the study `logo` is built as a draft in its place."""
 
     checkout: Checkout
-    draft: bool = True
+    draft: bool
+
+    @classmethod
+    def in_folder(cls, root: Path, *, draft: bool) -> Reader:
+        """A reader who has just got the repository."""
+        checkout = Checkout.made(root)
+        shutil.rmtree(root / "experiments/logo", ignore_errors=True)
+        (root / "docs").mkdir()
+        shutil.copy(ROOT / "docs/example_sim.py", root / "docs")
+        checkout.take_kernels(ROOT)
+        return cls(checkout, draft)
 
     def told(self, page: str) -> str:
         """Does what a page says; all that its commands and scripts then say themselves.
@@ -32,8 +45,8 @@ class Reader:
         """
         said = ""
         for block, ended in self._read(page):
-            fails = f"{block.text}```\n\n```text\nerror: " in text(page)
-            assert (ended.returncode != 0) == fails, block.text + ended.stdout + ended.stderr
+            wrong = (ended.returncode != 0) != is_mistake(block)
+            assert not wrong, block.text + ended.stdout + ended.stderr
             said += ended.stdout + ended.stderr
         return said
 
@@ -43,15 +56,19 @@ class Reader:
                 yield block, self.checkout.shell(self._meant(block.text))
             elif block.language == "python":
                 yield block, self.checkout.script(self._meant(block.text))
-            elif block.language == "yaml":
+            elif block.language == "yaml" and not is_mistake(block):
                 self._write(block)
 
     def _meant(self, words: str) -> str:
-        """The text with the draft in the place of the study, the one substitution there is."""
+        """The text with the draft in the place of the study, and recordings planned only.
+
+        These are all substitutions that there are.
+        """
         if not self.draft:
             return words
         meant = words.replace("results/logo/", "results/logo@quick/")
-        return re.sub(r"^make logo(?=_|$)", "make logo@quick", meant, flags=re.MULTILINE)
+        meant = meant.replace("make logo_recordings", f"{_PLAN} logo@quick_recordings")
+        return re.sub(r"^make logo$", "make logo@quick", meant, flags=re.MULTILINE)
 
     def _write(self, block: Block) -> None:
         """Writes a file that a page shows, or checks what it lays over one."""
@@ -61,6 +78,11 @@ class Reader:
         else:
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text(block.text)
+
+
+def is_mistake(block: Block) -> bool:
+    """Whether a message that begins with `error:` follows."""
+    return f"{block.text}```\n\n```text\nerror: " in text(block.page)
 
 
 def checked(block: Block, problem: Path) -> None:
