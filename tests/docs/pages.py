@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pipeline.environment import ROOT
 
 PAGES = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
+PLACE = re.compile(r"^  file:.*\n", re.MULTILINE)
+"""The line of a message that tells the file, whose lines are numbered anew by any edit."""
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _CODE = re.compile(r"`([^`]+)`")
 _TARGET = r"((?:make|(?:\.venv/bin/)?snakemake)(?: -n)? [a-z][\w@-]*)"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 import shutil
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +14,7 @@ from pipeline import failures, run
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.tracking import recognition
-from tests.docs.pages import Block, blocks, text
+from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
 
 FAQ = blocks("docs/faq.md")
@@ -24,7 +23,6 @@ MISTAKES = [
     for block, told in pairwise(FAQ)
     if (block.language, told.language) == ("yaml", "text")
 ]
-_PLACE = re.compile(r"^  file:.*\n", re.MULTILINE)
 
 
 @pytest.mark.parametrize(("block", "told"), MISTAKES, ids=lambda each: each.text[:60])
@@ -34,7 +32,7 @@ def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, tmp_path:
     shutil.copy(ROOT / shown, problem)
     with pytest.raises(UserError) as caught:
         checked(block, problem)
-    assert _PLACE.sub("", f"error: {caught.value}\n") == _PLACE.sub("", told.text)
+    assert PLACE.sub("", f"error: {caught.value}\n") == PLACE.sub("", told.text)
     assert f"  file:   {shown}, line " in told.text
 
 
