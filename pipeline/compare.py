@@ -66,11 +66,10 @@ def work(args: argparse.Namespace) -> None:
         error.file = error.file or str(args.recording)
         raise
     told = dataset(made)
-    synthetic = recording.synthetic or recording.virtual is not None
     origin = {
         **provenance.attributes(asked, "compare", parents=files, plan=_plan(made)),
         "recording": recording.model_dump_json(),
-        "synthetic": "yes" if synthetic else "no",
+        "synthetic": made.measurement.track.attrs["synthetic"],
     }
     datasets.write(
         told.assign_attrs(_words(asked, recording, made)), args.out, "comparison", origin
@@ -95,7 +94,9 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     from pipeline.tracking.specimen import as_built
 
     design = datasets.read(args.design, "design")
-    response = chosen(datasets.read(args.response, "response"), recording)
+    whole = datasets.read(args.response, "response")
+    _check_parent(whole, args.response, args.design)
+    response = chosen(whole, recording)
     built = as_built(design, recording.structure)
     measured = measurement(datasets.read(args.track, "track"), built)
     shown = axis(measured.time, measured.drive, response, static=asked.static)
@@ -114,6 +115,14 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             recording.pixel_size or np.nan,
         ),
     )
+
+
+def _check_parent(response: xr.Dataset, path: Path, design: Path) -> None:
+    from pipeline import provenance
+
+    if json.loads(response.attrs["parents"]).get("design") != provenance.file_hash(design):
+        remedy = "simulate this design: python -m pipeline.simulate"
+        raise UserError("the response is that of another design", file=path, remedy=remedy)
 
 
 def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:

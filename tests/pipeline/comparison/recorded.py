@@ -14,6 +14,8 @@ from pipeline.tracking.specimen import as_built
 
 SIGMA = np.array([0.004, 0.004, 0.0008])
 PIXEL = 0.25
+FORCE = 0.02
+"""Noise of the load cell, N."""
 
 
 def track(
@@ -29,8 +31,10 @@ def track(
         at: (frames,) time of the response that each shows, s.
     """
     shown = response.sel(structure=structure).isel(case=0)
-    motion = nominal(shown, at).displacement
-    noise = SIGMA * np.random.default_rng(5).standard_normal(motion.shape)
+    true = nominal(shown, at)
+    motion = true.displacement
+    random = np.random.default_rng(5)
+    noise = SIGMA * random.standard_normal(motion.shape)
     built = as_built(design, structure)
     frames, absent = len(time), np.isnan(motion[..., 0])
     variables = {
@@ -39,7 +43,7 @@ def track(
         "quality": (("time", "unit"), np.where(absent, 6, 0).astype(np.int8)),
         "timing": (("time",), np.zeros(frames, np.int8)),
         "frame": (("time",), np.arange(frames)),
-        "load_force": (("time",), np.full(frames, np.nan)),
+        "load_force": (("time",), true.force + FORCE * random.standard_normal(frames)),
         "camera_homography": (("row", "column"), np.diag([1 / PIXEL, 1 / PIXEL, 1.0])),
         "camera_centre": (("xy",), np.zeros(2)),
         "camera_radial": (("power",), np.zeros(2)),

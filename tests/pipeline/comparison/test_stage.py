@@ -12,7 +12,7 @@ import xarray as xr
 from pipeline import compare, datasets, simulate
 from pipeline.comparison.measurement import measurement
 from pipeline.comparison.registration import pixel_size
-from tests.pipeline.comparison.recorded import PIXEL, SIGMA, track, written
+from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
 Change = Callable[[xr.Dataset], xr.Dataset]
 
@@ -88,6 +88,30 @@ def test_the_band_holds_the_noisy_measurement(whole: xr.Dataset) -> None:
     assert int(whole["band_samples"]) == 64
     assert (whole["band_coverage"] > 0.95).all()
     assert (whole["band_low"].isel(time=-1) <= whole["band_high"].isel(time=-1)).sum() > 14
+
+
+def test_forces_are_those_of_the_load_cell(whole: xr.Dataset) -> None:
+    found = whole["force_rmse"].sel(side="nominal")
+    assert float(found.sel(estimate="value")) == pytest.approx(FORCE, rel=0.3)
+    assert float(found.sel(estimate="low")) < FORCE < 1.5 * float(found.sel(estimate="high"))
+    assert (whole["force_nrmse"].sel(estimate="value") < 0.05).all()
+    assert float(whole["load_force"].max()) > 20 * FORCE
+    inside = (whole["force_low"] <= whole["nominal_force"] + FORCE) & (
+        whole["nominal_force"] - FORCE <= whole["force_high"]
+    )
+    assert inside.all()
+
+
+def test_a_response_of_another_design_is_refused(
+    study: list[str], film: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = study[study.index("--design") + 1]
+    other = datasets.read(path, "design")
+    attributes = {name: str(other.attrs[name]) for name in ("problem", "problem_hash", "parents")}
+    datasets.write(other.assign(overlaps=1), tmp_path / "design.nc", "design", attributes)
+    given = [str(tmp_path / "design.nc") if word == path else word for word in study]
+    assert run(given, written(film, tmp_path), tmp_path) == 2
+    assert "that of another design" in capsys.readouterr().err
 
 
 def test_curves_are_those_of_both_sides(whole: xr.Dataset) -> None:
