@@ -7,7 +7,7 @@ import sys
 from snakemake.utils import min_version
 
 from pipeline.calibrated import calibrations, description, measurements
-from pipeline.filmed import compared, comparisons, recording_pages, tracked
+from pipeline.filmed import compared, comparisons, filmed, recording_pages, tracked
 from pipeline.sources import source_hash
 from pipeline.workflow import FRAMED, any_of, check_problems, check_room, chunks
 from pipeline.workflow import comparisons_of, copies, datasets_of, designs, families

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike, fspath
 
 _LONGEST_VALUE = 120
@@ -70,3 +72,13 @@ def refusal(path: str | PathLike[str], error: OSError) -> UserError:
     otherwise = (error.strerror or str(error), "check the path, then run the same command again")
     what, remedy = _REFUSALS.get(error.errno or 0, otherwise)
     return UserError(what, file=path, remedy=remedy)
+
+
+@contextmanager
+def found_in(path: PathLike[str]) -> Iterator[None]:
+    """Names the file of mistakes that are raised without one."""
+    try:
+        yield
+    except UserError as error:
+        error.file = error.file or fspath(path)
+        raise

@@ -69,17 +69,28 @@ def tracked(wildcards: Wildcards) -> dict[str, str]:
     study = f"results/{wildcards.name}{wildcards.preset}"
     if asked is None or asked.virtual is not None:
         stem = f"{study}/recordings/{wildcards.recording}"
-        return {
+        files = {
             "recording": f"{stem}.yaml",
             "video": f"{stem}.mp4",
             "design": f"{study}/design.nc",
         }
+        weighed = asked is not None and asked.virtual is not None and asked.virtual.load_cell
+        return files | {"load_cell": f"{stem}_load.csv"} if weighed else files
     folder = Path(_source(wildcards)).parent
     beside = {"video": asked.video, "design": asked.design}
     if asked.load_cell is not None:
         beside["load_cell"] = asked.load_cell.file
     named = {key: str(folder / file) for key, file in beside.items() if file is not None}
     return {"recording": _source(wildcards), "design": f"{study}/design.nc", **named}
+
+
+def filmed(wildcards: Wildcards) -> str:
+    """What a virtual recording shows: its specimen, or the study's own response."""
+    asked = described(wildcards)
+    study = f"results/{wildcards.name}{wildcards.preset}"
+    if asked is None or asked.virtual is None or asked.virtual.specimen is None:
+        return f"{study}/response.nc"
+    return f"{study}/recordings/{wildcards.recording}_specimen.nc"
 
 
 def described(wildcards: Wildcards) -> Recording | None:

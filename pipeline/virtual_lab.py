@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import cli
-from pipeline.errors import UserError
+from pipeline.errors import UserError, found_in
 from pipeline.tracking.origin import WORD
 
 if TYPE_CHECKING:
-    from pipeline.lab.filming import Filming
+    import xarray as xr
+
+    from pipeline.lab.setup import Virtual
     from pipeline.tracking.recording import Recording
 
 LOG = logging.getLogger(__name__)
@@ -25,11 +27,14 @@ DESCRIPTION = """\
 Film a simulated response.
 
   python -m pipeline.virtual_lab render RECORDING.yaml --response NC --design NC --out VIDEO.mp4
+  python -m pipeline.virtual_lab weigh RECORDING.yaml --response NC --out LOAD.csv
   python -m pipeline.virtual_lab plan [RECORDING.yaml] --response NC [choices]
 
 The first writes the video, beside it VIDEO.yaml, which pipeline.track takes, and VIDEO_truth.nc.
-The second renders short clips with each of the choices, tracks them, and tells what noise to
-expect. Choices that are given several values are tried in every combination.
+The second writes the log of the recording's load cell, which is to lie beside the video as
+VIDEO_load.csv. Of a recording that has a specimen, both take what pipeline.specimen wrote for the
+response. The third renders short clips with each of the choices, tracks them, and tells what noise
+to expect. Choices that are given several values are tried in every combination.
 """
 
 
@@ -41,6 +46,9 @@ def parser() -> argparse.ArgumentParser:
     render.add_argument("recording", type=Path, metavar="RECORDING.yaml")
     render.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
     render.add_argument("--out", type=Path, required=True, metavar="VIDEO", help="*.mp4 or *.mkv")
+    weigh = commands.add_parser("weigh", help="write a load cell's log", allow_abbrev=False)
+    weigh.add_argument("recording", type=Path, metavar="RECORDING.yaml")
+    weigh.add_argument("--out", type=Path, required=True, metavar="CSV", help="the log")
     plan = commands.add_parser("plan", help="what noise to expect", allow_abbrev=False)
     plan.add_argument("recording", type=Path, nargs="?", metavar="RECORDING.yaml")
     plan.add_argument("--structure", choices=("intact", "altered", "cloaked"))
@@ -52,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     plan.add_argument("--codec", nargs="+", metavar="NAME", help="ffv1, h264, h264-intra, h264:28")
     plan.add_argument("--marker", type=float, nargs="+", metavar="MM", help="diameter of the dots")
     plan.add_argument("--csv", type=Path, metavar="FILE", help="also write the table to this file")
-    for command in (render, plan):
+    for command in (render, weigh, plan):
         command.add_argument("--response", type=Path, required=True, metavar="NC")
         command.add_argument("--log", type=Path, metavar="FILE", default=argparse.SUPPRESS)
         command.add_argument("--quiet", action="store_true", default=argparse.SUPPRESS)
@@ -60,13 +68,15 @@ def parser() -> argparse.ArgumentParser:
 
 
 def work(args: argparse.Namespace) -> None:
-    """Renders a recording, or plans one.
+    """Renders a recording, weighs what it shows, or plans one.
 
     Raises:
         UserError: a fault of the files or of the choices.
     """
     if args.command == "render":
         _render(args.recording, args.response, args.design, args.out)
+    elif args.command == "weigh":
+        _weigh(args.recording, args.response, args.out)
     else:
         _plan(args)
 
@@ -115,60 +125,85 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     from pipeline import datasets, provenance
     from pipeline.lab import truth
     from pipeline.lab.encode import encode
+    from pipeline.lab.filming import prepared
     from pipeline.tracking import recording as recordings
     from pipeline.whole import whole
+
+    asked, virtual = _virtual(path)
+    if out.suffix not in virtual.codec.suffixes:
+        raise UserError(
+            f"{virtual.codec.name} does not go into such a file",
+            file=out,
+            remedy=f"name it *{virtual.codec.suffixes[0]}",
+        )
+    parents = {"response": response, "design": design}
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
+    with found_in(path):
+        film = prepared(_shown(asked, response), asked.structure, asked.specimen, virtual)
+    title = asked.title or path.stem
+    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
+    with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
+        encode(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
+    made = truth.dataset(film.response, film.present, film.motion, film.scene.view)
+    datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
+    comments = (SYNTHETIC, "Written by pipeline.virtual_lab; python -m pipeline.track takes it.")
+    with whole(out.with_suffix(".yaml")) as aside:
+        text = recordings.text(_described(asked, virtual, out, design), comments)
+        aside.write_text(text, encoding="utf-8")
+
+
+def _weigh(path: Path, response: Path, out: Path) -> None:
+    from pipeline.lab.weighing import log
+    from pipeline.whole import whole
+
+    asked, virtual = _virtual(path)
+    if virtual.load_cell is None:
+        remedy = "describe the load cell there"
+        raise UserError("no load cell", file=path, key="virtual.load_cell", remedy=remedy)
+    with found_in(path):
+        lines = log(_shown(asked, response), virtual, virtual.load_cell)
+    with whole(out) as aside, aside.open("w", encoding="utf-8") as file:
+        file.write(f"# {SYNTHETIC}\ntime,force\n")
+        file.writelines(f"{time:.4f},{force:.5f}\n" for time, force in lines)
+
+
+def _virtual(path: Path) -> tuple[Recording, Virtual]:
+    """A recording and how it is rendered."""
+    from pipeline.tracking import recording as recordings
 
     asked = recordings.load(path)
     if asked.virtual is None:
         remedy = "track it: python -m pipeline.track; or describe how to render it under `virtual`"
         raise UserError("a recording that was filmed", file=path, key="video", remedy=remedy)
-    if out.suffix not in asked.virtual.codec.suffixes:
-        raise UserError(
-            f"{asked.virtual.codec.name} does not go into such a file",
-            file=out,
-            remedy=f"name it *{asked.virtual.codec.suffixes[0]}",
-        )
-    parents = {"response": response, "design": design}
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
-    film = _prepared(asked, path, response)
-    title = asked.title or path.stem
-    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
-    with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
-        encode(out, film.images(bar.update), asked.virtual.rate, asked.virtual.codec, labels)
-    made = truth.dataset(film.response, film.present, film.motion, film.scene.view)
-    datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
-    comments = (SYNTHETIC, "Written by pipeline.virtual_lab; python -m pipeline.track takes it.")
-    with whole(out.with_suffix(".yaml")) as aside:
-        text = recordings.text(_described(asked, out, design), comments)
-        aside.write_text(text, encoding="utf-8")
+    return asked, asked.virtual
 
 
-def _prepared(asked: Recording, path: Path, response: Path) -> Filming:
+def _shown(asked: Recording, response: Path) -> xr.Dataset:
+    """What a recording shows: its specimen, or the study's own response at structure and case."""
     from pipeline import datasets
-    from pipeline.lab.filming import prepared
+    from pipeline.lab.filming import of_case
 
-    held = datasets.read(response, "response")
     assert asked.virtual is not None
-    try:
-        return prepared(held, asked.structure, asked.case, asked.specimen, asked.virtual)
-    except UserError as error:
-        error.file = error.file or str(path)
-        raise
+    if asked.virtual.specimen is not None:
+        return datasets.read(response, "specimen")
+    return of_case(datasets.read(response, "response"), asked.structure, asked.case)
 
 
-def _described(asked: Recording, video: Path, design: Path) -> dict[str, object]:
+def _described(asked: Recording, virtual: Virtual, video: Path, design: Path) -> dict[str, object]:
     """Keys and values of a recording of the rendered video."""
-    assert asked.virtual is not None
+    cell = virtual.load_cell
+    log = None if cell is None else {"file": f"{video.stem}_load.csv", "offset": cell.offset}
     return {
         "title": asked.title or None,
         "video": video.name,
         "design": os.path.relpath(design.resolve(), video.resolve().parent),
         "structure": asked.structure,
         "case": asked.case,
-        "pixel_size": f"{asked.virtual.camera.pixel_size:g} mm",
-        "thickness": f"{asked.virtual.look.thickness:g} mm",
-        "camera_distance": f"{asked.virtual.camera.distance:g} mm",
+        "pixel_size": f"{virtual.camera.pixel_size:g} mm",
+        "thickness": f"{virtual.look.thickness:g} mm",
+        "camera_distance": f"{virtual.camera.distance:g} mm",
         "load_axis": asked.load_axis,
+        "load_cell": log,
         "synthetic": True,
     }
 

@@ -10,7 +10,7 @@ from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
 from pipeline.datasets.responses import RESPONSE, SWEEP
 from pipeline.datasets.spectra import SPECTRUM
-from pipeline.datasets.tracks import RECORDED, TRACK, TRUTH
+from pipeline.datasets.tracks import RECORDED, SPECIMEN, TRACK, TRUTH
 from pipeline.datasets.trials import SCATTER, VERIFICATION
 from pipeline.datasets.variables import Table
 
@@ -24,6 +24,7 @@ Kind = Literal[
     "scatter",
     "verification",
     "spectrum",
+    "specimen",
     "track",
     "truth",
     "comparison",
@@ -38,6 +39,7 @@ TABLES: Mapping[Kind, Table] = {
     "scatter": SCATTER,
     "verification": VERIFICATION,
     "spectrum": SPECTRUM,
+    "specimen": SPECIMEN,
     "track": TRACK,
     "truth": TRUTH,
     "comparison": COMPARISON,
@@ -53,6 +55,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "scatter": {},
     "verification": {},
     "spectrum": {},
+    "specimen": RECORDED,
     "track": RECORDED,
     "truth": RECORDED,
     "comparison": COMPARED,
@@ -68,6 +71,7 @@ TITLES: Mapping[Kind, str] = {
     "scatter": "Responses of imperfect copies of a design",
     "verification": "Results with finer steps and with the other law of contact",
     "spectrum": "Small vibrations of the structures, and waves in their unit cell",
+    "specimen": "Motion of a specimen for a synthetic video, simulated",
     "track": "Motion of every unit in a video, with its uncertainty",
     "truth": "Motion of every unit that a synthetic video shows",
     "comparison": "Motion in a recording beside its simulation",

@@ -1,10 +1,10 @@
-"""What datasets hold of motions that were filmed: as tracked, and as rendered."""
+"""What datasets hold of motions that were filmed: as tracked, as rendered, as simulated for it."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.datasets.designs import SHAPE
+from pipeline.datasets.designs import NETWORK, SHAPE
 from pipeline.datasets.variables import LABELS, UNIT, Table, Variable, label
 
 _TRACKED = ("time", "unit", "dof")
@@ -95,5 +95,22 @@ TRUTH: Table = UNIT | {
     "camera_eye": Variable(("xyz",), "mm", "centre of projection, z towards the camera"),
 }
 
+SPECIMEN: Table = (
+    UNIT
+    | NETWORK
+    | {
+        "direction": label((), "degree", "direction of the planned drive"),
+        "time": label(("time",), "s", "time since the start of the drive"),
+        **{name: TRACK[name] for name in ("dof", "vertices")},
+        "displacement": replace(TRACK["displacement"], dtype="float64"),
+        "drive_displacement": Variable(
+            ("time", "xy"), "mm", "displacement of the driven units, mean"
+        ),
+        "drive_force": Variable(
+            ("time", "xy"), "N", "force of the drive on all driven units together"
+        ),
+    }
+)
+
 RECORDED = {"recording": "the recording's YAML, as read", "synthetic": "yes if rendered"}
-"""Attributes of both."""
+"""Attributes of them all."""

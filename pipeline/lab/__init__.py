@@ -1,4 +1,4 @@
-"""The virtual lab: films simulated responses, so that cameras and marks are tried before filming.
+"""The virtual lab: films what is simulated, so that cameras and marks are tried before filming.
 
-A response of a perturbed design is filmed as any other: nothing here asks where one comes from.
+It films a study's own response, or a specimen that is off its design as those of labs are.
 """

@@ -26,7 +26,7 @@ class Filming(NamedTuple):
     Attributes:
         scene: what is filmed.
         motion: of the units.
-        response: of the structure that is filmed.
+        response: what the structure does.
         present: (units,) which of them are there.
         asked: the set-up.
     """
@@ -45,22 +45,18 @@ class Filming(NamedTuple):
                 tell()
 
 
-def prepared(
-    response: xr.Dataset, structure: str, case: int, specimen: str, asked: Virtual
-) -> Filming:
-    """Everything for the film of one structure and case of a response.
+def prepared(one: xr.Dataset, structure: str, kind: str, asked: Virtual) -> Filming:
+    """Everything for the film of a structure under one load case.
 
     Args:
-        response: the dataset.
+        one: a response at one structure and one case, or a specimen.
         structure: intact, altered or cloaked.
-        case: number of the load case.
-        specimen: dots, speckle or bare (as is "auto").
+        kind: dots, speckle or bare (as is "auto").
         asked: the set-up.
 
     Raises:
-        UserError: the response lacks structure or case, or the specimen is out of the picture.
+        UserError: the specimen is out of the picture, or nothing is in the window of time.
     """
-    one = of_structure(response, structure)
     units = of_design(one)
     present = np.isin(one["unit"].values, units.ids)
     view = viewpoint(asked.camera, (units.centre.min(axis=0) + units.centre.max(axis=0)) / 2)
@@ -76,11 +72,11 @@ def prepared(
     scene = Scene(
         units,
         _ligaments(one, structure, units.ids),
-        marks(units, specimen, look, asked.seed),
+        marks(units, kind, look, asked.seed),
         look,
         view,
     )
-    return Filming(scene, motion(one, case, present, asked), one, present, asked)
+    return Filming(scene, motion(one, present, asked), one, present, asked)
 
 
 def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
@@ -95,6 +91,19 @@ def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
         what = "the response holds no such structure"
         raise UserError(what, key="structure", value=structure, remedy=remedy)
     return response.sel(structure=structure)
+
+
+def of_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
+    """One structure of a response under one of its load cases.
+
+    Raises:
+        UserError: the response does not hold it.
+    """
+    cases = response.sizes["case"]
+    if not 0 <= case < cases:
+        remedy = f"give a number from 0 to {cases - 1}"
+        raise UserError("the response has no such case", key="case", value=case, remedy=remedy)
+    return of_structure(response, structure).isel(case=case)
 
 
 def _ligaments(response: xr.Dataset, structure: str, ids: Ints) -> Ints:

@@ -30,40 +30,65 @@ class Motion(NamedTuple):
     instants: Floats
 
 
-def motion(response: xr.Dataset, case: int, present: Mask, asked: Virtual) -> Motion:
-    """The motion of one structure and case, sampled by the frames.
+class Clock(NamedTuple):
+    """Which time of the response a video shows at which of its own.
 
-    Between the samples of the response, a cubic spline; before the start, its first state.
+    Attributes:
+        frames: number of them.
+        start, end: times of the response, s.
+        still: rest at the video's start, s.
+        pace: how fast the response's time goes.
+    """
 
-    Args:
-        response: of one structure.
-        case: number of the load case.
-        present: (units,) which are there.
-        asked: rate, window and exposure.
+    frames: int
+    start: float
+    end: float
+    still: float
+    pace: float
+
+    def shown(self, instant: Floats) -> Floats:
+        """Times of the response at instants of the video, s."""
+        moved = self.start + (instant - self.still) * self.pace
+        return np.clip(moved, self.start, self.end)
+
+
+def clock(given: Floats, asked: Virtual) -> Clock:
+    """The clock of a video of a response with samples at the times ``given``, s.
 
     Raises:
-        UserError: no such case, or nothing in the window.
+        UserError: nothing is in the window.
     """
-    cases = response.sizes["case"]
-    if not 0 <= case < cases:
-        remedy = f"give a number from 0 to {cases - 1}"
-        raise UserError("the response has no such case", key="case", value=case, remedy=remedy)
-    states = response["displacement"].isel(case=case).transpose("time", "unit", "dof").values
-    given = response["time"].values
     end = given[-1] if asked.end is None else min(asked.end, given[-1])
     if end <= asked.start:
         what = "the response has ended by then"
         remedy = f"start before {given[-1]:g} s, and end after that"
         raise UserError(what, key="virtual.start", value=asked.start, remedy=remedy)
     pace = 1.0 if asked.duration is None else (end - asked.start) / asked.duration
-    course = CubicSpline(given, states[:, present])
     frames = 1 + int(np.floor((asked.still + (end - asked.start) / pace) * asked.rate + 1e-9))
-    time = np.arange(frames) / asked.rate
+    return Clock(frames, asked.start, end, asked.still, pace)
+
+
+def motion(one: xr.Dataset, present: Mask, asked: Virtual) -> Motion:
+    """The motion of a structure under one load case, sampled by the frames.
+
+    Between the samples of the response, a cubic spline; before the start, its first state.
+
+    Args:
+        one: a response at one structure and one case, or a specimen.
+        present: (units,) which are there.
+        asked: rate, window and exposure.
+
+    Raises:
+        UserError: nothing is in the window.
+    """
+    states = one["displacement"].transpose("time", "unit", "dof").values
+    given = one["time"].values
+    of_video = clock(given, asked)
+    course = CubicSpline(given, states[:, present])
+    time = np.arange(of_video.frames) / asked.rate
 
     def at(instant: Floats) -> Floats:
-        return np.asarray(
-            course(np.clip(asked.start + (instant - asked.still) * pace, asked.start, end))
-        )
+        return np.asarray(course(of_video.shown(instant)))
 
     pose = at(time)
     count = _instants(pose, asked)

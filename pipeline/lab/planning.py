@@ -13,7 +13,7 @@ import xarray as xr
 
 from pipeline.errors import UserError
 from pipeline.lab.encode import encode
-from pipeline.lab.filming import Filming, prepared
+from pipeline.lab.filming import Filming, of_case, prepared
 from pipeline.lab.setup import Codec, Virtual
 from pipeline.tracking.arrays import Floats, Reals
 from pipeline.tracking.calibrate import Setup
@@ -160,7 +160,8 @@ def expected(
     """
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
-    film = prepared(response, structure, case, choice.specimen, _clip(choice.setup, count))
+    one = of_case(response, structure, case)
+    film = prepared(one, structure, choice.specimen, _clip(choice.setup, count))
     camera = choice.setup.camera
     known = Setup(choice.setup.look.thickness, camera.distance)
     with TemporaryDirectory() as folder:

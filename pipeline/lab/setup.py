@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from pipeline.lab.specimens import Making, Weighing
 from pipeline.problem.fabrication import Markers
 from pipeline.problem.quantities import (
     Angle,
@@ -129,9 +130,10 @@ class Codec(Section):
 
 
 class Virtual(Section):
-    """A recording that is rendered from a response.
+    """A recording that is rendered: from the study's own response, or from a specimen's.
 
     Attributes:
+        specimen: in what the specimen differs from its design; without it, in nothing.
         rate: frames per second.
         still: how long the specimen rests before it moves.
         start: time of the response from which it moves on.
@@ -142,8 +144,11 @@ class Virtual(Section):
         light: on them.
         sensor: of the camera, with its optics.
         codec: of the file.
+        load_cell: at the drive, if there is one.
         seed: of noise and speckle.
     """
+
+    specimen: Making | None = None
 
     rate: Frequency = 100.0
     still: Delay = 0.1
@@ -155,4 +160,5 @@ class Virtual(Section):
     light: Light = Light()
     sensor: Sensor = Sensor()
     codec: Codec = Codec()
+    load_cell: Weighing | None = None
     seed: int = 0

@@ -14,7 +14,7 @@ def dataset(response: xr.Dataset, present: Mask, motion: Motion, view: Viewpoint
     """The dataset ``truth``: displacements at mid-exposure, as a track would have them.
 
     Args:
-        response: of one structure.
+        response: of one structure under one load case.
         present: (units,) which are there.
         motion: what was filmed of them.
         view: the camera.
@@ -35,4 +35,5 @@ def dataset(response: xr.Dataset, present: Mask, motion: Motion, view: Viewpoint
         "time": (("time",), motion.time),
         "dof": (("dof",), ["ux", "uy", "theta"]),
     }
-    return xr.Dataset(variables, coordinates).drop_vars("structure", errors="ignore")
+    made = xr.Dataset(variables, coordinates)
+    return made.drop_vars([name for name in made.coords if name not in coordinates])

@@ -32,15 +32,15 @@ class Tolerances(Section):
 class Prediction(Section):
     """The spread of the simulation that a measured course is compared with.
 
-    A size that is not given is the smallest that `robustness` tries of its kind, where there is
-    one (`geometry` and its `stiffness`, which is that of the single ligaments), and else that of
-    a specimen cut by laser: 0.01, 0.05, 0.05, 0.1 and 0.2.
+    A size that is not given is the smallest that `robustness` tries of its kind, where it tries
+    some, and else the usual one of `Tolerances`.
 
     Attributes:
         samples: specimens drawn.
         level: part of the specimens between the limits of the band.
         seed: of the draws.
-        geometry: largest shift of a vertex along x and y, as a share of the spacing.
+        geometry: largest shift of a vertex along x and y, either way and evenly spread, as a share
+            of the spacing.
         ligaments: standard deviation of every ligament's stiffnesses, as a share of them.
         stiffness: the same of each of the three stiffnesses, of all ligaments together.
         units: standard deviation of every unit's damping, as a share of it.

@@ -1,9 +1,49 @@
-# A recording that was filmed is tracked from its own folder; one that is virtual is rendered first.
+# A recording that was filmed is tracked from its own folder; one that is virtual is rendered first,
+# of a specimen of its own where it describes one.
+rule specimen:
+    input:
+        recording="experiments/{name}/recordings/{recording}.yaml",
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+    output:
+        "results/{name}{preset}/recordings/{recording}_specimen.nc",
+    log:
+        "results/{name}{preset}/logs/specimen_{recording}.log",
+    threads: 1
+    params:
+        study=options,
+        problem=section("simulate"),
+        source=source_hash("pipeline.specimen"),
+    message:
+        "Simulating the specimen of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline.specimen {input.recording} {params.study} --design {input.design}"
+        " --out {output} --log {log}"
+
+
+rule weigh:
+    input:
+        recording="experiments/{name}/recordings/{recording}.yaml",
+        response=filmed,
+    output:
+        "results/{name}{preset}/recordings/{recording}_load.csv",
+    log:
+        "results/{name}{preset}/logs/weigh_{recording}.log",
+    threads: 1
+    params:
+        source=source_hash("pipeline.virtual_lab"),
+    message:
+        "Weighing {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
+    shell:
+        "python -m pipeline.virtual_lab weigh {input.recording} --response {input.response}"
+        " --out {output} --log {log}"
+
+
 rule render:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         design="results/{name}{preset}/design.nc",
-        response="results/{name}{preset}/response.nc",
+        response=filmed,
     output:
         video="results/{name}{preset}/recordings/{recording}.mp4",
         recording="results/{name}{preset}/recordings/{recording}.yaml",

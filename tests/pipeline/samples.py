@@ -48,6 +48,7 @@ SIZES = {
 
 _ATTRIBUTES: dict[str, dict[str, str]] = {
     "design": {"shipped_method": "sqp"},
+    "specimen": {"recording": "{}", "synthetic": "yes"},
     "track": {"recording": "{}", "synthetic": "no"},
     "truth": {"recording": "{}", "synthetic": "yes"},
     "comparison": {

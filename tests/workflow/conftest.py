@@ -18,6 +18,7 @@ STAGES = (
     "pipeline/design",
     "pipeline/select",
     "pipeline/simulate",
+    "pipeline/specimen",
     "pipeline/sweep",
     "pipeline/scatter",
     "pipeline/verify",

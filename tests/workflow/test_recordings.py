@@ -19,7 +19,13 @@ def test_virtual_recordings_are_rendered_and_tracked(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig2_recordings")
     count = len(list((sandbox.root / "experiments/fig2/recordings").glob("*.yaml")))
     assert planned["render"] == planned["track"] == planned["track_report"] == count > 0
-    assert planned["simulate"] == 1
+    assert planned["specimen"] == count
+    assert not {"simulate", "weigh"} & planned.keys()
+
+
+def test_a_virtual_load_cell_is_read_with_its_video(sandbox: Sandbox) -> None:
+    planned = sandbox.planned("fig4_recordings")
+    assert planned["weigh"] == planned["specimen"] == planned["track"] == 2
 
 
 def test_a_video_that_is_dropped_in_is_tracked(sandbox: Sandbox) -> None:

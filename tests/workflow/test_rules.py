@@ -18,6 +18,7 @@ STUDY = {
     "simulate": 1,
     "sweep": 4,
     "gather_sweep": 1,
+    "specimen": 2,
     "render": 2,
     "track": 2,
     "compare": 2,
@@ -115,7 +116,11 @@ def test_planning_imports_nothing_heavy() -> None:
     ("old", "new", "rerun"),
     [
         ("points: 15", "points: 14", only("sweep", "gather_sweep", "report")),
-        ("cycles: 4", "cycles: 3", only("simulate", "render", "track", "compare", "report")),
+        (
+            "cycles: 4",
+            "cycles: 3",
+            only("simulate", "specimen", "render", "track", "compare", "report"),
+        ),
         ("title: Shielding", "title: Hiding", only("report")),
         ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
         ("amplitude: 4.5 mm", "amplitude: 4.4 mm", STUDY),

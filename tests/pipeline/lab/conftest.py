@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.lab.filming import Filming, prepared
+from pipeline.lab.filming import Filming, of_case, prepared
 from pipeline.lab.setup import Virtual
 from pipeline.tracking import importing
 from tests.pipeline.samples import sample
@@ -63,4 +63,4 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def film(files: Path) -> Filming:
     """The cloaked structure of the lattice, bare, in the virtual lab."""
     held = datasets.read(files / "response.nc", "response")
-    return prepared(held, "cloaked", 0, "bare", Virtual.model_validate(SETUP))
+    return prepared(of_case(held, "cloaked", 0), "cloaked", "bare", Virtual.model_validate(SETUP))

@@ -13,7 +13,7 @@ import pytest
 
 from pipeline import datasets
 from pipeline.lab.faces import Marks
-from pipeline.lab.filming import Filming, prepared
+from pipeline.lab.filming import Filming, of_case, prepared
 from pipeline.lab.setup import Virtual
 from pipeline.tracking.follow import Track, follow
 from pipeline.tracking.video import Frame, frames
@@ -26,7 +26,7 @@ def filmed(files: Path, specimen: str, **look: float) -> Filming:
     """Four frames, thin units: faces, marks and board of the shades that are given."""
     held = datasets.read(files / "response.nc", "response")
     asked = {**SETUP, "rate": "3 Hz", "look": {"thickness": "0 mm", **look}}
-    return prepared(held, "cloaked", 0, specimen, Virtual.model_validate(asked))
+    return prepared(of_case(held, "cloaked", 0), "cloaked", specimen, Virtual.model_validate(asked))
 
 
 def shown(film: Filming) -> Iterator[Frame]:
@@ -80,7 +80,7 @@ def test_polygons_with_other_numbers_of_corners(files: Path) -> None:
     whole = held.assign(vertices=(held["vertices"].dims, vertices))
     kept = whole.isel(ligament=np.isfinite(corners).all(axis=(1, 2)))
     asked: dict[str, Any] = {**SETUP, "rate": "3 Hz", "look": {"thickness": "0 mm"}}
-    film = prepared(kept, "cloaked", 0, "bare", Virtual.model_validate(asked))
+    film = prepared(of_case(kept, "cloaked", 0), "cloaked", "bare", Virtual.model_validate(asked))
     assert film.scene.specimen.count == 42
     check(film, follow(shown(film), film.scene.specimen, 1 / 0.365))
 

@@ -1,0 +1,171 @@
+"""Specimens of a structure as a lab has them: off their design, and driven as shakers drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from pipeline.errors import UserError
+from pipeline.lab.specimens import Assembly, Making, Shaking
+from pipeline.measuring import Structure
+from pipeline.tolerances import drawn
+from sim.arrays import Numbers
+from sim.imperfection import MOST_ROUNDS, clashing_units
+from sim.lattice import Lattice
+from sim.loads import Motion
+from sim.scene import Scene
+
+Floats = NDArray[np.float64]
+
+STREAM = 2
+"""First word of the seeds of all draws here, so that no predicted specimen equals one of them."""
+SAMPLES = 1001
+"""Of the planned motion, to find its largest displacement."""
+
+
+class Shaken(NamedTuple):
+    """A drive that is not quite the planned one (``sim.loads.Motion``).
+
+    Attributes:
+        planned: the motion that was asked for.
+        place: (n_units, 2) of the driven units from their middle, mm.
+        largest: (2,) the planned motion's largest displacement, mm.
+        turning: when a static load is taken off again, s; past the end if it is not.
+        end: of the motion, s.
+        gain, turn, cross, tilt, drift, delay: see ``Shaking``.
+    """
+
+    planned: Motion
+    place: Numbers
+    largest: Numbers
+    turning: float
+    end: float
+    gain: float
+    turn: float
+    cross: float
+    tilt: float
+    drift: Numbers
+    delay: float
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, n_units, 3) at the given times, s."""
+        since = jnp.maximum(jnp.asarray(times) - self.delay, 0.0)
+        planned = self.planned(jnp.minimum(since, 2 * self.turning - since))
+        amplitude = jnp.hypot(*self.largest)
+        along = jnp.asarray(self.largest) / amplitude
+        far = planned[:, :2] @ along / amplitude
+        bent = planned[:, :2] + self.cross * amplitude * far[:, None] ** 2 * _left(along)
+        path = self.gain * bent @ _turned(self.turn).T
+        path += jnp.asarray(times)[:, None] / self.end * jnp.asarray(self.drift)
+        angle = self.tilt * far
+        cos, sin = jnp.cos(angle)[:, None, None] - 1, jnp.sin(angle)[:, None, None]
+        place = jnp.asarray(self.place)
+        swung = cos * place + sin * _left(place)
+        rotation = jnp.broadcast_to((planned[:, 2] + angle)[:, None], swung.shape[:2])
+        return jnp.concatenate([path[:, None] + swung, rotation[..., None]], axis=2)
+
+
+def _left(vector: Array) -> Array:
+    """Vectors (..., 2) turned by a right angle counter-clockwise."""
+    return jnp.stack([-vector[..., 1], vector[..., 0]], axis=-1)
+
+
+def _turned(angle: float) -> Array:
+    cos, sin = jnp.cos(angle), jnp.sin(angle)
+    return jnp.array([[cos, -sin], [sin, cos]])
+
+
+def specimen(structure: Structure, case: int, asked: Making, end: float) -> Structure:
+    """A specimen of a structure under one of its load cases.
+
+    Args:
+        structure: as designed.
+        case: number of the load case.
+        asked: in what the specimen differs.
+        end: of its motion, s.
+
+    Raises:
+        UserError: its units would overlap.
+    """
+    seed = (STREAM, asked.seed)
+    scene, copy = drawn(*structure, asked, seed)
+    random = np.random.default_rng((*seed, 1))
+    vertices = assembled(scene, copy.vertices, asked.assembly, random)
+    made = replace(
+        scene,
+        lattice=replace(scene.lattice, vertices=vertices),
+        motions=(shaken(scene, case, asked.drive, end, asked.unload),),
+        weights=np.ones(1),
+        duration=end,
+        frequency=None,
+        reference=None,
+        symmetry="none",
+    )
+    return Structure(made, vertices)
+
+
+def assembled(
+    scene: Scene, vertices: Floats, asked: Assembly, random: np.random.Generator
+) -> Floats:
+    """Vertices (n_vertices, 2) once the units are joined, each off its place; mm.
+
+    The ligaments are at rest there: they are as long and as inclined as the units leave them. Units
+    that would overlap or touch are put elsewhere.
+
+    Raises:
+        UserError: some still do after many tries.
+    """
+    lattice = scene.lattice
+    spread = np.array([asked.shift, asked.shift, asked.turn])
+    pose = spread * random.standard_normal((lattice.n_units, 3))
+    for _ in range(MOST_ROUNDS):
+        placed = _placed(lattice, vertices, pose)
+        clashing = clashing_units(lattice, placed, scene.cutoff)
+        if len(clashing) == 0:
+            return placed
+        pose[clashing] = spread * random.standard_normal((len(clashing), 3))
+    remedy = "give another seed, or smaller tolerances"
+    raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
+
+
+def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
+    """Vertices (n_vertices, 2) of units that are moved by a pose (n_units, 3) each, mm and rad."""
+    middle = np.add.reduceat(vertices, lattice.first_vertex[:-1])
+    middle /= np.diff(lattice.first_vertex)[:, None]
+    arm = vertices - middle[lattice.unit]
+    cos, sin = (of(pose[lattice.unit, 2, None]) for of in (np.cos, np.sin))
+    across = np.column_stack([-arm[:, 1], arm[:, 0]])
+    return np.asarray((middle + pose[:, :2])[lattice.unit] + cos * arm + sin * across)
+
+
+def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) -> Shaken:
+    """The drive of a load case as the specimen has it.
+
+    Args:
+        scene: of the structure.
+        case: number of the load case.
+        asked: in what the drive differs.
+        end: of the motion, s.
+        unload: whether the load is taken off again in the second half.
+    """
+    planned = scene.motions[case]
+    path = np.asarray(planned(np.linspace(0, scene.duration, SAMPLES)))[:, :2]
+    site = scene.lattice.site[scene.driven]
+    return Shaken(
+        planned,
+        site - site.mean(axis=0),
+        path[np.hypot(*path.T).argmax()],
+        end / 2 if unload else end,
+        end,
+        asked.gain,
+        asked.turn,
+        asked.cross,
+        asked.tilt,
+        np.array(asked.drift),
+        asked.delay,
+    )
