@@ -23,8 +23,6 @@ from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
 from tests.e2e.checkout import Checkout
 
 COMMANDS = list(commands())
-REFUSED = "fig2@edge4"
-"""A preset that is not there, for the message that it is told with."""
 
 
 def is_run(command: Command) -> bool:
