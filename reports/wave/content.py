@@ -18,7 +18,7 @@ _CAPTION = (
     "<b>d</b> Vertical displacement of the marked units. "
     "<b>e</b> Distance of the surroundings' motion to the intact one, over the largest size of "
     "that in time. "
-    "<b>f</b> Number of closed voids along the top and bottom edges."
+    "<b>f</b> Smallest void angle along the top and bottom edges; in the red band the units touch."
 )
 
 

@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from reports import draft, style
 from reports.history import loss_history
@@ -69,7 +68,7 @@ def _contacts(study: Study, axes: Axes, row: Row, sample: int) -> None:
     frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
     touching = voids.closed(study.problem, part.isel(time=[sample]))[0]
     x, y = voids.middles(structure, deformed(structure, frame))[touching].T
-    axes.plot(x, y, ls="", marker="o", ms=1.6, mfc=CONTACT, mec="none", zorder=8)
+    axes.plot(x, y, ls="", marker="o", ms=2.4, mfc=CONTACT, mec="white", mew=0.3, zorder=8)
 
 
 def _places(figure: Figure, study: Study, top: float) -> None:
@@ -100,10 +99,17 @@ def _whole(figure: Figure, study: Study, top: float) -> None:
     style.letter(figure, 0.0, top, "e", "Mimicking error")
     error = style.place(figure, 11.0, top + ROOM, half - 14.0, 27.0)
     measure_panel(error, study, path, measures.measure_of(study.problem))
-    style.letter(figure, half, top, "f", "Closed voids along the top and bottom edges")
-    count = style.place(figure, half + 11.0, top + ROOM, half - 14.0, 27.0)
-    path_axes(count, path, "number")
-    contacts = voids.edge_contacts(study.problem, study.response)
-    structure_curves(count, study.problem, path, contacts, structures(study.response))
-    count.yaxis.set_major_locator(MaxNLocator(5, integer=True))
-    count.set_ylim(0, 1.15 * max(float(contacts.max()), 1.0))
+    style.letter(figure, half, top, "f", "Smallest void angle along the top and bottom edges")
+    edges = style.place(figure, half + 11.0, top + ROOM, half - 14.0, 27.0)
+    path_axes(edges, path, "angle (°)")
+    angles = 180.0 / np.pi * voids.along_edges(study.problem, study.response).min("ligament")
+    structure_curves(edges, study.problem, path, angles, structures(study.response))
+    cutoff, barrier = np.degrees(
+        [study.problem.contact.cutoff_angle, study.problem.contact.barrier_angle]
+    )
+    edges.axhspan(barrier, cutoff, color=CONTACT, alpha=0.18, lw=0, zorder=1)
+    edges.set_ylim(barrier - 4.0, 1.1 * float(angles.max()))
+    edges.text(
+        0.01, barrier + 0.5 * (cutoff - barrier), "contact", color=CONTACT, fontsize=style.SMALL,
+        va="center", transform=edges.get_yaxis_transform(),
+    )  # fmt: skip

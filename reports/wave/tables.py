@@ -15,7 +15,7 @@ from reports.path.curves import over_cases
 from reports.study import Study
 from reports.tables import Table
 from reports.wave.course import places
-from reports.wave.voids import edge_contacts
+from reports.wave.voids import along_edges
 
 Columns = dict[str, NDArray[Any]]
 
@@ -39,7 +39,7 @@ def build(study: Study) -> list[Table]:
 
 
 def over_time(study: Study) -> Columns:
-    """One row a sample: u_y where marked, mimicking error, closed voids, energies."""
+    """One row a sample: u_y where marked, mimicking error, void angles, energies."""
     problem, response = study.problem, study.response
     rise = response["displacement"].sel(dof="uy")
     series = {
@@ -48,7 +48,7 @@ def over_time(study: Study) -> Columns:
     }
     series |= {
         "mimicking_error": measures.measure_of(problem).of(response),
-        "edge_contacts": edge_contacts(problem, response),
+        "edge_void_angle_rad": along_edges(problem, response).min("ligament"),
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],

@@ -13,12 +13,8 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-def closed(problem: Problem, part: xr.Dataset) -> Mask:
-    """Whether a void beside each ligament of a structure is closed to the cutoff.
-
-    Args:
-        problem: the problem.
-        part: one structure of a response, one load case.
+def smaller_angles(problem: Problem, part: xr.Dataset) -> Array:
+    """The smaller void angle beside each ligament of a structure under one load case, rad.
 
     Returns:
         (n_times, n_ligaments) in the order of ``from_dataset``.
@@ -28,7 +24,12 @@ def closed(problem: Problem, part: xr.Dataset) -> Mask:
     first, second = structure.ligament_unit.T
     turned = turns[:, first] - turns[:, second]
     one, other = rest_angles(structure).T
-    return np.asarray(np.minimum(one + turned, other - turned) < problem.contact.cutoff_angle)
+    return np.asarray(np.minimum(one + turned, other - turned))
+
+
+def closed(problem: Problem, part: xr.Dataset) -> Mask:
+    """Whether a void beside each ligament (n_times, n_ligaments) is closed to the cutoff."""
+    return np.asarray(smaller_angles(problem, part) < problem.contact.cutoff_angle)
 
 
 def rest_angles(structure: Structure) -> Array:
@@ -67,19 +68,26 @@ def middles(structure: Structure, vertices: Array) -> Array:
     return np.asarray(ends.mean(axis=1))
 
 
+def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """The smaller void angle (structure, case, time, ligament) along the top and bottom edges."""
+    whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
+    n_edge = int(on_edges(whole).sum())
+    angles = np.full(
+        (*(response.sizes[dim] for dim in ("structure", "case", "time")), n_edge), np.nan
+    )
+    for k, name in enumerate(response["structure"].values):
+        part = response.sel(structure=name)
+        here = on_edges(from_dataset(part, problem.lattice.spacing))
+        for case in range(response.sizes["case"]):
+            found = smaller_angles(problem, part.isel(case=case))[:, here]
+            angles[k, case, :, : found.shape[1]] = found
+    dims = ("structure", "case", "time", "ligament")
+    return xr.DataArray(angles, {name: response[name] for name in ("structure", "time")}, dims)
+
+
 def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     """Number (structure, case, time) of closed voids along the top and bottom edges."""
-    counts = [
-        [
-            closed(problem, part.isel(case=case))[
-                :, on_edges(from_dataset(part, problem.lattice.spacing))
-            ].sum(axis=1)
-            for case in range(response.sizes["case"])
-        ]
-        for part in (response.sel(structure=name) for name in response["structure"].values)
-    ]
-    return xr.DataArray(
-        np.array(counts, dtype=float),
-        dims=("structure", "case", "time"),
-        coords={"structure": response["structure"], "time": response["time"]},
+    contacts: xr.DataArray = (along_edges(problem, response) < problem.contact.cutoff_angle).sum(
+        "ligament"
     )
+    return contacts
