@@ -7,10 +7,13 @@ driven units is equal load, on the way there and back.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from pipeline.errors import UserError
 from pipeline.tracking.arrays import Floats
@@ -25,6 +28,7 @@ _STEPS = 12  # of refinement
 _RIVAL = 0.02  # of the correlation: a lag that is as good as the best
 _BEYOND = 0.005  # of the nominal range: still its end
 _LEAST_RANGE = 0.05  # of the nominal range: a drive that moves
+_DENSER = 20  # samples of a path that is inverted, for each of its own
 _STILL = 0.1  # of the mean speed: neither way
 
 
@@ -48,16 +52,21 @@ class Lag(NamedTuple):
     ambiguous: bool
 
 
-class Course(NamedTuple):
+@dataclass(frozen=True)
+class Course:
     """A motion at rest before its first time: times (n,) in s, values (n, channels) in mm."""
 
     time: Floats
     value: Floats
 
     def at(self, time: Floats) -> Floats:
-        """Values (times, channels), linear between the samples, NaN after the last."""
-        columns = [np.interp(time, self.time, column, right=np.nan) for column in self.value.T]
-        return np.stack(columns, axis=-1)
+        """Values (times, channels), a cubic spline through the samples, NaN after the last."""
+        inside = np.clip(time, self.time[0], self.time[-1])
+        return np.where((time <= self.time[-1])[:, None], self._spline(inside), np.nan)
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.time, self.value)
 
 
 def find_lag(measured: Course, nominal: Course) -> Lag:
@@ -190,7 +199,9 @@ def load_time(measured: Floats, nominal: Course) -> Floats:
         )
     margin = _BEYOND * span
     inside = (measured >= course[0] - margin) & (measured <= course[-1] + margin)
-    return np.where(inside, np.interp(measured, course, nominal.time), np.nan)
+    dense = np.linspace(nominal.time[0], nominal.time[-1], _DENSER * len(course))
+    finer = np.maximum.accumulate(nominal.at(dense)[:, 0])
+    return np.where(inside, np.interp(measured, finer, dense), np.nan)
 
 
 def branches(measured: Floats) -> NDArray[np.int8]:
