@@ -21,6 +21,9 @@ from reports.publishing import Parts
 from reports.structure import DRIVEN, from_dataset
 from reports.tables import Table
 
+HEADLINE = ("boundary_reduction", "boundary_altered", "boundary_rises")
+"""Keys of the facts that stand above all others."""
+
 SHOWN = 45.0
 """Load angle of the animation, degrees."""
 
@@ -76,7 +79,6 @@ def page(
     studies = [design.study for design in family.designs]
     player = payload(animation(family))
     draft = list(dict.fromkeys(reason for study in studies for reason in study.draft))
-    best = replace(by_key["boundary_reduction"], label="largest |U| on the boundary")
     return Page(
         title=family.problem.title,
         targets=[family.target],
@@ -87,7 +89,7 @@ def page(
         svg=svg,
         figure_files=figure_files,
         datasets=[f"../../{study.target}/{name}" for study in studies for name in study.files],
-        headline=[best, by_key["boundary_altered"], by_key["boundary_rises"]],
+        headline=[by_key[key] for key in HEADLINE],
         facts=known,
         tables=data,
         player=player,

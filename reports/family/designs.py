@@ -88,7 +88,7 @@ class Family:
         values = np.array([number for number, _ in filter(None, found)])
         unit = next((unit for _, unit in filter(None, found)), "")
         if self.key == RADIUS and unit == "mm":
-            return values / self.designs[0].scene.spacing, "Size of the cloak, R/s"
+            return values / self.designs[0].scene.spacing, "Size of the cloak $R/s$"
         return values, f"{self.key} ({unit})" if unit else self.key
 
     def label(self, design: Design) -> str:

@@ -9,10 +9,12 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+import yaml
 
 from pipeline import failures, run
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.problem import load
 from pipeline.tracking import recognition
 from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
@@ -71,3 +73,12 @@ def test_the_paper_is_cited_as_in_the_citation_file() -> None:
         key, _, value = line.strip(" -").partition(": ")
         if key in ("family-names", "doi", "journal", "version", "value"):
             assert value in cited, line
+
+
+@pytest.mark.parametrize("block", blocks("docs/sweeps.md"), ids=lambda block: block.place)
+def test_a_sweep_is_valid(block: Block, tmp_path: Path) -> None:
+    problem = tmp_path / "problem.yaml"
+    (section,) = yaml.safe_load(block.text).items()
+    whole = yaml.safe_load((ROOT / block.place).read_text())
+    problem.write_text(yaml.safe_dump(whole | dict([section])))
+    assert getattr(load(problem), section[0]) is not None
