@@ -13,13 +13,13 @@ from tests.reports.test_page import Links
 
 
 @pytest.fixture(scope="module")
-def results(
-    study: Study, report: Path, quick_report: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
+def results(study: Study, report: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a figure with its datasets, and of a draft without."""
     folder = tmp_path_factory.mktemp("results")
     shutil.copytree(report, folder / "fig2/report")
-    shutil.copytree(quick_report, folder / "fig2@quick/report")
+    draft = folder / "fig2@quick/report/index.html"
+    draft.parent.mkdir(parents=True)
+    draft.write_text('<title>A draft</title><p class="draft">DRAFT</p>')
     for name, data in study.datasets.items():
         data.to_netcdf(folder / f"fig2/{name}.nc")
     (folder / "fig2/fabrication").mkdir()
