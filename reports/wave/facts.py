@@ -11,6 +11,7 @@ from pipeline.problem.drives import RampHarmonic
 from reports import checks
 from reports.facts import Fact, grouped, number, share, within, worded
 from reports.path import measures
+from reports.path.contact import overlapping
 from reports.path.course import course, display_name, structures
 from reports.path.curves import over_cases
 from reports.path.facts import loss_facts, scene_facts
@@ -116,8 +117,10 @@ def step_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
                 continue
             step = worded(1e6 * float(part["time_step"]), "µs", 4)
             note = (
-                f"relative error {float(part['error']):.3g}; steps of {step}; units "
-                f"{within(float(part['departure']), 'mm', 2)} from the run at most"
+                f"relative error {float(part['error']):.3g}; steps of {step}; "
+                f"{overlapping(int(part['overlaps']))}"
             )
+            if (apart := float(part["departure"])) > 0.0:
+                note += f"; units {within(apart, 'mm', 2)} from the run at most"
             value = float(part["loss"])
             yield number(f"check_{key}_{structure}", label, value, digits=4, note=note)

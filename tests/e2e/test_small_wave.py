@@ -44,7 +44,7 @@ def test_the_losses_are_the_known_ones(wave: Wave) -> None:
     loss = wave.built.response["loss"].isel(case=0)
     assert float(loss.sel(structure="altered")) == pytest.approx(START, rel=1e-3)
     assert float(loss.sel(structure="cloaked")) == pytest.approx(END, rel=0.02)
-    assert float(loss.sel(structure="cloaked")) == pytest.approx(wave.built.best_loss, rel=1e-8)
+    assert float(loss.sel(structure="cloaked")) == pytest.approx(wave.built.best_loss, rel=1e-4)
     assert float(wave.built.design["constraint_margin"].min()) >= 0.0
 
 

@@ -34,7 +34,8 @@ class Expected:
         losses = built.response["loss"].isel(case=0)
         reached = float(losses.sel(structure="cloaked"))
         assert reached <= most * (1 + self.tolerance)
-        assert reached == pytest.approx(built.best_loss, rel=1e-6)
+        same_steps = self.shorter is None
+        assert reached == pytest.approx(built.best_loss, rel=1e-6 if same_steps else 1e-4)
         assert float(built.design["constraint_margin"].min()) >= 0.0
         assert int(built.design["overlaps"]) == 0
         assert (built.response["stability"].sel(structure="cloaked") != UNSTABLE).all()
