@@ -201,6 +201,9 @@ class TrackedMotion(Section):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         exactly_one(self, "file", "virtual")
+        if self.virtual is not None and self.structure == "cloaked":
+            remedy = "give intact or altered"
+            raise fault("a cloaked structure cannot be computed here", remedy, "structure")
         return self
 
 

@@ -128,8 +128,8 @@ class Fit(NamedTuple):
     bounds: Floats
 
 
-def fit(model: Model) -> Fit:
-    """The constants that fit best.
+def fit(model: Model, near: Floats | None = None) -> Fit:
+    """The constants that fit best, looked for from `near` on, or from the start.
 
     Levels of noise that are not known follow from the residuals of their sets, and weigh the sets
     against one another; they are found in turns with the constants.
@@ -137,10 +137,11 @@ def fit(model: Model) -> Fit:
     Raises:
         SimulationError: the measured states cannot be simulated from the start on.
     """
-    unknowns, rows = model.start, model.set_of_row
-    reach = np.full(len(unknowns), np.inf)
+    rows, begin = model.set_of_row, model.start
+    unknowns = begin if near is None else near
+    reach = np.full(len(begin), np.inf)
     reach[: len(model.names)] = REACH
-    bounds = np.stack([unknowns - reach, unknowns + reach], axis=1)
+    bounds = np.stack([begin - reach, begin + reach], axis=1)
     level = _level(model, model.residual(unknowns), np.zeros((len(rows), 1)))
     for _ in range(ROUNDS):
         unknowns = _solved(model, unknowns, level[rows], bounds)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
 import numpy as np
@@ -12,6 +12,8 @@ from pipeline.calibration.description import Name
 from sim.arrays import Floats, Ints
 
 Kind = Literal["force_displacement", "free_decay", "track"]
+
+_UNSEEN = 1e-8
 
 ELASTIC: tuple[Name, ...] = (
     "axial_stiffness",
@@ -36,6 +38,9 @@ class Measured:
         channel: (n,) which course each value belongs to; of a track, 3 unit + dof.
         bias: (n,) standard deviation of what a channel's values have in common besides; infinite
             where it is unknown, so that a channel's mean tells nothing.
+        axes: (n, r) orthonormal directions of whitened values in which a common cause, such as
+            the noise of the drive, scatters them besides.
+        spread: (r,) standard deviation along them by that cause alone.
     """
 
     name: str
@@ -46,6 +51,8 @@ class Measured:
     known: bool
     channel: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     bias: Floats = field(default_factory=lambda: np.zeros(0))
+    axes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    spread: Floats = field(default_factory=lambda: np.zeros(0))
 
     def whitened(self, deviation: Floats) -> Floats:
         """Deviations (n, ...) from the values as numbers of unit variance, without correlation.
@@ -53,11 +60,30 @@ class Measured:
         The covariance in a channel is D + b^2 1 1', with D the squared ``sigma``: its inverse root
         takes from D^-1/2 x a part of the component along D^-1/2 1.
         """
-        return self._less_mean((deviation.T / self.sigma).T)
+        return self._less_common(self._less_mean((deviation.T / self.sigma).T))
 
     def transposed(self, white: Floats) -> Floats:
         """What the transpose of ``whitened`` makes of whitened numbers (n,)."""
-        return self._less_mean(white) / self.sigma
+        return self._less_mean(self._less_common(white)) / self.sigma
+
+    def with_common(self, causes: Floats) -> Measured:
+        """The same with what independent causes do to the values, (n, m) per standard deviation.
+
+        The covariance of whitened values is then 1 + C C': along the axes of C they are divided by
+        what it is there.
+        """
+        alone = replace(self, axes=np.zeros((0, 0)), spread=np.zeros(0))
+        white = alone.whitened(causes)
+        square, turn = np.linalg.eigh(white.T @ white)
+        seen = square > _UNSEEN * max(float(square[-1]), 1.0)
+        spread = np.sqrt(square[seen])
+        return replace(self, axes=white @ turn[:, seen] / spread, spread=spread)
+
+    def _less_common(self, white: Floats) -> Floats:
+        if not len(self.spread):
+            return white
+        part = 1 - 1 / np.sqrt(1 + self.spread**2)
+        return white - self.axes @ (part * (self.axes.T @ white).T).T
 
     def _less_mean(self, scaled: Floats) -> Floats:
         """Multiples (n, ...) of ``sigma`` without what a bias of their channels may explain."""

@@ -32,7 +32,6 @@ class Estimate(NamedTuple):
         wanted: how many of them were fitted.
         value: (n,) in working units.
         error: (n,) standard errors of their logarithms.
-        bound: (n,) the same by the Cramer-Rao bound for known drives.
         low, high: (n,) ends of the 95 % intervals.
         covariance: (n, n) of the logarithms.
         status: (n,) how well each is determined.
@@ -44,7 +43,6 @@ class Estimate(NamedTuple):
     wanted: int
     value: Floats
     error: Floats
-    bound: Floats
     low: Floats
     high: Floats
     covariance: Floats
@@ -83,8 +81,6 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     turn = slopes(fit.model.begin, names, logs, lambda each: each.logs(every))
     covariance = turn @ known.covariance @ turn.T
     error = np.sqrt(np.diag(covariance))
-    # without drives' noise the bound is the covariance; with it, derived ones scale alike
-    bound = np.concatenate([known.bound, error[len(names) :]])
     here = fit.model.constants(fit.unknowns)
     reach = _quantile(fit) * error
     low, high = (_values(here, every, here.logs(every) + sign * reach) for sign in (-1, 1))
@@ -96,9 +92,7 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     scaled = known.covariance / np.outer(error[: len(names)], error[: len(names)])
     axes = np.linalg.eigvalsh(scaled)
     condition = float(np.sqrt(axes[-1] / max(axes[0], 1e-16)))
-    return Estimate(
-        every, len(names), values, error, bound, low, high, covariance, status, condition
-    )
+    return Estimate(every, len(names), values, error, low, high, covariance, status, condition)
 
 
 def _values(here: Constants, names: Sequence[Name], logs: Floats) -> Floats:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.calibration import decay, forces
+from pipeline.calibration import decay, field, forces
 from pipeline.calibration.constants import Constants, start
 from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay, Set
 from pipeline.calibration.estimate import Fit, Model, fit
 from pipeline.calibration.experiment import Experiment
 from pipeline.errors import UserError
 from sim.errors import SimulationError
+
+_ROUNDS = 1
+"""In which the effect of the drive's noise is found anew, at better constants."""
 
 
 def fitted(asked: Calibration, path: Path) -> Fit:
@@ -32,7 +35,7 @@ def fitted(asked: Calibration, path: Path) -> Fit:
         what = f"{values} values do not determine {len(model.start)} unknowns"
         raise UserError(what, file=path, key="data", remedy=remedy)
     try:
-        return fit(model)
+        return _settled(model)
     except SimulationError as error:
         remedy = "check lattice, displacements and the values in material that the fit starts from"
         what = f"the measured states cannot be simulated: {error}"
@@ -56,5 +59,27 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
     folder = path.parent
     if isinstance(asked, ForceDisplacement):
         return forces.experiment(asked, begin, *forces.read(asked, folder))
-    assert isinstance(asked, FreeDecay)
-    return decay.experiment(asked, *decay.read(asked, folder))
+    if isinstance(asked, FreeDecay):
+        return decay.experiment(asked, *decay.read(asked, folder))
+    return field.experiment(asked, folder, begin, field.read(asked, folder))
+
+
+def _settled(model: Model) -> Fit:
+    """The fit with what the noise of measured drives does at the constants that it finds."""
+    known = _noisy(model, model.begin)
+    found = fit(known)
+    for _ in range(_ROUNDS if known is not model else 0):
+        known = _noisy(model, model.constants(found.unknowns))
+        found = fit(known, found.unknowns)
+    return found
+
+
+def _noisy(model: Model, at: Constants) -> Model:
+    """The model with what the noise of its drives does at some constants, if it has any."""
+    if not any(isinstance(each, field.Field) for each in model.experiments):
+        return model
+    knowing = [
+        each.with_drive_noise(at) if isinstance(each, field.Field) else each
+        for each in model.experiments
+    ]
+    return model._replace(experiments=knowing)

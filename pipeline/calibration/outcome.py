@@ -12,7 +12,7 @@ from pipeline.calibration.decay import Decay
 from pipeline.calibration.description import Name
 from pipeline.calibration.estimate import Fit
 from pipeline.calibration.experiment import Experiment
-from pipeline.calibration.findings import Estimate, estimate, quality, warnings
+from pipeline.calibration.findings import UNDETERMINED, Estimate, estimate, quality, warnings
 from pipeline.calibration.uncertainty import uncertainty
 from sim.arrays import Floats
 
@@ -37,7 +37,8 @@ def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         "lower": ("parameter", found.low),
         "upper": ("parameter", found.high),
         "standard_error": ("parameter", found.error),
-        "bound": ("parameter", found.bound),
+        # the weights are the inverse of the noise's covariance, so the bound is attained
+        "bound": ("parameter", found.error),
         "covariance": (("parameter", "with_parameter"), found.covariance),
         "correlation": (("parameter", "with_parameter"), found.correlation),
         "condition": ((), found.condition),
@@ -88,8 +89,12 @@ def fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
     """The lines `material:` of a problem file, the interval of each fitted value beside it."""
     here = fit.model.constants(fit.unknowns)
     told = {
-        name: f"  # 95 %: {_words(name, low)} to {_words(name, high)}"
-        for name, low, high in zip(found.names, found.low, found.high, strict=True)
+        name: "  # not determined by the data"
+        if status == UNDETERMINED
+        else f"  # 95 %: {_words(name, low)} to {_words(name, high)}"
+        for name, low, high, status in zip(
+            found.names, found.low, found.high, found.status, strict=True
+        )
     }
     lines = [
         *(["# SYNTHETIC: found from computed data, not from a specimen."] if synthetic else []),

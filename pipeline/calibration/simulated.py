@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -14,35 +15,56 @@ from jax import Array
 from pipeline.calibration.constants import Constants
 from sim import dynamics
 from sim.arrays import Floats, Ints, Numbers
-from sim.dynamics import Drive, simulate
+from sim.dynamics import Drive
+from sim.explicit import ExplicitSolver
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
 from sim.lattice import Lattice
-from sim.loads import TimeSeries
+from sim.loads import Motion, held_values
 from sim.model import Material, Parameters, Values, parameters
 from sim.statics import StaticSolver
+
+AnySolver = StaticSolver | ImplicitSolver | ExplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
 """What is measured of a motion (n_asked, n_units, 3) of given parameters."""
 
 
 class KnownDrive(Drive):
-    """A drive whose values are computed once: the fit asks for the same ones again and again."""
+    """A drive whose values are computed once: a fit asks for the same ones again and again."""
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """See ``sim.dynamics.Drive``."""
-        return self._once(super().values, held, times)
+        return self._once("values", held, times)
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """See ``sim.dynamics.Drive``."""
-        return self._once(super().rates, held, times)
+        return self._once("rates", held, times)
 
-    def _once(self, compute: Callable[[Ints, Floats], Floats], held: Ints, times: Floats) -> Floats:
+    def _once(self, what: Literal["values", "rates"], held: Ints, times: Floats) -> Floats:
         memory = self.__dict__.setdefault("memory", {})
-        key = (compute.__name__, held.tobytes(), times.tobytes())
-        if key not in memory:
-            memory[key] = compute(held, times)
+        if (key := (what, times.tobytes())) not in memory:
+            units = np.asarray(self.units, dtype=np.int64)
+            compute = _followed(held.tobytes(), units.tobytes(), what)
+            memory[key] = np.asarray(compute(self.motion, times))
         return memory[key]
+
+
+@lru_cache(maxsize=64)
+def _followed(
+    held: bytes, units: bytes, what: Literal["values", "rates"]
+) -> Callable[[Motion, Numbers], Array]:
+    """Compiled function to the values or rates of the held dofs when units follow a motion."""
+    dofs, moved = (np.frombuffer(each, dtype=np.int64) for each in (held, units))
+
+    def values(motion: Motion, times: Numbers) -> Array:
+        return held_values(dofs, moved, motion, times)
+
+    def rates(motion: Motion, times: Numbers) -> Array:
+        at = jnp.asarray(times)
+        return jax.jvp(lambda t: values(motion, t), (at,), (jnp.ones_like(at),))[1]
+
+    return jax.jit(values if what == "values" else rates)
 
 
 @dataclass(frozen=True)
@@ -57,15 +79,17 @@ class Simulation:
         solver: of its motion.
         drive: of its held units.
         seen: what is measured of the motion.
+        stiffer: (n_ligaments,) or (1,) factor on the stiffness of each ligament.
     """
 
     lattice: Lattice
     vertices: Floats
     density: float
     contact: float
-    solver: StaticSolver | ImplicitSolver
+    solver: AnySolver
     drive: KnownDrive
     seen: Seen
+    stiffer: Floats = field(default_factory=lambda: np.ones(1))
 
     @cached_property
     def parameters(self) -> Callable[[Numbers], Parameters[Array]]:
@@ -75,8 +99,16 @@ class Simulation:
         @jax.jit
         def of_numbers(numbers: Numbers) -> Parameters[Array]:
             axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
-            law = (axial, shear, bending, self.contact, translation, rotation)
-            return parameters(self.lattice, made, Material(self.density, *law))
+            made_of = Material(
+                self.density,
+                self.stiffer * axial,
+                self.stiffer * shear,
+                self.stiffer * bending,
+                self.contact,
+                translation,
+                rotation,
+            )
+            return parameters(self.lattice, made, made_of)
 
         return of_numbers
 
@@ -84,38 +116,43 @@ class Simulation:
     def _compiled(self) -> Seen:
         return jax.jit(self.seen)
 
-    def predict(self, constants: Constants) -> Floats:
-        """(n,) what is measured of a specimen.
+    def predict(self, constants: Constants, motion: Motion | None = None) -> Floats:
+        """(n,) what is measured of a specimen; with a `motion`, under that in place of the drive's.
 
         Raises:
             SimulationError: a step failed.
         """
         made = self.parameters(constants.numbers)
         values = Values(*(np.asarray(part) for part in made))
-        motion, _, _ = dynamics.forward(self._solver(constants), values, (self.drive,))
-        return np.asarray(self._compiled(motion[0], made))
+        drive = self.drive if motion is None else KnownDrive(self.drive.units, motion)
+        found, _, _ = dynamics.forward(self._solver(constants), values, (drive,))
+        return np.asarray(self._compiled(found[0], made))
 
-    def pulled_back(self, constants: Constants, bar: Floats) -> tuple[Floats, Floats]:
-        """Derivatives of `bar @ predict` by the numbers (5,) and by the drive's series, by adjoint.
+    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint.
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
-        solver, units = self._solver(constants), self.drive.units
-        series = self.drive.motion
-        assert isinstance(series, TimeSeries)
+        solver, numbers = self._solver(constants), jnp.asarray(constants.numbers)
+        made = self.parameters(numbers)
+        values = Values(*(np.asarray(part) for part in made))
+        motion, velocity, records = dynamics.forward(solver, values, (self.drive,))
+        by_motion, direct = self._seen_back(motion[0], made, bar)
+        still = np.zeros_like(velocity)
+        pulled = dynamics.backward(solver, records, np.asarray(by_motion)[None], still)
+        total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
+        return np.asarray(self._parameters_back(numbers, Parameters(*total)))
 
-        def weighted(numbers: Array, motion: Array) -> Array:
-            made = self.parameters(numbers)
-            drive = Drive(units, TimeSeries(series.times, motion))
-            response = simulate(solver, made, (drive,))
-            return self._compiled(response.displacement[0], made) @ bar
+    @cached_property
+    def _seen_back(self) -> Callable[[Numbers, Parameters, Numbers], tuple[Array, Parameters]]:
+        return jax.jit(lambda motion, made, bar: jax.vjp(self.seen, motion, made)[1](bar))
 
-        at = jnp.asarray(constants.numbers), jnp.asarray(series.motion)
-        by_numbers, by_motion = jax.grad(weighted, argnums=(0, 1))(*at)
-        return np.asarray(by_numbers), np.asarray(by_motion)
+    @cached_property
+    def _parameters_back(self) -> Callable[[Numbers, Parameters], Array]:
+        return jax.jit(lambda at, bar: jax.vjp(self.parameters, at)[1](bar)[0])
 
-    def _solver(self, constants: Constants) -> StaticSolver | ImplicitSolver:
+    def _solver(self, constants: Constants) -> AnySolver:
         if constants.cutoff is None:
             return self.solver
         return replace(self.solver, topology=replace(self.solver.topology, cutoff=constants.cutoff))

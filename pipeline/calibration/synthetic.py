@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from pipeline.calibration import decay, forces
+from pipeline import datasets, provenance
+from pipeline.calibration import decay, forces, syntrack
 from pipeline.calibration.constants import Constants, start
 from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay, Set
 from pipeline.problem import yamlfile
@@ -66,12 +67,14 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
     data.pop("virtual")
     true = truth(asked)
     for number, (each, raw) in enumerate(zip(asked.data, sets, strict=True)):
+        if "problem" in raw:
+            raw["problem"] = os.path.relpath(path.parent / raw["problem"], folder)
         if each.virtual is None:
             raw["file"] = os.path.relpath(path.parent / raw["file"], folder)
         else:
             del raw["virtual"]
             random = np.random.default_rng([asked.virtual.seed, number])
-            raw["file"] = _written(each, true, random, folder)
+            raw["file"] = _written(each, path, true, random, folder)
     with whole(folder / YAML) as aside:
         text = yaml.safe_dump(
             {**data, "synthetic": True, "data": sets}, sort_keys=False, allow_unicode=True
@@ -79,17 +82,23 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
         aside.write_text(f"# {LABEL}\n{text}", encoding="utf-8")
 
 
-def _written(each: Set, true: Constants, random: np.random.Generator, folder: Path) -> str:
-    """The name of the file that a set was written to."""
+def _written(
+    each: Set, path: Path, true: Constants, random: np.random.Generator, folder: Path
+) -> str:
+    """The name of the file that a set was written to; `path` is the calibration's."""
     name = f"{each.name}.csv"
     if isinstance(each, ForceDisplacement):
         columns = (f"{each.columns.displacement} (mm)", f"{each.columns.force} (N)")
         _table(folder / name, columns, *forces_of(each, true, random))
-    else:
-        assert isinstance(each, FreeDecay)
+        return name
+    if isinstance(each, FreeDecay):
         columns = (f"{each.columns.time} (s)", f"{each.columns.angle} (rad)")
         _table(folder / name, columns, *decay_of(each, true, random))
-    return name
+        return name
+    origin = provenance.recorded(each.model_dump_json(), {}, synthetic=True)
+    track = syntrack.track_of(each, path.parent, true, random)
+    datasets.write(track, folder / f"{each.name}.nc", "track", origin)
+    return f"{each.name}.nc"
 
 
 def _table(path: Path, heading: tuple[str, ...], *columns: Floats) -> None:

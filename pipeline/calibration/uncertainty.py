@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.calibration.constants import Constants
 from pipeline.calibration.description import Name
 from pipeline.calibration.estimate import Fit
+from pipeline.calibration.field import Field
 from pipeline.calibration.forces import ForceTest
 from sim.arrays import Floats
 
@@ -21,14 +22,13 @@ class Uncertainty(NamedTuple):
     """Errors of the wanted constants' logarithms.
 
     Attributes:
-        covariance: (n_names, n_names), what the noise of measured drives adds included.
-        bound: (n_names,) standard errors by the Cramer-Rao bound for known drives.
+        covariance: (n_names, n_names), the inverse of the information: the Cramer-Rao bound of the
+            stated, or estimated, noise.
         newton: largest step that Newton's method would still take by the adjoint's gradient, in
             standard errors; how far the solution is from the least sum of squares.
     """
 
     covariance: Floats
-    bound: Floats
     newton: float
 
 
@@ -44,9 +44,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     by_adjoint[wanted] = gradient(fit)
     step = inverse @ by_adjoint
     bound = np.sqrt(np.diag(inverse))
-    return Uncertainty(
-        inverse[wanted, wanted], bound[wanted], float(np.abs(step / bound)[wanted].max())
-    )
+    return Uncertainty(inverse[wanted, wanted], float(np.abs(step / bound)[wanted].max()))
 
 
 def _inverse(jacobian: Floats) -> Floats:
@@ -66,11 +64,11 @@ def gradient(fit: Fit) -> Floats:
     for k, each in enumerate(model.experiments):
         mine = model.set_of_row == k
         column = fit.jacobian[mine, : len(total)].T @ fit.residual[mine]
-        if not isinstance(each, ForceTest):
+        if not isinstance(each, ForceTest | Field):
             total += column
             continue
         bar = each.measured.transposed(fit.residual[mine]) / fit.level[k]
-        by_numbers, _ = each.simulation.pulled_back(constants, bar)
+        by_numbers = each.simulation.pulled_back(constants, bar)
         total += np.where(by_columns, column, by_numbers @ slopes)
     return total
 

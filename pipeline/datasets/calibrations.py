@@ -37,7 +37,7 @@ CALIBRATION: Table = {
     "upper": Variable(_OF, _STATED, "upper end of the 95 % interval"),
     "standard_error": Variable(_OF, "1", "standard error of the logarithm of the value"),
     "bound": Variable(
-        _OF, "1", "Cramer-Rao bound of that standard error, for drives without noise"
+        _OF, "1", "Cramer-Rao bound of the standard error, at the noise and the values found"
     ),
     "covariance": Variable(_PAIR, "1", "covariance of the logarithms of the values"),
     "correlation": Variable(_PAIR, "1", "correlation of the logarithms of the values"),

@@ -18,7 +18,10 @@ _ROW = 62.0
 _AXES = {
     "force_displacement": ("displacement, mm", "force, N", 1.0),
     "free_decay": ("time, s", "angle, deg", float(np.rad2deg(1.0))),
+    "track": ("time, s", "displacement, mm", 1.0),
 }
+_COURSES = 5
+"""Courses of a track that are drawn, those that move most."""
 _WORDS = {
     "axial_stiffness": r"$k_\ell$",
     "shear_stiffness": r"$k_s$",
@@ -47,7 +50,7 @@ def figure(made: xr.Dataset) -> Figure:
 
 
 def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, float]) -> None:
-    chosen = made.isel(point=np.flatnonzero(made["set_of_point"].values == number))
+    chosen = _shown(made.isel(point=np.flatnonzero(made["set_of_point"].values == number)))
     along, label, factor = _AXES[str(made["kind"].values[number])]
     x = chosen["abscissa"].values
     axes = style.place(drawn, *corner, _WIDE, _HIGH)
@@ -61,13 +64,14 @@ def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, floa
         markeredgewidth=0,
         label="measured",
     )
-    axes.plot(
-        x,
-        factor * chosen["fitted"].values,
-        color=style.CLOAKED,
-        linewidth=0.9 if few else 0.5,
-        label="fit",
-    )
+    for course in np.unique(channel := chosen["channel"].values):
+        axes.plot(
+            x[channel == course],
+            factor * chosen["fitted"].values[channel == course],
+            color=style.CLOAKED,
+            linewidth=0.9 if few else 0.5,
+            label="fit" if course == channel[0] else None,
+        )
     axes.set(ylabel=label, xticklabels=[])
     if number == 0:
         axes.legend(loc="upper left")
@@ -77,6 +81,17 @@ def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, floa
     below.plot(x, rest, ".", color=style.GREY, markersize=2.0 if few else 1.0, markeredgewidth=0)
     most = max(4.0, float(np.abs(rest).max()) * 1.05)
     below.set(xlabel=along, ylabel="residual/σ", ylim=(-most, most), xlim=axes.get_xlim())
+
+
+def _shown(chosen: xr.Dataset) -> xr.Dataset:
+    """Of a track, the displacements that go farthest; of other sets, all."""
+    channel = chosen["channel"].values
+    if not channel.any():
+        return chosen
+    places = np.unique(channel[channel % 3 < 2])
+    reach = [np.ptp(chosen["fitted"].values[channel == course]) for course in places]
+    farthest = places[np.argsort(reach)[-_COURSES:]]
+    return chosen.isel(point=np.flatnonzero(np.isin(channel, farthest)))
 
 
 def _constants(drawn: Figure, made: xr.Dataset, top: float) -> None:

@@ -1,0 +1,139 @@
+"""Stated intervals hold: over many seeds of noise the truth is in 95 of 100, no wider than need be.
+
+Each kind of data alone; noise is estimated from the data. The bound is that of Cramer and Rao, at
+the true constants and the true noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from pipeline.calibration import decay, findings, forces, synthetic, uncertainty
+from pipeline.calibration.constants import Constants, start
+from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay
+from pipeline.calibration.estimate import Model, fit
+from pipeline.calibration.experiment import Experiment
+from sim.arrays import Floats
+from tests.pipeline.calibration.specimens import (
+    STIFFNESS,
+    decay_set,
+    described,
+    force_sets,
+    loaded,
+)
+
+SEEDS = 100
+FEWEST, MOST = 90, 99
+WIDEST = 1.5
+NORMAL = 1.96
+
+Draw = Callable[[np.random.Generator], list[Experiment]]
+
+
+class Case(NamedTuple):
+    """What is found again and again.
+
+    Attributes:
+        asked: the calibration.
+        true: constants.
+        draw: experiments with noise.
+        noise: (n,) its true standard deviations.
+    """
+
+    asked: Calibration
+    true: Constants
+    draw: Draw
+    noise: Floats
+
+
+def forces_case(folder: Path) -> Case:
+    asked = loaded(folder, described(force_sets(points=12), STIFFNESS))
+    begin, true = start(asked), synthetic.truth(asked)
+    clean: list[tuple[forces.ForceTest, Floats, float]] = []
+    for each in asked.data:
+        assert isinstance(each, ForceDisplacement)
+        assert each.virtual is not None
+        along = np.linspace(0.0, each.virtual.end, each.virtual.points + 1)[1:]
+        test = forces.experiment(each, begin, along, np.zeros(len(along)))
+        clean.append((test, test.simulation.predict(true), each.virtual.noise))
+
+    def draw(random: np.random.Generator) -> list[Experiment]:
+        return [
+            replace(
+                test,
+                measured=replace(
+                    test.measured, values=force + noise * random.normal(size=len(force))
+                ),
+            )
+            for test, force, noise in clean
+        ]
+
+    noises = [np.full(len(force), noise) for _, force, noise in clean]
+    return Case(asked, true, draw, np.concatenate(noises))
+
+
+def decay_case(folder: Path) -> Case:
+    asked = loaded(folder, described([decay_set()], ["damping_ratio"]))
+    true, each = synthetic.truth(asked), asked.data[0]
+    assert isinstance(each, FreeDecay)
+    assert each.virtual is not None
+
+    def draw(random: np.random.Generator) -> list[Experiment]:
+        return [decay.experiment(each, *synthetic.decay_of(each, true, random))]
+
+    count = int(each.virtual.duration * each.virtual.rate)
+    return Case(asked, true, draw, np.full(count, each.virtual.noise))
+
+
+class Trials(NamedTuple):
+    """What came out.
+
+    Attributes:
+        names: of the constants.
+        inside: (n_names,) of how many intervals the truth is inside.
+        width: (n_names,) mean half width of the intervals' logarithms over that of the bound.
+    """
+
+    names: tuple[str, ...]
+    inside: list[int]
+    width: Floats
+
+
+def tried(case: Case) -> Trials:
+    names = case.asked.fit
+    true = case.true.logs(names)
+    inside, width = [], []
+    for seed in range(SEEDS):
+        model = Model(start(case.asked), names, case.draw(np.random.default_rng([7, seed])))
+        found = fit(model)
+        estimate = findings.estimate(found, uncertainty.uncertainty(found))
+        low, high = (np.log(ends[: len(names)]) for ends in (estimate.low, estimate.high))
+        inside.append((low < true) & (true < high))
+        width.append((high - low) / 2)
+    bound = _bound(model, np.concatenate([true, found.unknowns[len(names) :]]), case.noise)
+    told = Trials(names, np.sum(inside, axis=0).tolist(), np.mean(width, axis=0) / (NORMAL * bound))
+    print(told)  # noqa: T201
+    return told
+
+
+def _bound(model: Model, at: Floats, noise: Floats) -> Floats:
+    """Standard errors of the wanted constants by the bound, for unwhitened sets."""
+    jacobian = model.jacobian(at) / noise[:, None]
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    return np.sqrt(np.diag(covariance))[: len(model.names)]
+
+
+@pytest.mark.parametrize("case", [forces_case, decay_case])
+def test_intervals_hold_and_are_no_wider_than_need_be(
+    case: Callable[[Path], Case], tmp_path: Path
+) -> None:
+    told = tried(case(tmp_path))
+    for name, inside, width in zip(*told, strict=True):
+        assert FEWEST <= inside <= MOST, name
+        assert width < WIDEST, name
