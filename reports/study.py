@@ -148,8 +148,9 @@ def load(
         )
     read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
     for name, data in read.items():
-        _check_problem(chosen, name, data, files[name])
-    compared = {file.parent.name: datasets.read(file, "comparison") for file in comparisons}
+        posed = contacts.geometric(chosen) if name == "geometric_response" else chosen
+        _check_problem(posed, STAGES[name], data, files[name])
+    compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
     return Study(
         name=path.resolve().parent.name,
         preset=preset,
@@ -181,9 +182,14 @@ def built(path: Path, preset: str | None, results: Path, recordings: Sequence[st
     return load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}, compared)
 
 
-def _check_problem(chosen: Problem, name: Output, data: xr.Dataset, path: Path) -> None:
-    posed = contacts.geometric(chosen) if name == "geometric_response" else chosen
-    wanted = problem.section_hash(posed, STAGES[name])
+def _comparison(chosen: Problem, path: Path) -> xr.Dataset:
+    data = datasets.read(path, "comparison")
+    _check_problem(chosen, "compare", data, path)
+    return data
+
+
+def _check_problem(posed: Problem, stage: Stage, data: xr.Dataset, path: Path) -> None:
+    wanted = problem.section_hash(posed, stage)
     if (found := data.attrs.get("problem_hash")) != wanted:
         raise UserError(
             "the dataset was made from another problem (or another preset)",

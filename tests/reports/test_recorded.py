@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from pipeline.errors import UserError
 from reports import kinds, page, style
 from reports.facts import Fact
 from reports.player import payload
@@ -153,3 +154,8 @@ def test_comparisons_are_read_from_their_folders(tmp_path: Path) -> None:
     read = load(tmp_path / "problem.yaml", None, files, [file])
     assert list(read.compared) == ["altered_0"]
     assert "recordings/altered_0/comparison.nc" in read.files
+    problem = tmp_path / "problem.yaml"
+    problem.write_text(problem.read_text() + "prediction: { samples: 3 }\n")
+    with pytest.raises(UserError, match=r"comparison\.nc") as refused:
+        load(problem, None, files, [file])
+    assert "made from another problem" in str(refused.value)
