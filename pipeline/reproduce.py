@@ -65,7 +65,7 @@ def _work(args: argparse.Namespace) -> None:
             key=args.target,
             remedy="tell the developers, with this list and the versions in requirements.lock",
         )
-    LOG.info("%s: %d files, the same bytes from two builds", args.target, count)
+    LOG.info("%s: two builds have the same bytes (files compared: %d)", args.target, count)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

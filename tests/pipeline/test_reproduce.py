@@ -36,7 +36,9 @@ def test_two_equal_builds_are_reproducible(
 ) -> None:
     monkeypatch.setattr(reproduce, "_built", build("same"))
     assert reproduce.main(["fig2@quick"]) == 0
-    assert "fig2@quick: 1 files, the same bytes" in capsys.readouterr().err
+    assert (
+        "fig2@quick: two builds have the same bytes (files compared: 1)" in capsys.readouterr().err
+    )
 
 
 def test_files_that_differ_are_named(
