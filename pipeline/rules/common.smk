@@ -19,6 +19,8 @@ onstart:
 
 # What was built, and the caches of compiled solvers and plots.
 rule clean:
+    log:
+        ".snakemake/clean.log",
     localrule: True
     shell:
-        "rm -rf results .cache"
+        "rm -rf results .cache 2> {log}"
