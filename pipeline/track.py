@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline import cli
-from pipeline.errors import UserError
+from pipeline.errors import UserError, found_in
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,11 +83,8 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
     held = path.parent / asked.points
-    try:
+    with found_in(path):
         made = points.track(design, points.cloud(held, asked))
-    except UserError as error:
-        error.file = error.file or str(path)
-        raise
     parents = {"design": source, "points": held}
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)
@@ -241,16 +238,12 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
-    try:
+    with found_in(source):
         setup = Setup(
             asked.thickness, asked.camera_distance, asked.specimen, asked.turned, asked.mirrored
         )
         with cli.progress(length(video), "tracking") as bar:
             track = follow(shown, of_design(design), scale, bar.update, setup)
-    except UserError as error:
-        if error.file is None:
-            error.file = str(source)
-        raise
     if uneven(track.time):
         LOG.warning("warning: the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))
