@@ -8,7 +8,8 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from tests.e2e.checkout import Checkout
 
 TARGET = "fig3@quick"
 AS_ROOT = () if os.geteuid() == 0 else ("sudo", "-n")
-PATIENCE = 300.0
+PATIENCE = 900.0  # seconds; far more than it takes, for a machine that others use as well
 ON_SLURM = (
     *("--profile", "profiles/slurm", "--slurm-no-account"),
     *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
@@ -65,8 +66,10 @@ def wait_for(condition: Callable[[], object], run: subprocess.Popen[str]) -> Non
         time.sleep(0.1)
 
 
-def started(checkout: Checkout) -> subprocess.Popen[str]:
-    return subprocess.Popen(
+@contextmanager
+def started(checkout: Checkout) -> Iterator[subprocess.Popen[str]]:
+    """The command of a user; whatever comes, it ends with the block; its jobs do not."""
+    run = subprocess.Popen(
         [sys.executable, "-m", "pipeline.run", *ON_SLURM, TARGET],
         cwd=checkout.root,
         text=True,
@@ -74,6 +77,12 @@ def started(checkout: Checkout) -> subprocess.Popen[str]:
         stderr=subprocess.STDOUT,
         start_new_session=True,
     )
+    try:
+        yield run
+    finally:
+        if run.poll() is None:
+            os.killpg(run.pid, signal.SIGKILL)
+            run.communicate()
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +96,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 
 
 def lose_the_node(checkout: Checkout) -> None:
-    """The node goes with all that runs on it, and comes back."""
+    """The node goes with all that runs on it, and is brought back."""
     node = socket.gethostname().partition(".")[0]
     asked(*AS_ROOT, "scontrol", "update", f"nodename={node}", "state=down", "reason=test")
     for process in checkout.stages("pipeline.design"):
@@ -101,24 +110,22 @@ def test_whatever_is_lost_the_results_are_those_of_one_machine(
     checkout = local.copied(tmp_path / "checkout")
     checkout.take_kernels(ROOT)
 
-    run = started(checkout)
-    wait_for(lambda: designing(checkout.root), run)
-    for job in designing(checkout.root):
-        assert (job.memory, job.cores, job.limit) == ("4000M", "1", "8:00:00")
-        assert job.name.startswith(PREFIX)
-    os.killpg(run.pid, signal.SIGKILL)
-    run.communicate()
+    with started(checkout) as run:
+        wait_for(lambda: designing(checkout.root), run)
+        for job in designing(checkout.root):
+            assert (job.memory, job.cores, job.limit) == ("4000M", "1", "8:00:00")
+            assert job.name.startswith(PREFIX)
     left = {job.number for job in jobs(checkout.root)}
     assert left, "the jobs live on without their submitter"
 
-    run = started(checkout)
-    wait_for(lambda: {job.number for job in designing(checkout.root)} - left, run)
-    assert not left & {job.number for job in jobs(checkout.root)}
-    lose_the_node(checkout)
-    told = run.communicate(timeout=2 * PATIENCE)[0]
+    with started(checkout) as run:
+        wait_for(lambda: {job.number for job in designing(checkout.root)} - left, run)
+        assert not left & {job.number for job in jobs(checkout.root)}
+        lose_the_node(checkout)
+        told = run.communicate(timeout=PATIENCE)[0]
     assert run.returncode == 0, told
     assert all(f"cancelled job {number} of a killed run" in told for number in left)
-    assert "NODE_FAIL" in told or "node failure" in told
+    assert "node failure" in told
     assert not jobs(checkout.root)
     for study in (TARGET, f"{TARGET}.1", f"{TARGET}.2"):
         assert checkout.built(study) == local.built(study)
