@@ -57,13 +57,17 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
     from pipeline.calibration import outcome
     from pipeline.calibration.description import Calibration
-    from pipeline.calibration.fitting import fitted
+    from pipeline.calibration.fitting import fitted, unsimulated
     from pipeline.problem.loading import section
     from pipeline.whole import whole
+    from sim.errors import SimulationError
 
     asked = section(path, Calibration)
     fit = fitted(asked, path)
-    made, found = outcome.dataset(fit)
+    try:
+        made, found = outcome.dataset(fit)
+    except SimulationError as error:
+        raise unsimulated(error, path) from error
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("warning: %s", line)
     parents = {each.name: path.parent / each.file for each in asked.data if each.file is not None}

@@ -6,16 +6,20 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
+from pipeline.calibration.virtual import (
+    Amplitude,
+    Error,
+    Virtual,
+    VirtualDecay,
+    VirtualForces,
+    VirtualTrack,
+)
 from pipeline.problem.lattices import Lattice
 from pipeline.problem.model import Contact, Material
 from pipeline.problem.quantities import (
-    Angle,
     Count,
-    Duration,
     Force,
-    Frequency,
     Length,
-    Samples,
     fault,
 )
 from pipeline.problem.section import Section, exactly_one
@@ -32,7 +36,6 @@ Name = Literal[
 
 File = Annotated[str, Field(min_length=1)]
 Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
-Amplitude = Annotated[Angle, Field(gt=0.0)]
 
 
 class ForceColumns(Section):
@@ -45,20 +48,6 @@ class ForceColumns(Section):
 
     displacement: str = "displacement"
     force: str = "force"
-
-
-class VirtualForces(Section):
-    """A test that is computed.
-
-    Attributes:
-        end: displacement up to which it goes.
-        points: along the way.
-        noise: standard deviation of the load cell's white noise.
-    """
-
-    end: Length
-    points: Samples = 40
-    noise: Force
 
 
 class ForceDisplacement(Section):
@@ -103,22 +92,6 @@ class DecayColumns(Section):
     angle: str = "angle"
 
 
-class VirtualDecay(Section):
-    """A trace that is computed: a damped oscillation at the authors' frequency of one hinge.
-
-    Attributes:
-        amplitude: at the start.
-        duration: of the trace.
-        rate: of its readings.
-        noise: standard deviation of the angles.
-    """
-
-    amplitude: Amplitude
-    duration: Duration
-    rate: Frequency = 960.0
-    noise: Amplitude
-
-
 class FreeDecay(Section):
     """Angle over time of two units on one ligament that was bent and let go.
 
@@ -141,32 +114,6 @@ class FreeDecay(Section):
     def _one_source(self) -> Self:
         exactly_one(self, "file", "virtual")
         return self
-
-
-class Error(Section):
-    """Standard deviations.
-
-    Attributes:
-        displacement: of places.
-        rotation: of rotations.
-    """
-
-    displacement: Length
-    rotation: Amplitude
-
-
-class VirtualTrack(Section):
-    """A track that is computed.
-
-    Attributes:
-        rate: frames per second.
-        noise: of every frame.
-        bias: that stays with each unit.
-    """
-
-    rate: Frequency
-    noise: Error
-    bias: Error | None = None
 
 
 class TrackedMotion(Section):
@@ -208,20 +155,6 @@ class TrackedMotion(Section):
 
 
 Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminator="kind")]
-
-
-class Virtual(Section):
-    """What computed data are made with.
-
-    Attributes:
-        truth: the true constants.
-        cutoff_angle: the true one, where it is not that of `contact`.
-        seed: of the noise.
-    """
-
-    truth: Material
-    cutoff_angle: Angle | None = None
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
 class Calibration(Section):

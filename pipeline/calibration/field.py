@@ -14,10 +14,11 @@ from jax import Array
 from pipeline import datasets
 from pipeline import problem as problems
 from pipeline.calibration.constants import Constants
-from pipeline.calibration.description import Error, Name, TrackedMotion
+from pipeline.calibration.description import Name, TrackedMotion
 from pipeline.calibration.drivenoise import changes
 from pipeline.calibration.experiment import ELASTIC, Measured
 from pipeline.calibration.simulated import AnySolver, KnownDrive, Simulation
+from pipeline.calibration.virtual import Error
 from pipeline.comparison import redrive
 from pipeline.comparison.registration import measured_places, register
 from pipeline.datasets import TABLES

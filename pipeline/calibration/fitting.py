@@ -35,11 +35,16 @@ def fitted(asked: Calibration, path: Path) -> Fit:
         what = f"{values} values do not determine {len(model.start)} unknowns"
         raise UserError(what, file=path, key="data", remedy=remedy)
     try:
-        return _settled(model)
+        return settled(model)
     except SimulationError as error:
-        remedy = "check lattice, displacements and the values in material that the fit starts from"
-        what = f"the measured states cannot be simulated: {error}"
-        raise UserError(what, file=path, key="data", remedy=remedy) from error
+        raise unsimulated(error, path) from error
+
+
+def unsimulated(error: SimulationError, path: Path) -> UserError:
+    """What it means that measured states cannot be simulated."""
+    remedy = "check lattice, displacements and the values in material that the fit starts from"
+    what = f"the measured states cannot be simulated: {error}"
+    return UserError(what, file=path, key="data", remedy=remedy)
 
 
 def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
@@ -64,7 +69,7 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
     return field.experiment(asked, folder, begin, field.read(asked, folder))
 
 
-def _settled(model: Model) -> Fit:
+def settled(model: Model) -> Fit:
     """The fit with what the noise of measured drives does at the constants that it finds."""
     known = _noisy(model, model.begin)
     found = fit(known)

@@ -6,6 +6,7 @@ the true constants and the true noise.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -14,20 +15,29 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pipeline.calibration import decay, findings, forces, synthetic, uncertainty
+from pipeline.calibration import decay, field, findings, forces, synthetic, syntrack, uncertainty
 from pipeline.calibration.constants import Constants, start
-from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay
-from pipeline.calibration.estimate import Model, fit
+from pipeline.calibration.description import (
+    Calibration,
+    ForceDisplacement,
+    FreeDecay,
+    TrackedMotion,
+)
+from pipeline.calibration.estimate import Model
 from pipeline.calibration.experiment import Experiment
+from pipeline.calibration.fitting import settled
+from pipeline.environment import ROOT
 from sim.arrays import Floats
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
+    TRUTH,
     decay_set,
     described,
     force_sets,
     loaded,
 )
 
+SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"
 SEEDS = 100
 FEWEST, MOST = 90, 99
 WIDEST = 1.5
@@ -43,7 +53,7 @@ class Case(NamedTuple):
         asked: the calibration.
         true: constants.
         draw: experiments with noise.
-        noise: (n,) its true standard deviations.
+        noise: (n,) its true standard deviations, over those that the sets state.
     """
 
     asked: Calibration
@@ -91,6 +101,30 @@ def decay_case(folder: Path) -> Case:
     return Case(asked, true, draw, np.full(count, each.virtual.noise))
 
 
+def field_case(folder: Path) -> Case:
+    shutil.copy(SPECIMEN, folder)
+    error = {"displacement": "0.01 mm", "rotation": "0.05 deg"}
+    track = {
+        "kind": "track",
+        "name": "motion",
+        "problem": SPECIMEN.name,
+        "structure": "altered",
+        "bias": error,
+        "virtual": {"rate": "6 Hz", "noise": error, "bias": error},
+    }
+    start_of = TRUTH | {"bending_stiffness": "1.7 N mm/rad", "axial_stiffness": "100 N/mm"}
+    wanted = ["axial_stiffness", "bending_stiffness"]
+    asked = loaded(folder, described([track], wanted, material=start_of))
+    begin, true, each = start(asked), synthetic.truth(asked), asked.data[0]
+    assert isinstance(each, TrackedMotion)
+
+    def draw(random: np.random.Generator) -> list[Experiment]:
+        made = syntrack.track_of(each, folder, true, random)
+        return [field.experiment(each, folder, begin, made)]
+
+    return Case(asked, true, draw, np.ones(1))
+
+
 class Trials(NamedTuple):
     """What came out.
 
@@ -111,12 +145,12 @@ def tried(case: Case) -> Trials:
     inside, width = [], []
     for seed in range(SEEDS):
         model = Model(start(case.asked), names, case.draw(np.random.default_rng([7, seed])))
-        found = fit(model)
+        found = settled(model)
         estimate = findings.estimate(found, uncertainty.uncertainty(found))
         low, high = (np.log(ends[: len(names)]) for ends in (estimate.low, estimate.high))
         inside.append((low < true) & (true < high))
         width.append((high - low) / 2)
-    bound = _bound(model, np.concatenate([true, found.unknowns[len(names) :]]), case.noise)
+    bound = _bound(found.model, np.concatenate([true, found.unknowns[len(names) :]]), case.noise)
     told = Trials(names, np.sum(inside, axis=0).tolist(), np.mean(width, axis=0) / (NORMAL * bound))
     print(told)  # noqa: T201
     return told
@@ -129,7 +163,7 @@ def _bound(model: Model, at: Floats, noise: Floats) -> Floats:
     return np.sqrt(np.diag(covariance))[: len(model.names)]
 
 
-@pytest.mark.parametrize("case", [forces_case, decay_case])
+@pytest.mark.parametrize("case", [forces_case, decay_case, field_case])
 def test_intervals_hold_and_are_no_wider_than_need_be(
     case: Callable[[Path], Case], tmp_path: Path
 ) -> None:
