@@ -114,7 +114,7 @@ def test_every_state_stays_inside_the_barrier(splitting: Splitting) -> None:
 
 def test_deep_contact_takes_no_shorter_steps() -> None:
     rig = shaken(3.0, bias_deg=45.0)
-    rough = solver_for(rig, 160)
+    rough = solver_for(rig, 300)
     u, _, record = rough.forward(rig.values, rig.drive)
     assert record.steps.n_steps == rough.n_steps
     angles = rig.topology.smallest_void_angles(rig.values.void, u.reshape(len(u), -1, 3))
