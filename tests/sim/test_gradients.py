@@ -39,6 +39,7 @@ TAYLOR = {
 }
 TAYLOR_IN_CONTACT = TAYLOR | {
     "design": np.geomspace(1e-4, 1e-5, 4),
+    "stiffness": np.geomspace(4e-5, 4e-6, 4),
     "contact": np.geomspace(3e-3, 3e-4, 4),
     "density": np.geomspace(3e-3, 3e-4, 4),
     "damping": np.geomspace(3e-4, 3e-5, 4),
@@ -54,9 +55,9 @@ SOLVERS: dict[str, Callable[[Rig], Solver]] = {
     "implicit": lambda rig: ImplicitSolver(
         rig.topology, np.linspace(0.0, DURATION, 61), ASKED, tolerance=1e-8
     ),
-    "leapfrog": lambda rig: ExplicitSolver(rig.topology, DURATION, 300, ASKED, splitting=LEAPFROG),
+    "leapfrog": lambda rig: ExplicitSolver(rig.topology, DURATION, 400, ASKED, splitting=LEAPFROG),
     "blanes_moan": lambda rig: ExplicitSolver(
-        rig.topology, DURATION, 150, ASKED, splitting=BLANES_MOAN
+        rig.topology, DURATION, 300, ASKED, splitting=BLANES_MOAN
     ),
 }
 DYNAMIC = ("implicit", "leapfrog", "blanes_moan")
