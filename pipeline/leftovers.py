@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import time
 from pathlib import Path
@@ -11,6 +10,9 @@ from pipeline.errors import UserError
 
 PREFIX = "cloak_"
 """Begins the names of all jobs of a run; see profiles/slurm."""
+
+LOGS = Path(".snakemake/slurm_logs")
+"""Where jobs on a cluster write, in the folder of their run: without it, there was none."""
 
 _PATIENCE = 60.0  # seconds that cancelled jobs get to end
 _FORMAT = "%i|%j|%Z"  # number, name, working directory
@@ -22,7 +24,7 @@ def cancel(folder: Path) -> list[str]:
     Raises:
         UserError: SLURM does not answer, or a job does not end.
     """
-    if shutil.which("squeue") is None or not (found := jobs(folder)):
+    if not (folder / LOGS).exists() or not (found := jobs(folder)):
         return []
     _ask("scancel", *found)
     until = time.monotonic() + _PATIENCE
@@ -47,6 +49,6 @@ def _ask(*command: str) -> list[str]:
         ended = subprocess.run(command, text=True, capture_output=True, check=True, timeout=60)
     except (OSError, subprocess.SubprocessError) as error:
         told = str(getattr(error, "stderr", None) or error).strip()
-        remedy = "mend it, or run without profiles/slurm where there is no squeue"
+        remedy = f"mend it, or remove {LOGS} if no job of this folder is left on the cluster"
         raise UserError(f"SLURM does not answer: {told}", remedy=remedy) from error
     return ended.stdout.splitlines()

@@ -26,21 +26,25 @@ def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return queue
 
 
+def used(folder: Path) -> Path:
+    """The folder, after a run that used a cluster."""
+    (folder / leftovers.LOGS).mkdir(parents=True)
+    return folder
+
+
 def test_jobs_of_this_folder_and_of_a_run_are_cancelled(queue: Path) -> None:
-    others = "3|cloak_a|/elsewhere\n4|mine|/here\n"
-    queue.write_text(f"1|cloak_a|/here\n2|cloak_b|/here\n{others}")
-    assert leftovers.cancel(Path("/here")) == ["1", "2"]
+    here = used(queue.parent)
+    others = f"3|cloak_a|/elsewhere\n4|mine|{here}\n"
+    queue.write_text(f"1|cloak_a|{here}\n2|cloak_b|{here}\n{others}")
+    assert leftovers.cancel(here) == ["1", "2"]
     assert queue.read_text() == others
-    assert leftovers.cancel(Path("/here")) == []
+    assert leftovers.cancel(here) == []
 
 
 def test_a_cluster_that_does_not_answer_is_told(queue: Path) -> None:
     with pytest.raises(UserError, match="SLURM does not answer"):
-        leftovers.cancel(queue.parent)  # there is no queue to list
+        leftovers.cancel(used(queue.parent))  # there is no queue to list
 
 
-def test_without_a_cluster_there_is_nothing_to_cancel(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert leftovers.cancel(tmp_path) == []
+def test_a_folder_that_no_run_used_a_cluster_for_asks_none(queue: Path) -> None:
+    assert leftovers.cancel(queue.parent) == []  # there is no queue to list
