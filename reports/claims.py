@@ -88,7 +88,7 @@ class Judged:
 
     @property
     def both(self) -> Status:
-        """Whether it holds wherever the paper claims it."""
+        """Whether it holds in simulation and in experiment, of a claim on both."""
         sides = [self.simulation.status, self.experiment.status]
         order: tuple[Status, ...] = ("does not hold", "not yet evaluated", "holds")
         return next(status for status in order if status in sides)
