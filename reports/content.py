@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -102,3 +102,22 @@ def provenance(study: Study) -> list[Source]:
     }
     own = source("this page", xr.Dataset(attrs=made))
     return [own, *(source(f"{name}.nc", data) for name, data in study.datasets.items())]
+
+
+def sources_of(studies: Mapping[str, Study]) -> list[Source]:
+    """Where a page of several studies, by name, is from."""
+    return [
+        replace(source, name=f"{name}: {source.name}")
+        for name, study in studies.items()
+        for source in provenance(study)
+    ]
+
+
+def skipped_of(studies: Sequence[Study]) -> list[str]:
+    """What the simulations of several studies left out, each once."""
+    return list(dict.fromkeys(text for study in studies for text in skipped(study.response)))
+
+
+def drafts_of(studies: Sequence[Study]) -> list[str]:
+    """Why a page of several studies is a draft, each reason once."""
+    return list(dict.fromkeys(reason for study in studies for reason in study.draft))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -78,7 +77,7 @@ def page(
     by_key = {fact.key: fact for fact in known}
     studies = [design.study for design in family.designs]
     player = payload(animation(family))
-    draft = list(dict.fromkeys(reason for study in studies for reason in study.draft))
+    draft = content.drafts_of(studies)
     return Page(
         title=family.problem.title,
         targets=[family.target],
@@ -94,15 +93,11 @@ def page(
         tables=data,
         player=player,
         player_note=content.rounding(player),
-        provenance=[
-            replace(source, name=f"{study.target}: {source.name}")
-            for study in studies
-            for source in content.provenance(study)
-        ],
+        provenance=content.sources_of({study.target: study for study in studies}),
         problem=json.dumps(
             json.loads(canonical_json(family.problem)), indent=1, sort_keys=True, ensure_ascii=False
         ),
-        skipped=list(dict.fromkeys(text for s in studies for text in content.skipped(s.response))),
+        skipped=content.skipped_of(studies),
         draft=draft,
         claims=[] if draft else claims.judged(family.name, known),
     )

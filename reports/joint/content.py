@@ -71,7 +71,7 @@ def page(
     by_key = {fact.key: fact for fact in known}
     player = payload(animation(studies))
     problems = {study.name: json.loads(canonical_json(study.problem)) for study in studies}
-    draft = list(dict.fromkeys(reason for study in studies for reason in study.draft))
+    draft = content.drafts_of(studies)
     headline = []
     for study in studies:
         key = f"{study.name}.{measures.measure_of(study.problem).key}_reduction"
@@ -92,13 +92,9 @@ def page(
         tables=data,
         player=player,
         player_note=content.rounding(player),
-        provenance=[
-            replace(source, name=f"{study.name}: {source.name}")
-            for study in studies
-            for source in content.provenance(study)
-        ],
+        provenance=content.sources_of({study.name: study for study in studies}),
         problem=json.dumps(problems, indent=1, sort_keys=True, ensure_ascii=False),
-        skipped=list(dict.fromkeys(text for s in studies for text in content.skipped(s.response))),
+        skipped=content.skipped_of(studies),
         draft=draft,
         claims=[] if draft else claims.judged(name, known),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,20 +21,31 @@ Columns = dict[str, NDArray[Any]]
 
 def build(study: Study) -> list[Table]:
     """All tables, in the order of the panels."""
-    tables = [
-        Table(
-            "design.csv",
-            "vertices of the cloaked and of the initial design",
-            vertices(study.design),
-        ),
-        Table("loss_history.csv", "loss against evaluation (panel b)", history(study.design)),
-        Table("path.csv", "every structure along the path", path(study)),
-    ]
+    tables = [*of_design(study), Table("path.csv", "every structure along the path", path(study))]
     if study.scatter is not None:
         tables.append(
             Table("robustness.csv", "imperfect copies, one a line", copies(study, study.scatter))
         )
     return tables
+
+
+def of_design(study: Study) -> list[Table]:
+    """The design and how it was found."""
+    text = "vertices of the cloaked and of the initial design"
+    return [
+        Table("design.csv", text, vertices(study.design)),
+        Table("loss_history.csv", "loss against evaluation (panel b)", history(study.design)),
+    ]
+
+
+def by_structure(study: Study, series: Mapping[str, xr.DataArray]) -> Columns:
+    """A column for each series of a response and each structure, one row a sample."""
+    columns: Columns = {}
+    for label, values in series.items():
+        mean = over_cases(study.problem, values)
+        for name in structures(study.response):
+            columns[f"{name}_{label}"] = mean.sel(structure=name).values
+    return columns
 
 
 def path(study: Study) -> Columns:
@@ -52,11 +64,7 @@ def path(study: Study) -> Columns:
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],
     }
-    for label, values in series.items():
-        mean = over_cases(problem, values)
-        for name in structures(response):
-            columns[f"{name}_{label}"] = mean.sel(structure=name).values
-    return columns
+    return columns | by_structure(study, series)
 
 
 def copies(study: Study, made: xr.Dataset) -> Columns:

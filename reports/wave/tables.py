@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from reports.fig2.tables import history, vertices
 from reports.path import measures
-from reports.path.course import structures
-from reports.path.curves import over_cases
+from reports.path.tables import Columns, by_structure, of_design
 from reports.study import Study
 from reports.tables import Table
 from reports.wave.course import places
 from reports.wave.voids import along_edges
 
-Columns = dict[str, NDArray[Any]]
-
 
 def build(study: Study) -> list[Table]:
     """All tables, in the order of the panels."""
     tables = [
-        Table(
-            "design.csv",
-            "vertices of the cloaked and of the initial design",
-            vertices(study.design),
-        ),
-        Table("loss_history.csv", "loss against evaluation (panel b)", history(study.design)),
+        *of_design(study),
         Table("waves.csv", "every structure over time (panels d to f)", over_time(study)),
     ]
     if study.verification is not None:
@@ -53,12 +41,7 @@ def over_time(study: Study) -> Columns:
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],
     }
-    columns: Columns = {"time_s": response["time"].values}
-    for label, values in series.items():
-        mean = over_cases(problem, values)
-        for name in structures(response):
-            columns[f"{name}_{label}"] = mean.sel(structure=name).values
-    return columns
+    return {"time_s": response["time"].values} | by_structure(study, series)
 
 
 def steps(verification: xr.Dataset) -> Columns:
