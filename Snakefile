@@ -9,11 +9,11 @@ from snakemake.utils import min_version
 from pipeline.calibrated import calibrations, description, measurements
 from pipeline.filmed import compared, comparisons, filmed, recording_pages, tracked
 from pipeline.sources import source_hash
-from pipeline.workflow import FRAMED, any_of, check_problems, check_room, chunks
-from pipeline.workflow import comparisons_of, copies, datasets_of, designs, families
-from pipeline.workflow import figures, hashes_of, joints, member_hashes, members, movies
-from pipeline.workflow import options, packages, prepare_jobs, product_pages, section
-from pipeline.workflow import robust_designs, shown, shown_options, targets
+from pipeline.studies import FRAMED, families, figures, joints, movies, targets
+from pipeline.workflow import any_of, check_problems, check_room, chunks, comparisons_of
+from pipeline.workflow import copies, datasets_of, designs, hashes_of, member_hashes
+from pipeline.workflow import members, options, packages, prepare_jobs, product_pages
+from pipeline.workflow import robust_designs, section, shown, shown_options
 
 min_version("9.20")
 
@@ -22,42 +22,8 @@ if workflow.is_main_process:
     check_problems(sys.argv[1:])
 prepare_jobs()
 
-for target, built in targets().items():
 
-    rule:
-        name:
-            target
-        input:
-            f"results/{built}/report/index.html",
-
-    rule:
-        name:
-            f"{target}_fabrication"
-        input:
-            product_pages(built, "fabrication"),
-
-    rule:
-        name:
-            f"{target}_spectrum"
-        input:
-            product_pages(built, "spectrum"),
-
-    rule:
-        name:
-            f"{target}_recordings"
-        input:
-            recording_pages(built),
-
-
-for study in sorted({built.partition("@")[0] for built in targets().values()}):
-
-    rule:
-        name:
-            f"{study}_gains"
-        input:
-            f"results/{study}/gains.csv",
-
-
+include: "pipeline/rules/targets.smk"
 include: "pipeline/rules/common.smk"
 include: "pipeline/rules/design.smk"
 include: "pipeline/rules/simulate.smk"

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline import cli, contacts, problem
 from pipeline.design import design_dataset, optimise
-from pipeline.problem.model import Method, Methods
+from pipeline.problem.optimiser import Method, Methods
 from pipeline.select import join
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, RampHarmonic
-from pipeline.problem.model import Load, Robust
+from pipeline.problem.objective import Load, Robust
 from pipeline.scenes import motions_of, scene_of
 from sim.loads import Motion
 from sim.scene import Scene

@@ -1,4 +1,4 @@
-"""What the rules ask before anything runs: which studies there are, and what a stage needs of them.
+"""What the rules ask before anything runs: what a stage needs of a study.
 
 A stage depends on sections of its problem file and on source (pipeline/sources.py). Both enter the
 rules as hashes: a rerun follows from what a file says, never from its date. Nothing heavy is
@@ -8,144 +8,26 @@ imported here: this is the time one waits for "nothing to be done".
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
-import yaml
 from snakemake.iocontainers import Wildcards
 
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
-from pipeline.filmed import RECORDINGS, shown_recordings
-from pipeline.movies import MOVIES
+from pipeline.filmed import shown_recordings
 from pipeline.problem import (
     Problem,
     Stage,
-    joint,
-    load,
     outputs,
-    preset_names,
     section_hash,
 )
-from pipeline.problem.families import count, numbered
-from pipeline.problem.loading import overlaid
 from pipeline.problem.settings import group_count
+from pipeline.studies import Study, asked_for, problem_of, studies, together
 
-PRODUCTS = ("_fabrication", "_spectrum", "_gains", RECORDINGS)
-"""Ends of the targets of a study beside its report."""
-ALL = "all"  # the target that builds every figure of the paper
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
-
-
-@dataclass(frozen=True, order=True)
-class Study:
-    """One study, with one preset of its problem file or with none ("")."""
-
-    name: str
-    preset: str = ""
-
-    @classmethod
-    def parse(cls, text: str) -> Study:
-        """Reads "fig2" or "fig2@edge3"."""
-        name, _, preset = text.partition("@")
-        return cls(name, preset)
-
-    def __str__(self) -> str:
-        return f"{self.name}@{self.preset}" if self.preset else self.name
-
-    @property
-    def targets(self) -> tuple[str, ...]:
-        """Names under which a command line may ask for the study."""
-        return (str(self), f"{self.name}_{self.preset}") if self.preset else (self.name,)
-
-    @property
-    def problem(self) -> str:
-        """Path of the problem file, from the root of the repository."""
-        return f"experiments/{self.name}/problem.yaml"
-
-    @property
-    def options(self) -> str:
-        """Options by which a stage finds the problem."""
-        return f"--problem {self.problem}" + (f" --preset {self.preset}" if self.preset else "")
-
-
-FRAMED = (Study("fig2"),)
-"""From which the framework is drawn, Figure 1."""
-
-
-def families(root: Path = ROOT) -> dict[Study, list[Study]]:
-    """Every study below experiments/, each followed by its presets, with their several designs.
-
-    A file that is no YAML counts as a study without presets: the stage that reads it tells why.
-    """
-    found = {}
-    for path in sorted(root.glob("experiments/*/problem.yaml")):
-        try:
-            content = yaml.load(path.read_bytes(), Loader=yaml.CSafeLoader)
-        except yaml.YAMLError:
-            content = None
-        content = content if isinstance(content, dict) else {}
-        presets = content.pop("presets", None)
-        for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
-            whole = overlaid(content, laid if isinstance(laid, dict) else {})
-            names = (numbered(str(preset), k + 1) for k in range(count(whole)))
-            study = Study(path.parent.name, str(preset))
-            found[study] = [Study(study.name, name) for name in names]
-    return found
-
-
-def studies(root: Path = ROOT) -> list[Study]:
-    """Every study with its presets and designs."""
-    return [each for study, designs in families(root).items() for each in (study, *designs)]
-
-
-def joints(root: Path = ROOT) -> dict[str, list[Study]]:
-    """The studies of every figure of several, by target; with each preset that all of them have.
-
-    A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
-    """
-    found: dict[str, list[Study]] = {}
-    for path in sorted(root.glob("experiments/*/figure.yaml")):
-        name = path.parent.name
-        try:
-            members = joint.load(path).studies
-        except UserError:
-            members = ()
-        presets = [set(preset_names(path.parents[1] / m / "problem.yaml")) for m in members]
-        for preset in ("", *sorted(set.intersection(*presets) if presets else ())):
-            found[str(Study(name, preset))] = [Study(member, preset) for member in members]
-    return found
-
-
-def together() -> dict[str, list[Study]]:
-    """The studies of every page of several, by target."""
-    return joints() | {str(study): designs for study, designs in families().items() if designs}
-
-
-def targets() -> dict[str, str]:
-    """What every target builds: the folder of a study or of a figure of several."""
-    single = {target: str(study) for study in studies() for target in study.targets}
-    return single | {figure: figure for figure in together()}
-
-
-def figures() -> list[str]:
-    """The studies that are figures of the paper, by their names."""
-    return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
-
-
-def movies() -> dict[str, list[Study]]:
-    """The movies whose studies are there, with these studies."""
-    there = {study.name for study in studies()}
-    return {
-        name: [Study(each) for each in shown]
-        for name, shown in MOVIES.items()
-        if there.issuperset(shown)
-    }
 
 
 def datasets_of(shown: Sequence[Study]) -> list[str]:
@@ -203,28 +85,6 @@ def member_hashes(wildcards: Wildcards) -> str:
     return hashes_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
-def asked_for(words: Collection[str]) -> list[Study]:
-    """The studies that the words of a command line name, by target or by a file of theirs.
-
-    A preset counts even if its problem file has none of that name: reading the problem tells so.
-    """
-    by_target = {target: study for study in studies() for target in study.targets}
-    names = {study.name for study in by_target.values()}
-    several = together()
-    words = [*words, *(figures() if ALL in words else ())]
-    words = [_without_product(word) for word in words]
-    found = [study for word in words for study in several.get(word, ())]
-    for word in words:
-        study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
-        if study.name in names:
-            found.append(study)
-    return found
-
-
-def _without_product(word: str) -> str:
-    return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
-
-
 def check_problems(words: Collection[str]) -> None:
     """Ends the process with one clear message if a study that is asked for has a faulty problem.
 
@@ -258,16 +118,6 @@ def check_room(folder: str) -> None:
 def study_of(wildcards: Wildcards) -> Study:
     """The study that a job works on, from its wildcards `name` and `preset`."""
     return Study.parse(f"{wildcards.name}{wildcards.preset}")
-
-
-@cache
-def problem_of(study: Study) -> Problem:
-    """The problem of a study.
-
-    Raises:
-        UserError: the problem file is wrong; tells where and what to do.
-    """
-    return load(study.problem, study.preset or None)
 
 
 def options(wildcards: Wildcards) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibration.description import Calibration, Name
-from pipeline.problem.model import UNROTATED_MOMENT, Contact, Material
+from pipeline.problem.material import UNROTATED_MOMENT, Contact, Material
 from sim.arrays import Floats
 
 UNITS: dict[Name, str] = {

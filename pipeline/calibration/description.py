@@ -15,7 +15,7 @@ from pipeline.calibration.virtual import (
     VirtualTrack,
 )
 from pipeline.problem.lattices import Lattice
-from pipeline.problem.model import Contact, Material
+from pipeline.problem.material import Contact, Material
 from pipeline.problem.quantities import (
     Count,
     Force,

@@ -13,7 +13,7 @@ from pipeline.calibration import decay, forces, syntrack
 from pipeline.calibration.constants import Constants, start
 from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay, Set
 from pipeline.problem import yamlfile
-from pipeline.problem.model import UNROTATED_MOMENT
+from pipeline.problem.material import UNROTATED_MOMENT
 from pipeline.whole import whole
 from sim.arrays import Floats
 

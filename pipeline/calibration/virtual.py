@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.problem.model import Material
+from pipeline.problem.material import Material
 from pipeline.problem.quantities import Angle, Duration, Force, Frequency, Length, Samples
 from pipeline.problem.section import Section
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -11,24 +10,18 @@ from pipeline.problem.drives import Drive, Harmonic, LinearRamp, RampHarmonic, T
 from pipeline.problem.fabrication import Fabrication
 from pipeline.problem.families import Designs
 from pipeline.problem.lattices import Lattice
+from pipeline.problem.material import Contact, Material
+from pipeline.problem.objective import Objective
+from pipeline.problem.optimiser import Optimiser
 from pipeline.problem.prediction import Prediction, Tolerances
 from pipeline.problem.quantities import (
     Angle,
-    BendingStiffness,
-    ContactStiffness,
     Count,
-    Damping,
-    Density,
     Duration,
-    Frequency,
     Gap,
     Length,
     Positive,
-    Ratio,
-    RotaryDamping,
     Samples,
-    Stiffness,
-    fault,
 )
 from pipeline.problem.regions import CloakRegion, Region, VoidRegion
 from pipeline.problem.report import Report, Robustness
@@ -36,88 +29,6 @@ from pipeline.problem.section import Section, exactly_one
 from pipeline.problem.selection import Selector
 from pipeline.problem.spectrum import Spectrum
 from pipeline.problem.sweeping import Sweep
-
-UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
-UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
-
-
-class DampingLaw(Section):
-    """Viscous damping to ground per unit: the authors' ratio, or the two coefficients.
-
-    Attributes:
-        ratio: over the critical damping of one unit on one ligament.
-        translation: force over velocity; together with `rotation`.
-        rotation: torque over angular velocity.
-    """
-
-    ratio: Ratio | None = None
-    translation: Damping | None = None
-    rotation: RotaryDamping | None = None
-
-    @model_validator(mode="after")
-    def _one_form(self) -> Self:
-        pair = [self.translation is not None, self.rotation is not None]
-        if (self.ratio is not None) == any(pair) or any(pair) != all(pair):
-            raise fault("one form of damping is wanted", "give ratio, or translation and rotation")
-        return self
-
-
-class Material(Section):
-    """Units and ligaments.
-
-    Attributes:
-        density: mass of the units over their area, in the plane.
-        axial_stiffness: force over elongation of a ligament.
-        shear_stiffness: force over lateral displacement of its ends.
-        bending_stiffness: torque over relative rotation of its ends.
-        damping: of the units.
-    """
-
-    density: Density
-    axial_stiffness: Stiffness
-    shear_stiffness: Stiffness
-    bending_stiffness: BendingStiffness
-    damping: DampingLaw
-
-    def damping_coefficients(self, spacing: float) -> tuple[float, float]:
-        """Translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.
-
-        The ratio is that of a single-ligament oscillator with the mass and inertia of a square
-        that is not rotated, whatever the design (the authors' formula).
-        """
-        law = self.damping
-        if law.ratio is None:
-            assert law.translation is not None
-            assert law.rotation is not None
-            return law.translation, law.rotation
-        mass = UNROTATED_AREA * self.density * spacing**2
-        inertia = UNROTATED_MOMENT * self.density * spacing**4
-        return (
-            law.ratio * 2.0 * math.sqrt(mass * self.shear_stiffness),
-            law.ratio * 2.0 * math.sqrt(inertia * self.bending_stiffness),
-        )
-
-
-class Contact(Section):
-    """Contact of units: on the void angles of bonded ones (the authors'), or on true distances.
-
-    On angles there is none above the cut-off and no bound at the barrier; on distances none beyond
-    `distance` and no bound at a touch. Designs are judged by both.
-
-    Attributes:
-        law: by which the design is optimised.
-        stiffness: of the contact, torque over angle squared.
-        barrier_angle: void angle at which the energy is infinite.
-        cutoff_angle: void angle above which there is no contact.
-        distance: of two units beyond which there is none; by default a twelfth of the ligaments'
-            length, or the gap that the constraints ask for if that is smaller.
-    """
-
-    law: Literal["angle", "geometric"]
-    stiffness: ContactStiffness
-    barrier_angle: Angle
-    cutoff_angle: Angle
-    distance: Length | None = None
 
 
 class Support(Section):
@@ -169,56 +80,6 @@ class Horizon(Section):
         return self
 
 
-class Load(Section):
-    """The drive with another amplitude, another frequency, or both.
-
-    Attributes:
-        amplitude: in place of the drive's.
-        frequency: in place of the drive's.
-        weight: in the loss, where the drive's own loads have the weight 1 together.
-    """
-
-    amplitude: Length | None = None
-    frequency: Frequency | None = None
-    weight: Positive = 1.0
-
-
-class Robust(Section):
-    """What a design is to hold against besides the drive.
-
-    Attributes:
-        loads: that are simulated besides, along all of the drive's directions.
-        sharpness: p of the p-mean of the losses under all loads: 1 is their mean, 8 or more leads
-            to the worst of them.
-        copies: number of imperfect copies, whose mean loss is minimised in place of the perfect
-            structure's; none by default.
-        geometry: largest shift of their vertices along x and y, as a share of the spacing.
-        seed: of the shifts.
-    """
-
-    loads: tuple[Load, ...] = ()
-    sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 1.0
-    copies: Annotated[int, Field(ge=0, le=64, strict=True)] = 0
-    geometry: Ratio = 0.03
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
-
-
-class Objective(Section):
-    """What the surroundings or a region should do.
-
-    Attributes:
-        kind: what is compared: displacements and rotations, or the strain energy.
-        target: stay at rest, or do as in the intact lattice.
-        region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
-        robust: what else the design is to hold against, if anything.
-    """
-
-    kind: Literal["displacement", "strain_energy"]
-    target: Literal["rest", "intact"]
-    region: Literal["surroundings"] | Region = "surroundings"
-    robust: Robust | None = None
-
-
 class Constraints(Section):
     """What can be made: lower bounds at every unit, none where a key is left out.
 
@@ -235,58 +96,6 @@ class Constraints(Section):
     void_angle: Angle | None = None
     gap: Gap | None = None
     convex: bool = True
-
-
-class Method(Section):
-    """The budget of one optimisation method.
-
-    Attributes:
-        evaluations: of loss and gradient, at most.
-    """
-
-    evaluations: Count
-
-
-class Methods(Section):
-    """The optimisation methods to run; the better design is shipped.
-
-    Attributes:
-        sqp: sequential quadratic programming in a trust region.
-        mma: method of moving asymptotes, as the authors do.
-    """
-
-    sqp: Method | None = None
-    mma: Method | None = None
-
-    @property
-    def chosen(self) -> dict[str, Method]:
-        """The methods asked for, by name."""
-        pairs = {"sqp": self.sqp, "mma": self.mma}
-        return {name: method for name, method in pairs.items() if method is not None}
-
-
-class Optimiser(Section):
-    """How to look for the design; lengths are shifts of vertices.
-
-    Attributes:
-        methods: one or both.
-        geometric: the budget with which a design by the angle law of contact is optimised again
-            with contact on distance, where its loss depends on the law.
-        symmetry: that the design is to have.
-        trust_radius: at the start.
-        trust_radius_max: at most.
-        kick: random shifts with which an optimisation that has ended goes on, as far as its
-            budget allows.
-        seed: of the kicks.
-    """
-
-    methods: Methods
-    geometric: Method = Method(evaluations=60)
-    symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
-    trust_radius: Length = 0.25
-    trust_radius_max: Length = 1.0
-    kick: Length = 0.15
-    seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
 class Solver(Section):

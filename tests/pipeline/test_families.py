@@ -11,7 +11,7 @@ from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.problem import content_hash, load, section_hash
 from pipeline.problem.families import numbered, parted
-from pipeline.workflow import Study, families, together
+from pipeline.studies import Study, families, together
 from tests.pipeline import static
 
 FIG3 = ROOT / "experiments/fig3/problem.yaml"

@@ -14,7 +14,7 @@ from pipeline.calibration.description import Calibration
 from pipeline.calibration.fitting import fitted
 from pipeline.calibration.uncertainty import gradient, uncertainty
 from pipeline.problem.loading import section
-from pipeline.problem.model import Material
+from pipeline.problem.material import Material
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
     decay_set,

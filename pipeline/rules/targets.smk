@@ -1,0 +1,35 @@
+# What `snakemake TARGET` may ask for: every study with its presets, every figure of several.
+for target, built in targets().items():
+
+    rule:
+        name:
+            target
+        input:
+            f"results/{built}/report/index.html",
+
+    rule:
+        name:
+            f"{target}_fabrication"
+        input:
+            product_pages(built, "fabrication"),
+
+    rule:
+        name:
+            f"{target}_spectrum"
+        input:
+            product_pages(built, "spectrum"),
+
+    rule:
+        name:
+            f"{target}_recordings"
+        input:
+            recording_pages(built),
+
+
+for study in sorted({built.partition("@")[0] for built in targets().values()}):
+
+    rule:
+        name:
+            f"{study}_gains"
+        input:
+            f"results/{study}/gains.csv",
