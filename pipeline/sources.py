@@ -55,6 +55,7 @@ def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
     return tuple(sorted({*modules.values(), *resources}))
 
 
+@cache
 def _locate(module: str, root: Path) -> Path | None:
     """File of a module of this project; None for what lies outside or is no module."""
     if module.partition(".")[0] not in PACKAGES:

@@ -6,7 +6,7 @@ Nothing heavy is imported here: this is the time one waits for "nothing to be do
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -62,7 +62,8 @@ FRAMED = (Study("fig2"),)
 """From which the framework is drawn, Figure 1."""
 
 
-def families(root: Path = ROOT) -> dict[Study, list[Study]]:
+@cache
+def families(root: Path = ROOT) -> Mapping[Study, list[Study]]:
     """Every study below experiments/, each followed by its presets, with their several designs.
 
     A file that is no YAML counts as a study without presets: the stage that reads it tells why.
@@ -88,7 +89,8 @@ def studies(root: Path = ROOT) -> list[Study]:
     return [each for study, designs in families(root).items() for each in (study, *designs)]
 
 
-def joints(root: Path = ROOT) -> dict[str, list[Study]]:
+@cache
+def joints(root: Path = ROOT) -> Mapping[str, list[Study]]:
     """The studies of every figure of several, by target; with each preset that all of them have.
 
     A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
@@ -106,9 +108,11 @@ def joints(root: Path = ROOT) -> dict[str, list[Study]]:
     return found
 
 
-def together() -> dict[str, list[Study]]:
+@cache
+def together() -> Mapping[str, list[Study]]:
     """The studies of every page of several, by target."""
-    return joints() | {str(study): designs for study, designs in families().items() if designs}
+    several = {str(study): designs for study, designs in families().items() if designs}
+    return {**joints(), **several}
 
 
 def targets() -> dict[str, str]:
