@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from pipeline import cli
+from reports.arguments import joined
 
 
 def _work(args: argparse.Namespace) -> None:
@@ -21,12 +21,7 @@ def _work(args: argparse.Namespace) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Build the report; returns the exit code."""
     parser = cli.parser("reports.family.build", str(__doc__))
-    parser.add_argument(
-        "--results", type=Path, required=True, metavar="FOLDER", help="where their datasets are"
-    )
-    parser.add_argument(
-        "--out-dir", type=Path, required=True, metavar="FOLDER", help="the report's folder"
-    )
+    joined(parser)
     return cli.run(_work, parser, argv)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline import cli
+from reports.arguments import joined
 
 
 def _work(args: argparse.Namespace) -> None:
@@ -25,12 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = cli.parser("reports.joint.build", str(__doc__), study=False)
     parser.add_argument("--figure", type=Path, required=True, metavar="YAML", help="the studies")
     parser.add_argument("--preset", metavar="NAME", help="a preset that all of them have")
-    parser.add_argument(
-        "--results", type=Path, required=True, metavar="FOLDER", help="where their datasets are"
-    )
-    parser.add_argument(
-        "--out-dir", type=Path, required=True, metavar="FOLDER", help="the report's folder"
-    )
+    joined(parser)
     return cli.run(_work, parser, argv)
 
 
