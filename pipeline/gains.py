@@ -1,13 +1,12 @@
-"""Stage: what the robust presets of a study gain over its own design, as a table."""
+"""Stage: what the presets that ask for more than a study's own drive gain over its own design."""
 
 from __future__ import annotations
 
 import argparse
-import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,58 +15,59 @@ from pipeline import cli, problem
 from pipeline.errors import UserError
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from pipeline.problem import Problem
     from sim.scene import Scene
 
-LOG = logging.getLogger(__name__)
-
 PLAIN = "plain"
-COLUMNS = ("preset", "loads", "copies", "plain_design", "own_design", "gain", "own_under_drive")
-_HELD_OUT = 16  # imperfect copies that no design was made for
+HELD_OUT = 16
+"""Imperfect copies that a loss is evaluated over, none of them known to a design."""
 _SEED = 1000
+
+
+class Gain(NamedTuple):
+    """One preset: what it asks for and the losses under it, as `GAINS` has them."""
+
+    asks: str
+    loads: int
+    copies: int
+    loss_plain: float
+    loss_own: float
+    loss_altered: float
+    price: float
 
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
     made = cli.parser(
         "pipeline.gains",
-        "Evaluate the robust loss of every preset with objective.robust at the study's own design"
-        " and at the preset's.",
+        "Evaluate the loss of every preset that asks for more than the study's own drive at the"
+        " study's own design and at the preset's.",
     )
     told = "the study's own design as plain=NC, and one for each preset"
     made.add_argument("--designs", nargs="+", required=True, metavar="PRESET=NC", help=told)
-    made.add_argument("--out", type=Path, required=True, metavar="CSV", help="table to write")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
     return made
 
 
 def work(args: argparse.Namespace) -> None:
-    """Reads the designs, evaluates them, writes and tells the table.
+    """Reads the designs, evaluates them, writes the gains.
 
     Raises:
-        UserError: no design of the study itself is given, or none of a preset.
+        UserError: no design of the study itself is given, or none of a preset, or a preset asks
+            for nothing but the study's own drive.
     """
-    import csv
-
-    from pipeline.whole import whole
+    from pipeline import datasets, provenance
 
     given = dict(_named(text) for text in args.designs)
-    presets = [name for name in given if name != PLAIN]
-    if PLAIN not in given or not presets:
+    if PLAIN not in given or len(given) == 1:
         what = "a design of the study itself and one of a preset are compared"
         remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
         raise UserError(what, key="--designs", remedy=remedy)
-    rows = []
-    with cli.progress(len(presets), "robust losses") as bar:
-        for preset in presets:
-            rows.append(_row(args.problem, preset, given[PLAIN], given[preset]))
-            bar.update()
-    with whole(args.out) as aside, aside.open("w", encoding="utf-8", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(COLUMNS)
-        table.writerows(rows)
-    for row in rows:
-        pairs = zip(COLUMNS, row, strict=True)
-        LOG.info("%s", ", ".join(f"{name} {value}" for name, value in pairs))
+    made = gains(args.problem, given)
+    origin = provenance.attributes(problem.load(args.problem), "design", parents=given)
+    datasets.write(made, args.out, "gains", origin)
 
 
 def _named(text: str) -> tuple[str, Path]:
@@ -75,38 +75,73 @@ def _named(text: str) -> tuple[str, Path]:
     return name, Path(path)
 
 
-def _row(path: Path, preset: str, plain: Path, own: Path) -> tuple[str, ...]:
-    """One line of the table; copies are others than the design was made with."""
+def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
+    """The dataset ``gains`` of a problem file, from its own design and those of presets.
+
+    Raises:
+        UserError: a preset asks for nothing but the study's own drive.
+    """
+    import xarray as xr
+
+    from pipeline.responses import loss_units
+
+    own = problem.load(path)
+    presets = [name for name in designs if name != PLAIN]
+    with cli.progress(len(presets) + 1, "losses") as bar:
+        drive = _loss(own, path.parent, designs[PLAIN])
+        bar.update()
+        rows = []
+        for name in presets:
+            rows.append(_gain(path, name, designs))
+            bar.update()
+    columns = {
+        name: (("preset",), list(column))
+        for name, column in zip(Gain._fields, zip(*rows, strict=True), strict=True)
+    }
+    made = xr.Dataset({"preset": presets, **columns, "loss_drive": ((), drive)})
+    for name in ("loss_plain", "loss_own", "loss_altered", "price", "loss_drive"):
+        made[name].attrs["units"] = loss_units(own)
+    return made
+
+
+def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
+    """One preset; the copies are others than its design was made with."""
     asked, drive = problem.load(path, preset), problem.load(path)
-    robust = asked.objective.robust
-    if robust is None:
-        what, remedy = "the preset has no objective.robust", "give presets with it"
+    if not asked.asks_more_than(drive):
+        what, remedy = "the preset asks for nothing but the study's own drive", "leave it out"
         raise UserError(what, file=path, value=preset, remedy=remedy)
-    folder = path.parent
-    before, after = (_loss(_held_out(asked), folder, design) for design in (plain, own))
-    alone = _loss(drive, folder, own)
-    counts = 1 + len(robust.loads), _HELD_OUT if robust.copies else 0
-    gain = f"{1 - after / before:.1%}"
-    return preset, *map(str, counts), f"{before:.5g}", f"{after:.5g}", gain, f"{alone:.5g}"
+    robust, held = asked.objective.robust, _held_out(asked)
+    plain, own = (_loss(held, path.parent, designs[name]) for name in (PLAIN, preset))
+    return Gain(
+        asks=asked.title,
+        loads=1 + len(robust.loads if robust else ()),
+        copies=HELD_OUT if robust and robust.copies else 0,
+        loss_plain=plain,
+        loss_own=own,
+        loss_altered=_loss(held, path.parent, None),
+        price=_loss(drive, path.parent, designs[preset]),
+    )
 
 
 def _held_out(asked: Problem) -> Problem:
     robust = asked.objective.robust
-    assert robust is not None
-    copies = _HELD_OUT if robust.copies else 0
-    other = robust.model_copy(update={"copies": copies, "seed": robust.seed + _SEED})
+    if robust is None or not robust.copies:
+        return asked
+    other = robust.model_copy(update={"copies": HELD_OUT, "seed": robust.seed + _SEED})
     objective = asked.objective.model_copy(update={"robust": other})
     return asked.model_copy(update={"objective": objective})
 
 
-def _loss(asked: Problem, folder: Path, path: Path) -> float:
+def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
+    """The loss of a design, or of the structure before any; over the copies, if there are any."""
     from pipeline import datasets
     from pipeline.robust import design_scene
     from pipeline.structures import flat_vertices
 
     scene = design_scene(asked, folder)
-    design = datasets.read(path, "design")
-    vertices = flat_vertices(scene.lattice, design["vertices"])
+    vertices = scene.lattice.vertices
+    if path is not None:
+        vertices = flat_vertices(scene.lattice, datasets.read(path, "design")["vertices"])
     shifts = [0.0] if scene.copies is None else scene.copies[:, scene.lattice.group]
     return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
 

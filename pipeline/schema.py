@@ -59,6 +59,8 @@ def _overlaid(node: Any) -> Any:  # noqa: ANN401  (any JSON)
     part = {key: _overlaid(value) for key, value in node.items() if key not in _STRICT}
     if "oneOf" in part:  # parts of several kinds of drive look alike
         part["anyOf"] = part.pop("oneOf")
+    if part.get("additionalProperties") is False:  # of another kind, whose keys it removes
+        part["additionalProperties"] = {"type": "null"}
     if isinstance(properties := part.get("properties"), dict):
         part["properties"] = {
             key: {"anyOf": [value, {"type": "null"}]} for key, value in properties.items()

@@ -135,9 +135,10 @@ def designs(wildcards: Wildcards) -> list[str]:
 
 
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
-    """The study's own design ("plain") and those of its presets with objective.robust."""
+    """The study's own design ("plain") and those of its presets that ask for more."""
+    own = problem_of(Study(wildcards.name))
     mine = [study for study in studies() if study.name == wildcards.name and study.preset]
-    held = [study for study in mine if problem_of(study).objective.robust is not None]
+    held = [study for study in mine if problem_of(study).asks_more_than(own)]
     named = {study.preset: f"results/{study}/design.nc" for study in held}
     return {"plain": f"results/{wildcards.name}/design.nc", **named}
 

@@ -8,6 +8,7 @@ from typing import Literal
 from pipeline.datasets.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
+from pipeline.datasets.gains import GAINS
 from pipeline.datasets.responses import RESPONSE, SWEEP
 from pipeline.datasets.spectra import SPECTRUM
 from pipeline.datasets.tracks import RECORDED, SPECIMEN, TRACK, TRUTH
@@ -24,6 +25,7 @@ Kind = Literal[
     "scatter",
     "verification",
     "spectrum",
+    "gains",
     "specimen",
     "track",
     "truth",
@@ -39,6 +41,7 @@ TABLES: Mapping[Kind, Table] = {
     "scatter": SCATTER,
     "verification": VERIFICATION,
     "spectrum": SPECTRUM,
+    "gains": GAINS,
     "specimen": SPECIMEN,
     "track": TRACK,
     "truth": TRUTH,
@@ -55,6 +58,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "scatter": {},
     "verification": {},
     "spectrum": {},
+    "gains": {},
     "specimen": RECORDED,
     "track": RECORDED,
     "truth": RECORDED,
@@ -71,6 +75,7 @@ TITLES: Mapping[Kind, str] = {
     "scatter": "Responses of imperfect copies of a design",
     "verification": "Results with finer steps and with the other law of contact",
     "spectrum": "Small vibrations of the structures, and waves in their unit cell",
+    "gains": "Losses of designs that hold against more than the study's own drive",
     "specimen": "Motion of a specimen for a synthetic video, simulated",
     "track": "Motion of every unit in a video, with its uncertainty",
     "truth": "Motion of every unit that a synthetic video shows",

@@ -180,6 +180,10 @@ class Problem(Section):
         """Whether the load grows so slowly that inertia plays no part."""
         return isinstance(self.drive, LinearRamp | TanhRamp)
 
+    def asks_more_than(self, own: Problem) -> bool:
+        """Whether, as a preset of the study `own`, it is to hold against more or other loads."""
+        return self.objective.robust is not None or self.drive.kind != own.drive.kind
+
     @property
     def frequency(self) -> float | None:
         """The frequency of the drive in Hz, where it has one."""

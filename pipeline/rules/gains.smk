@@ -2,7 +2,7 @@ rule gains:
     input:
         unpack(robust_designs),
     output:
-        "results/{name}/gains.csv",
+        "results/{name}/gains.nc",
     log:
         "results/{name}/logs/gains.log",
     threads: 1
@@ -16,3 +16,22 @@ rule gains:
     shell:
         "python -m pipeline.gains --problem experiments/{wildcards.name}/problem.yaml"
         " --designs {params.designs} --out {output} --log {log}"
+
+
+rule gains_page:
+    input:
+        gains="results/{name}/gains.nc",
+    output:
+        multiext("results/{name}/gains/gains", ".pdf", ".svg", ".png", ".csv"),
+        page="results/{name}/gains/index.html",
+    log:
+        "results/{name}/logs/gains_page.log",
+    threads: 1
+    params:
+        folder=subpath(output.page, parent=True),
+        source=source_hash("reports.gains.build"),
+    message:
+        "Drawing what the robust presets of {wildcards.name} gain"
+    shell:
+        "python -m reports.gains.build --problem experiments/{wildcards.name}/problem.yaml"
+        " --gains {input.gains} --out-dir {params.folder} --log {log}"

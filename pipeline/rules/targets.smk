@@ -32,4 +32,4 @@ for study in sorted({built.partition("@")[0] for built in targets().values()}):
         name:
             f"{study}_gains"
         input:
-            f"results/{study}/gains.csv",
+            f"results/{study}/gains/index.html",

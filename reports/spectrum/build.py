@@ -19,11 +19,18 @@ if TYPE_CHECKING:
 
     from reports.tables import Table
 
+_CAPTION = (
+    "(a) Lowest modes, exaggerated and coloured by their motion; frequencies without damping."
+    " (b) Steady motion under a small harmonic motion of the driven units, with damping; the mean"
+    " over the load cases where there are several. (c) Waves round the triangle of the Brillouin"
+    " zone, without damping, about the lattice at rest and compressed along x with the stress"
+    " across relieved."
+)
+
 
 def _work(args: argparse.Namespace) -> None:
     from pipeline import datasets, problem
-    from pipeline.whole import whole
-    from reports import style, templating
+    from reports import sheet
     from reports.spectrum import figure
 
     asked = problem.load(args.problem, args.preset)
@@ -37,24 +44,18 @@ def _work(args: argparse.Namespace) -> None:
             value=found,
             remedy="run pipeline.spectrum again with this problem",
         )
-    args.out_dir.mkdir(parents=True, exist_ok=True)
-    with style.styled():
-        drawn = style.save(figure.build(data, asked), args.out_dir / "spectrum")
-    tables = [_transmission(data), _modes(data), _bands(data)]
-    for table in tables:
-        with whole(args.out_dir / table.name) as aside:
-            aside.write_bytes(table.csv)
-    svg = (args.out_dir / "spectrum.svg").read_text(encoding="utf-8")
-    values = {
-        "title": asked.title or args.problem.resolve().parent.name,
-        "svg": templating.inlined(svg),
-        "files": [path.name for path in drawn],
-        "tables": tables,
-        "sources": sorted((key, str(value)) for key, value in data.attrs.items()),
-    }
-    with whole(args.out_dir / "index.html") as aside:
-        text = templating.rendered("spectrum.html.j2", values)
-        aside.write_text(text, encoding="utf-8", newline="\n")
+    made = sheet.Sheet(
+        name="spectrum",
+        title=asked.title or args.problem.resolve().parent.name,
+        subject="small vibrations",
+        lead="Small vibrations of the structures about their equilibria, and waves in the unit"
+        " cell of the lattice.",
+        caption=_CAPTION,
+        figure=lambda: figure.build(data, asked),
+        tables=[_transmission(data), _modes(data), _bands(data)],
+        sources=data.attrs,
+    )
+    sheet.publish(made, args.out_dir)
 
 
 def _transmission(data: xr.Dataset) -> Table:

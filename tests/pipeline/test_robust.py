@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from pipeline import datasets, design, gains
 from pipeline.errors import UserError
 from pipeline.problem import load
 from pipeline.robust import design_scene
+from reports.gains import build
 from sim.loads import Harmonic
 from tests.pipeline.static import HOLE, write
 
@@ -79,14 +79,30 @@ def test_the_gain_of_a_preset_is_over_the_studys_own_design(
     hole: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = write(tmp_path, HOLE + PRESETS, size=5, amplitude=3.0)
-    shipped, out = Path(hole[1]).with_name("design.nc"), tmp_path / "gains.csv"
+    shipped, out = Path(hole[1]).with_name("design.nc"), tmp_path / "gains.nc"
     words = ["--problem", str(path), "--quiet", "--out", str(out), "--designs"]
     assert gains.main([*words, f"plain={shipped}", f"tolerant={shipped}"]) == 0
-    (row,) = csv.DictReader(out.read_text().splitlines())
-    assert (row["preset"], row["loads"], row["copies"]) == ("tolerant", "1", "16")
-    assert row["plain_design"] == row["own_design"]
-    assert row["gain"] == "0.0%"
+    made = datasets.read(out, "gains").squeeze()
+    counts = [made[name].item() for name in ("preset", "loads", "copies")]
+    assert counts == ["tolerant", 1, 16]
+    assert made["loss_plain"] == made["loss_own"] < made["loss_altered"]
     best = float(datasets.read(shipped, "design")["best_loss"].min())
-    assert float(row["own_under_drive"]) == pytest.approx(best, rel=1e-4)
+    assert float(made["price"]) == float(made["loss_drive"]) == pytest.approx(best, rel=1e-4)
+    assert made["price"].attrs["units"] == "1"
+    page = tmp_path / "page"
+    assert build.main([*words[:3], "--gains", str(out), "--out-dir", str(page)]) == 0
+    text = (page / "index.html").read_text(encoding="utf-8")
+    assert "<td>tolerant</td>" in text
+    assert "<td>0.0%</td>" in text
     assert gains.main([*words, f"plain={shipped}"]) == 2
     assert "one of a preset" in capsys.readouterr().err
+
+
+def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
+    own, pulse = load(fig2), load(fig2, "pulse")
+    assert pulse.asks_more_than(own)
+    assert not load(fig2, "edge3").asks_more_than(own)
+    scene = design_scene(pulse, fig2.parent)
+    times = np.linspace(0.0, 0.4, 401)
+    largest = max(np.abs(drive.motion(times)).max() for drive in scene.drives)
+    assert largest == pytest.approx(4.5)

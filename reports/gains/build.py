@@ -1,0 +1,78 @@
+"""Draws what designs gain that hold against more: figure (PDF, SVG, PNG), table, one page.
+
+The same dataset gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline import cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from reports.sheet import Shown
+
+_CAPTION = (
+    "(a) Loss under all loads and imperfect copies that a preset asks for: of the altered"
+    " structure, of the study's own design, and of the preset's. The copies are others than those"
+    " that the design was made with. (b) What the preset's design pays under the study's own"
+    " drive; the line is the study's own design."
+)
+_COLUMNS = (
+    "preset", "asks for", "loads", "copies", "loss of the study's own design",
+    "loss of the preset's design", "gain", "loss under the study's own drive",
+)  # fmt: skip
+
+
+def _work(args: argparse.Namespace) -> None:
+    from pipeline import datasets, problem
+    from reports import sheet
+    from reports.gains import figure
+    from reports.tables import Table
+
+    asked = problem.load(args.problem)
+    data = datasets.read(args.gains, "gains")
+    columns = {str(name): data[name].values for name in data.variables if data[name].dims}
+    made = sheet.Sheet(
+        name="gains",
+        title=asked.title or args.problem.resolve().parent.name,
+        subject="designs that hold against more",
+        lead="Designs that hold against more than the study's own drive, and what each gains over"
+        f" the study's own design, whose loss is {float(data['loss_drive']):.4g}.",
+        caption=_CAPTION,
+        figure=lambda: figure.build(data),
+        tables=[Table("gains.csv", "losses of every preset", columns)],
+        sources=data.attrs,
+        shown=_shown(data),
+    )
+    sheet.publish(made, args.out_dir)
+
+
+def _shown(data: xr.Dataset) -> Shown:
+    from reports.sheet import Shown
+
+    return Shown(_COLUMNS, [_row(data.sel(preset=name)) for name in data["preset"].values])
+
+
+def _row(data: xr.Dataset) -> tuple[str, ...]:
+    plain, own, price = (float(data[name]) for name in ("loss_plain", "loss_own", "price"))
+    words = (str(data[name].item()) for name in ("preset", "asks", "loads", "copies"))
+    return *words, f"{plain:.4g}", f"{own:.4g}", f"{1 - own / plain:.1%}", f"{price:.4g}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Draw the gains; returns the exit code."""
+    parser = cli.parser("reports.gains.build", str(__doc__))
+    parser.add_argument("--gains", type=Path, required=True, metavar="NC", help="the dataset")
+    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for all files")
+    return cli.run(_work, parser, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
