@@ -68,6 +68,10 @@ class Camera:
             radius = radius - excess / (1 + square * (3 * first + square * 5 * second))
         return radius / seen
 
+    def beside(self, points: Floats, pixels: Floats) -> Floats:
+        """Points (..., 2) that are seen ``pixels`` (..., 2) away from others, mm."""
+        return self.unproject(self.project(points) + pixels)
+
     def jacobian(self, points: Floats) -> Floats:
         """Derivative (..., 2, 2) of the pixels after the points, px/mm."""
         step = 1e-3

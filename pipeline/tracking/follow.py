@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +14,12 @@ from pipeline.errors import UserError
 from pipeline.tracking import timing, uncertainty
 from pipeline.tracking.arrays import Floats, Ints, Picture, Reals, Singles
 from pipeline.tracking.calibrate import Calibration, Setup, calibrate
-from pipeline.tracking.find import placed
+from pipeline.tracking.find import Sighting, placed
 from pipeline.tracking.fitting import Fitter
+from pipeline.tracking.markings import shown_on
 from pipeline.tracking.recognition import ambiguous, check, recognised
 from pipeline.tracking.recovery import Recovery
+from pipeline.tracking.rigid import swung
 from pipeline.tracking.specimen import Specimen
 from pipeline.tracking.template import Learner
 from pipeline.tracking.tracker import Found, Tracker
@@ -85,6 +88,7 @@ def follow(
     check(specimen, sighting, calibration)
     if (lies := placed(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
+    off_place = _off_place(first.image, specimen, sighting, calibration, setup.kind)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
     rows, ended = _rows(_all(first, frames), tracker, tell)
     times, numbers, motion, sigmas, qualities = (
@@ -92,12 +96,32 @@ def follow(
     )
     del rows, tracker
     motion -= np.where(np.isfinite(motion[0]), motion[0], 0)
+    motion[..., :2] += swung(motion[..., 2], off_place)
     time = times - times[0]
     faults = timing.faults(time, motion, sigmas)
     sigma = uncertainty.calibrated(motion, sigmas, specimen.centre, faults == timing.STEADY)
     sigma[~np.isfinite(motion)] = np.nan
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+def _off_place(
+    image: Picture, specimen: Specimen, sighting: Sighting, calibration: Calibration, kind: str
+) -> Singles:
+    """How far (units, 2) bare units rest off their design's places, mm.
+
+    Templates turn about these places, so what the middle of such a unit swings about its place is
+    missing from its shift. Of others it is not known: their outlines may be those of what was glued
+    on, off the middle of the unit below.
+    """
+    camera = calibration.camera
+    if kind == "auto":
+        sighting = replace(sighting, camera=camera)
+        kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
+    if kind != "bare":
+        return np.zeros((specimen.count, 2), np.float32)
+    seen = camera.beside(specimen.centre, calibration.residual)
+    return np.nan_to_num(seen - specimen.centre).astype(np.float32)
 
 
 class _Row(NamedTuple):

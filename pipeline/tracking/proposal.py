@@ -14,13 +14,11 @@ from pipeline.errors import UserError
 from pipeline.tracking.arrays import Floats, Image, Picture
 from pipeline.tracking.calibrate import Calibration, Setup, calibrate
 from pipeline.tracking.find import Sighting
+from pipeline.tracking.markings import shown_on
 from pipeline.tracking.recognition import agreeing, ambiguous, check, inside, recognised
 from pipeline.tracking.specimen import Specimen, as_built, of_design
 
 _CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
-_BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
-_MARKED = 0.02  # of a face
-_DOTS = 4
 _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
 
 
@@ -63,7 +61,7 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
     sighting = replace(best.ways[0], camera=calibration.camera)
     check(specimen, sighting, calibration)
     like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
-    kind = _kind(image, specimen, sighting, 1 / calibration.pixel)
+    kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
     doubts = tuple(_doubts(best, like))
     return Proposal(best.name, specimen, sighting, kind, calibration.pixel, doubts)
 
@@ -125,36 +123,6 @@ def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
     yield "window: whether the specimen is at rest in the first frame"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"
-
-
-def _kind(image: Picture, specimen: Specimen, sighting: Sighting, px_per_mm: float) -> str:
-    """What most faces bear, by the number of patches on them that differ from their own shade."""
-    contrast = float(np.subtract(*np.percentile(image, [95, 5])))
-    counts = [_marks(image, specimen, sighting, unit, contrast) for unit in sighting.unit]
-    usual = float(np.median(counts))
-    if usual < 1:
-        return "bare"
-    small = px_per_mm * specimen.pitch < 3 * _DOTS  # px: no dots can be told apart
-    return "speckle" if usual > _DOTS or small else "dots"
-
-
-def _marks(
-    image: Picture, specimen: Specimen, sighting: Sighting, unit: int, contrast: float
-) -> int:
-    """Number of patches on a face, its rim left out."""
-    shrunk = specimen.centre[unit] + 0.75 * specimen.polygon(unit)
-    polygon = np.round(sighting.camera.project(shrunk)).astype(np.int32)
-    left, top, wide, high = cv2.boundingRect(polygon)
-    area = image[max(top, 0) : top + high, max(left, 0) : left + wide].astype(float)
-    if area.size == 0:
-        return 0
-    mask = np.zeros(area.shape, np.uint8)
-    cv2.fillPoly(mask, [polygon - [max(left, 0), max(top, 0)]], 1)
-    face = np.median(area[mask > 0]) if mask.any() else 0.0
-    differs = ((np.abs(area - face) > _BLANK * contrast) & (mask > 0)).astype(np.uint8)
-    if differs.sum() < _MARKED * mask.sum():
-        return 0
-    return int(cv2.connectedComponents(differs, connectivity=8)[0]) - 1
 
 
 def picture(image: Picture, found: Proposal, note: str = "") -> Image:

@@ -1,14 +1,21 @@
-"""Rigid motion between two sets of points in the plane (Kabsch), plain and robust."""
+"""Rigid motion in the plane: of points by angles, and between two sets of points (Kabsch)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats
+from pipeline.tracking.arrays import Floats, Reals
 
 _ROUNDS = 8
 _TUKEY = 4.685
 _LEAST = 1e-9
+
+
+def swung(angle: Reals, arm: Reals) -> Reals:
+    """How far (..., 2) the ends of arms (..., 2) go when these turn by angles (...) in rad."""
+    cos, sin = np.cos(angle) - 1, np.sin(angle)
+    x, y = arm[..., 0], arm[..., 1]
+    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
 
 
 def rigid_motion(
