@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks import registry, store, table
+from benchmarks import compare, registry, store, table
 from benchmarks.frame import Benchmark, Outcome, Report
 from benchmarks.measure import CandidateError, measure, pin
 
@@ -23,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     good = True
     for benchmark in chosen:
+        yard = compare.yardstick()
         try:
             report = _report(benchmark, asked.repeats, asked.skip_baseline, asked.out, core)
         except CandidateError as failed:
@@ -31,6 +32,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             continue
         print(f"\n{table.text(report)}\n")
         print("  stored:", *store.write(report, asked.out), flush=True)
+        made = compare.record(report, yard)
+        print(compare.told(benchmark.name, made), flush=True)
+        if asked.keep:
+            compare.keep(benchmark.name, made)
         good = good and not any(outcome.failure for outcome in report.outcomes)
     return 0 if good else 1
 
@@ -65,6 +70,11 @@ def _parser() -> argparse.ArgumentParser:
         "--skip-baseline",
         action="store_true",
         help="show the slow baselines' stored figures, marked so, if there are any",
+    )
+    parser.add_argument(
+        "--keep",
+        action="store_true",
+        help=f"store this as what later ones are compared with ({compare.STORED.name})",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results/benchmark"), help="folder (default %(default)s)"

@@ -39,11 +39,15 @@ class RungeKutta:
     Attributes:
         rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike).
         max_steps: bound on the steps; the adjoint keeps about its square root in checkpoints.
+        solver: name of a method of diffrax.
+        adjoint: of diffrax, for the gradient.
     """
 
-    rtol: float = 1e-8
-    atol: float = 1e-4
+    rtol: float | Array = 1e-8
+    atol: float | Array = 1e-4
     max_steps: int = 2**17
+    solver: str = "Dopri5"
+    adjoint: str = "RecursiveCheckpointAdjoint"
 
 
 def force(scene: Scene) -> Force:
@@ -97,7 +101,7 @@ def respond(
     def of_parameters(values: Parameters) -> tuple[Array, dict[str, Array]]:
         solution = diffrax.diffeqsolve(
             diffrax.ODETerm(rates),
-            diffrax.Dopri5(),
+            getattr(diffrax, method.solver)(),
             t0=0.0,
             t1=scene.duration,
             dt0=None,
@@ -105,7 +109,7 @@ def respond(
             args=values,
             saveat=diffrax.SaveAt(ts=times),
             stepsize_controller=diffrax.PIDController(rtol=method.rtol, atol=method.atol),
-            adjoint=diffrax.RecursiveCheckpointAdjoint(),
+            adjoint=getattr(diffrax, method.adjoint)(),
             max_steps=method.max_steps,
         )
         counts = {

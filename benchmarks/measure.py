@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import time
@@ -13,10 +14,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
+import psutil
+
 from benchmarks.frame import Benchmark, Candidate, Floats, Outcome, Run, Sample, errors
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 Tell = Callable[[str], None]
+_PATIENCE = 1.0
+"""Seconds between two looks at what a worker has spent."""
 
 
 class Timed(NamedTuple):
@@ -46,10 +51,20 @@ class CandidateError(Exception):
     """A candidate raised; the message says what."""
 
 
-class Worker:
-    """A process that prepares one candidate and runs it on demand."""
+class TooSlowError(CandidateError):
+    """A candidate took more processor time than it may."""
 
-    def __init__(self, prepare: Callable[[], Run]) -> None:
+
+class Worker:
+    """A process that prepares a candidate, or several one after the other, and runs it on demand.
+
+    Args:
+        prepare: builds and compiles, from the arguments that come with each wish to prepare.
+        limit: processor time that a wish may take, s.
+    """
+
+    def __init__(self, prepare: Callable[..., Run], limit: float = math.inf) -> None:
+        self._limit = limit
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_serve, args=(there, prepare), daemon=True)
@@ -69,21 +84,27 @@ class Worker:
             self._process.terminate()
         self._process.join()
 
-    def prepare(self) -> float:
+    def prepare(self, *arguments: object) -> float:
         """Builds and compiles; returns the seconds that took."""
-        return float(self._ask("prepare"))
+        return float(self._ask("prepare", *arguments))
 
     def run(self) -> Timed:
         """Runs once."""
         return Timed(*self._ask("run"))
 
+    @property
+    def alive(self) -> bool:
+        """Whether it may be asked for more."""
+        return self._process.is_alive()
+
     def peak_mib(self) -> float:
         """Peak resident memory so far, MiB."""
         return float(self._ask("memory"))
 
-    def _ask(self, wish: str) -> Any:  # noqa: ANN401  (goes by the wish)
+    def _ask(self, *wish: object) -> Any:  # noqa: ANN401  (goes by the wish)
         try:
             self._here.send(wish)
+            self._wait()
             good, answer = self._here.recv()
         except (EOFError, BrokenPipeError, ConnectionResetError):
             self._process.join()
@@ -92,23 +113,37 @@ class Worker:
             raise CandidateError(answer)
         return answer
 
+    def _wait(self) -> None:
+        """Waits for an answer, as long as the wish may take."""
+        process = psutil.Process(self._process.pid)
+        start = sum(process.cpu_times()[:2])
+        while not self._here.poll(_PATIENCE):
+            try:
+                spent = sum(process.cpu_times()[:2]) - start
+            except psutil.NoSuchProcess:
+                return
+            if spent > self._limit:
+                self._process.terminate()
+                raise TooSlowError(f"took longer than {self._limit:g} s")
 
-def _serve(pipe: Connection, prepare: Callable[[], Run]) -> None:
+
+def _serve(pipe: Connection, prepare: Callable[..., Run]) -> None:
     """The worker's end: answers wishes until the other end closes."""
     run: Run | None = None
     while True:
         try:
-            wish = pipe.recv()
+            wish, *arguments = pipe.recv()
         except EOFError:
             return
         try:
             if wish == "memory":
                 answer: Any = _peak_mib()
-            elif run is None:
+            elif wish == "prepare":
                 start = time.perf_counter()
-                run = prepare()
+                run = prepare(*arguments)
                 answer = time.perf_counter() - start
             else:
+                assert run is not None
                 answer = _timed(run)
         except Exception as error:  # noqa: BLE001  (whatever a candidate raises is its result)
             pipe.send((False, "".join(traceback.format_exception_only(error)).strip()))
@@ -148,7 +183,7 @@ def measure(
         worker.prepare()
         reference = worker.run().sample.values
     with ExitStack() as stack:
-        at_work = [_AtWork(one, stack.enter_context(Worker(one.prepare))) for one in chosen]
+        at_work = [AtWork(one, stack.enter_context(Worker(one.prepare))) for one in chosen]
         for one in at_work:
             tell(f"{benchmark.name}: compiling {one.candidate.name}")
             one.prepare()
@@ -160,37 +195,48 @@ def measure(
         return [one.outcome(reference) for one in at_work]
 
 
-class _AtWork:
-    """A candidate under measurement."""
+class AtWork:
+    """A candidate under measurement; the arguments go to the worker with the wish to prepare."""
 
-    def __init__(self, candidate: Candidate, worker: Worker) -> None:
+    def __init__(self, candidate: Candidate, worker: Worker, *arguments: object) -> None:
         self.candidate = candidate
         self._worker = worker
+        self._arguments = arguments
         self._compile_s = float("nan")
         self._runs: list[Timed] = []
         self._failure = ""
 
+    @property
+    def spent_s(self) -> float:
+        """Processor time of the runs so far."""
+        return sum(run.cpu_s for run in self._runs)
+
     def prepare(self) -> None:
+        """Builds and compiles it."""
         try:
-            self._compile_s = self._worker.prepare()
+            self._compile_s = self._worker.prepare(*self._arguments)
         except CandidateError as failed:
             self._failure = str(failed)
 
     def wants(self, round_: int) -> bool:
+        """Whether it runs in that round."""
         most = self.candidate.repeats if self.candidate.timed else 1
         return not self._failure and (most is None or round_ < most)
 
     def run(self) -> None:
+        """Runs it once."""
         try:
             self._runs.append(self._worker.run())
         except CandidateError as failed:
             self._failure = str(failed)
 
     def line(self) -> str:
+        """What came of the last run."""
         result = self._failure or f"{self._runs[-1].cpu_s:.3g} s"
         return f"{self.candidate.name}: {result}"
 
     def outcome(self, reference: Mapping[str, Floats]) -> Outcome:
+        """Its figures."""
         name, note, share = self.candidate.name, self.candidate.note, self.candidate.share
         if self._failure or not self._runs:
             return Outcome(name, note, failure=self._failure or "was not run")

@@ -24,8 +24,8 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCES = ("sim", "benchmarks", "pipeline", "experiments")
 
 
-def machine(core: int) -> dict[str, Any]:
-    """Where and when this is measured, and from which sources."""
+def machine(core: int | None = None) -> dict[str, Any]:
+    """Where and when this is measured, from which sources; the core if it is bound to one."""
     return {
         "processor": _processor(),
         "core": core,

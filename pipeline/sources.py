@@ -14,7 +14,7 @@ from pathlib import Path
 
 from pipeline.environment import ROOT
 
-PACKAGES = ("sim", "pipeline", "reports")
+PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
 RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".yaml"}
 
 

@@ -18,9 +18,11 @@ from sim.observables import observe
 from sim.statics import StaticSolver
 
 SIDES = (15, 30, 60, 120)
-COMPRESSION = 0.1
 ALL_IN_BANDS = 60
 """Largest lattice that is also solved with a band."""
+WAYS = {"Newton, by size": SIDES[-1], "Newton, band": ALL_IN_BANDS}
+"""Ways to store the tangent, with the largest lattice that each is shown on."""
+COMPRESSION = 0.1
 
 
 def benchmark() -> Benchmark:
@@ -34,7 +36,7 @@ def benchmark() -> Benchmark:
     return Benchmark(
         name="static",
         title="equilibrium at 10 % compression from rest, squares of 15 to 120 units a side",
-        reference=_strict,
+        reference=partial(strict, SIDES),
         candidates=(*chosen, *banded),
         targets=(
             Target("exponent of time by units, 30 to 120", _exponent, at_most=1.75, aim=1.5),
@@ -72,12 +74,12 @@ def _posed(side: int) -> tuple[Topology, Values, Drive]:
     return posed, Values(*(np.asarray(part) for part in made)), drive
 
 
-def _strict() -> Run:
+def strict(sides: tuple[int, ...]) -> Run:
     """The same equilibria over two loads, each to a hundredth of the usual residual."""
 
     def run() -> Sample:
         found: dict[str, np.ndarray] = {}
-        for side in SIDES:
+        for side in sides:
             top, values, drive = _posed(side)
             solver = StaticSolver(top, np.ones(1), relative=1e-12, substeps=2)
             states = solve_case(solver, values, drive)[0]
@@ -85,6 +87,12 @@ def _strict() -> Run:
         return Sample(found, {})
 
     return run
+
+
+def grown(way: str, side: float, task: str) -> Run:
+    """Run of one size by one of the WAYS."""
+    del task
+    return _solve(int(side), None if way == "Newton, by size" else False)
 
 
 def _solve(side: int, by_fronts: bool | None = None) -> Run:

@@ -11,6 +11,7 @@ from benchmarks import scenes
 from benchmarks.frame import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
 from sim.evaluation import evaluator
 from sim.plan import make_plan
+from sim.scene import Scene
 from sim.statics import Record, StaticSolver
 
 COLD, WARM = "from rest", "from the last design"
@@ -67,19 +68,23 @@ class Start:
 
 
 def _strict() -> Run:
-    return _walk(1e-13, warm=False)
+    return walk(_scene(), 1e-13, warm=False)
 
 
 def _cold() -> Run:
-    return _walk(1e-10, warm=False)
+    return walk(_scene(), 1e-10, warm=False)
 
 
 def _warm() -> Run:
-    return _walk(1e-10, warm=True)
+    return walk(_scene(), 1e-10, warm=True)
 
 
-def _walk(relative: float, warm: bool) -> Run:
-    scene = replace(scenes.fig4(), steps=STEPS)
+def _scene() -> Scene:
+    return replace(scenes.fig4(), steps=STEPS)
+
+
+def walk(scene: Scene, relative: float, warm: bool) -> Run:
+    """Run of losses and gradients along a random walk of designs."""
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
     memory = Start(warm)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from pipeline.datasets.benchmarks import BENCHMARK, CONTEST, MEASURED
 from pipeline.datasets.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
@@ -31,6 +32,8 @@ Kind = Literal[
     "truth",
     "comparison",
     "calibration",
+    "benchmark",
+    "contest",
 ]
 
 TABLES: Mapping[Kind, Table] = {
@@ -47,6 +50,8 @@ TABLES: Mapping[Kind, Table] = {
     "truth": TRUTH,
     "comparison": COMPARISON,
     "calibration": CALIBRATION,
+    "benchmark": BENCHMARK,
+    "contest": CONTEST,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -64,6 +69,8 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "truth": RECORDED,
     "comparison": COMPARED,
     "calibration": WARNED,
+    "benchmark": MEASURED,
+    "contest": MEASURED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""
 
@@ -81,5 +88,7 @@ TITLES: Mapping[Kind, str] = {
     "truth": "Motion of every unit that a synthetic video shows",
     "comparison": "Motion in a recording beside its simulation",
     "calibration": "Constants of a specimen, found from measurements, with their errors",
+    "benchmark": "Run time, error and work of several methods",
+    "contest": "Optimisers on the same design problem, evaluation by evaluation",
 }
 """What each kind holds, in a line; a dataset may have a title of its own."""

@@ -8,6 +8,7 @@ wildcard_constraints:
     recording=r"\w+",
     calibration=r"\w+",
     movie=r"S\d",
+    suite=r"\w+",
     chunk=r"\d+",
     law=r"(geometric_)?",
     structure="intact|altered|cloaked",

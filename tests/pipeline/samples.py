@@ -37,6 +37,10 @@ SIZES = {
     "with_parameter": 4,
     "set": 3,
     "point": 20,
+    "run": 3,
+    "quantity": 3,
+    "work": 2,
+    "optimiser": 2,
     "state": 2,
     "mode": 4,
     "excitation": 5,
@@ -59,6 +63,8 @@ _ATTRIBUTES: dict[str, dict[str, str]] = {
         "case": "0",
     },
     "calibration": {"calibration": "{}", "synthetic": "no", "warnings": ""},
+    "benchmark": dict.fromkeys(ATTRIBUTES["benchmark"], "as told"),
+    "contest": dict.fromkeys(ATTRIBUTES["contest"], "as told"),
 }
 
 
@@ -81,7 +87,7 @@ def _values(name: str, variable: Variable, random: np.random.Generator) -> np.nd
     shape = tuple(SIZES[dim] for dim in variable.dims)
     if variable.values:
         return np.array(variable.values)
-    if name == "method":
+    if name == "method" and variable.dims == ("method",):
         return np.array(["sqp", "mma"])
     if variable.dtype == "str":
         return np.array(["überschritten", "ok"])[random.integers(2, size=shape)]

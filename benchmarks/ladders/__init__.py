@@ -1,0 +1,1 @@
+"""Run time against error: every method on every scene, at ever tighter settings."""

@@ -1,0 +1,118 @@
+"""The suites of `snakemake benchmark`, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import xarray as xr
+
+from benchmarks import contest, skips
+from benchmarks.climb import Ladder, Point, Rules, climb
+from benchmarks.ladders import cases, sets
+from benchmarks.measure import Tell, Worker
+from benchmarks.points import dataset
+from benchmarks.suites import static
+from pipeline.datasets import Kind
+from pipeline.errors import UserError
+
+PRECISION = "precision_"
+DESIGNED = ("fig2", "fig4", "fig5", "small_push")
+"""Scenes that optimisers are compared on."""
+FEW = contest.Terms(8, 20.0)
+"""Of a small scene."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is measured together.
+
+    Attributes:
+        subject: what one run computes.
+        reference: what errors are measured against.
+        measure: gives the dataset, without its attributes.
+        kind: of the dataset.
+    """
+
+    subject: str
+    reference: str
+    measure: Callable[[Rules, Tell], xr.Dataset]
+    kind: Kind = "benchmark"
+
+
+def named(name: str) -> Suite:
+    """The suite of that name.
+
+    Raises:
+        UserError: there is none.
+    """
+    suites: dict[str, Callable[[], Suite]] = {
+        **{f"{PRECISION}{scene}": partial(_precision, scene) for scene in cases.TITLES},
+        **{f"optimisers_{scene}": partial(_contest, scene) for scene in DESIGNED},
+        "ablation": partial(_ablation, "fig2", "fig4"),
+        "small_ablation": partial(_ablation, "small_wave", "small_push"),
+        "growth": partial(_growth, static.SIDES),
+        "small_growth": partial(_growth, static.SIDES[:2]),
+    }
+    if name not in suites:
+        raise UserError(
+            "no such suite", key="suite", value=name, remedy=f"one of: {', '.join(suites)}"
+        )
+    return suites[name]()
+
+
+def _precision(scene: str) -> Suite:
+    return Suite(cases.TITLES[scene], sets.reference_in_words(scene), partial(_climbed, scene))
+
+
+def _climbed(scene: str, rules: Rules, tell: Tell) -> xr.Dataset:
+    tell(f"{scene}: reference")
+    with Worker(sets.reference(scene)) as worker:
+        worker.prepare()
+        reference = worker.run().sample.values
+    units = cases.scene(scene).lattice.n_units
+    found: list[Point] = []
+    for ladder in sets.ladders(scene):
+        found += climb(ladder, reference, rules, units, tell)
+    return dataset(found)
+
+
+def _contest(scene: str) -> Suite:
+    terms = FEW if scene.startswith("small") else contest.Terms()
+    told = f"{terms.evaluations} evaluations or {terms.seconds:g} s"
+    return Suite(
+        f"Optimisers on the design of {cases.TITLES[scene]}",
+        f"nothing: losses are evaluated afresh; each optimiser gets {told}",
+        lambda _, tell: contest.measure(scene, terms, tell),
+        "contest",
+    )
+
+
+def _ablation(wave: str, push: str) -> Suite:
+    return Suite(
+        f"What is skipped: in time {cases.TITLES[wave]}; at rest {cases.TITLES[push]}",
+        "the result with the skip made: the change is that of not skipping",
+        lambda rules, tell: dataset(skips.measure(wave, push, rules, tell)),
+    )
+
+
+def _growth(sides: tuple[int, ...]) -> Suite:
+    return Suite(
+        "Growth with the lattice: an equilibrium at 10 % compression from rest",
+        "two loads on the way, each to a hundredth of the usual residual",
+        partial(_grown, sides),
+    )
+
+
+def _grown(sides: tuple[int, ...], rules: Rules, tell: Tell) -> xr.Dataset:
+    with Worker(partial(static.strict, sides)) as worker:
+        worker.prepare()
+        reference = worker.run().sample.values
+    found: list[Point] = []
+    for way, largest in static.WAYS.items():
+        rungs = tuple((f"{side} × {side}", side) for side in sides if side <= largest)
+        for rung in rungs:
+            ladder = Ladder(way, partial(static.grown, way), (rung,), True, ("loss",), 3)
+            found += climb(ladder, reference, rules, rung[1] ** 2, tell)
+    return dataset(found)

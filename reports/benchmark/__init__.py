@@ -1,0 +1,1 @@
+"""The page on benchmarks: run time against error, growth, what is skipped, optimisers, tracking."""
