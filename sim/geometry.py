@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from sim.arrays import Numbers
+from sim.arrays import Floats, Ints, Numbers
 from sim.lattice import Lattice
 
 VOID_BRANCH = -jnp.pi / 4
@@ -36,12 +36,33 @@ class Shape(NamedTuple):
 
 def shape(lattice: Lattice, vertices: Numbers) -> Shape:
     """Shape of the network whose vertices lie at ``vertices`` (n_vertices, 2), in mm."""
+    return _shape(Rings(*(getattr(lattice, name) for name in Rings._fields)), jnp.asarray(vertices))
+
+
+class Rings(NamedTuple):
+    """What of a lattice its shape depends on besides the vertices: see `Lattice`."""
+
+    unit: Ints
+    site: Floats
+    ligaments: Ints
+    next_vertex: Ints
+    previous_vertex: Ints
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return len(self.site)
+
+
+@jax.jit
+def _shape(lattice: Rings, vertices: Array) -> Shape:
+    """Compiled as one: that is sooner done than each of its operations by itself."""
     centroid, area, polar_moment = inertia(lattice, vertices)
     arm = vertices - centroid[lattice.unit]
-    return Shape(centroid, area, polar_moment, jnp.asarray(arm), void_angles(lattice, vertices))
+    return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
 
 
-def inertia(lattice: Lattice, vertices: Numbers) -> tuple[Array, Array, Array]:
+def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, Array]:
     """Centroid, area and polar moment about the centroid of each polygon (shoelace sums).
 
     Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
@@ -60,7 +81,7 @@ def inertia(lattice: Lattice, vertices: Numbers) -> tuple[Array, Array, Array]:
     return jnp.asarray(lattice.site) + offset, area, polar_moment
 
 
-def void_angles(lattice: Lattice, vertices: Numbers) -> Array:
+def void_angles(lattice: Lattice | Rings, vertices: Numbers) -> Array:
     """Signed, unwrapped angles (n_ligaments, 2) of the voids on both sides of each ligament, rad.
 
     The first lies between the clockwise edge of the second end and the counter-clockwise edge of

@@ -103,12 +103,10 @@ def strain_energies(
     first, second = (whole[..., ligament_units[:, end], :] for end in range(2))
     arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]
     law = LigamentLaw(*parameters.law[ligaments].T)
-    of_all = jax.vmap(ligament_energy, in_axes=(0, 0, 0, 0, 0, 0))
-
-    def of_state(a: Array, b: Array) -> Array:
-        return of_all(a, b, arm[:, 0], arm[:, 1], vector, law)
-
-    flat = jax.vmap(of_state)(
-        first.reshape(-1, *first.shape[-2:]), second.reshape(-1, *second.shape[-2:])
-    )
+    ends = (values.reshape(-1, *values.shape[-2:]) for values in (first, second))
+    flat = _energies(*ends, arm[:, 0], arm[:, 1], vector, law)
     return flat.reshape(first.shape[:-1])
+
+
+_energies = jax.jit(jax.vmap(jax.vmap(ligament_energy), in_axes=(0, 0, None, None, None, None)))
+"""Energies (n_states, n) of the ligaments between units in states (n_states, n, 3)."""

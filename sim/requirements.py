@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.arrays import Floats, Ints
+from sim.arrays import Floats, Ints, Numbers
 from sim.clearance import close_pairs
 from sim.geometry import VOID_BRANCH, angle_between, unwrap
 from sim.lattice import Lattice
@@ -103,9 +104,9 @@ class Kind:
         """Factor from the margin to the constraint value (mm)."""
         return ANGLE_LENGTH if self.unit == "rad" else 1.0
 
-    def margins(self, vertices: Array) -> Array:
-        """Margins (n_places,) in the unit of the kind."""
-        return self.sign * (jax.vmap(self.measure)(vertices[self.places]) - self.limit)
+    def margins(self, measured: Numbers) -> Numbers:
+        """Margins (n_places,) of what was measured there, in the unit of the kind."""
+        return self.sign * (measured - self.limit)
 
     def values_and_slopes(self, vertices: Array) -> tuple[Array, Array]:
         """Constraint values (n_places,) and their slopes to their vertices, flattened."""
@@ -200,15 +201,24 @@ def margins(lattice: Lattice, vertices: Floats, limits: Limits) -> dict[str, Mar
 def worst(lattice: Lattice, requirements: tuple[Kind, ...], vertices: Floats) -> dict[str, Margin]:
     """Smallest margin of each kind among some requirements, and the units that it is about."""
     found: dict[str, Margin] = {}
-    for kind in requirements:
-        if not len(kind.places):
-            continue
-        values = np.asarray(kind.margins(jnp.asarray(vertices)))
+    present = [kind for kind in requirements if len(kind.places)]
+    measures, places = tuple(k.measure for k in present), tuple(k.places for k in present)
+    for kind, measured in zip(present, _measured(measures, places, vertices), strict=True):
+        values = np.asarray(kind.margins(measured))
         place = int(np.argmin(values))
         units = tuple(int(unit) for unit in np.unique(lattice.unit[kind.places[place]]))
         where = " and ".join(f"unit ({i}, {j})" for i, j in lattice.index[list(units)])
         found[kind.name] = Margin(kind.name, float(values[place]), kind.unit, units, where)
     return found
+
+
+@partial(jax.jit, static_argnums=0)
+def _measured(
+    measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], vertices: Floats
+) -> list[Array]:
+    """What every measure finds at its places, compiled as one."""
+    corners = jnp.asarray(vertices)
+    return [jax.vmap(of)(corners[at]) for of, at in zip(measures, places, strict=True)]
 
 
 def vertices_of(lattice: Lattice, place: Ints) -> str:
