@@ -42,7 +42,7 @@ class Constants(NamedTuple):
         material: density, stiffness and damping.
         contact: in the tests of forces, if there is any.
         spacing: of the lattice, mm.
-        cutoff: cut-off angle of contact, rad, if it is wanted.
+        cutoff: cut-off angle of contact, rad, where it is wanted or is not that of `contact`.
     """
 
     material: Material
@@ -111,4 +111,5 @@ class Constants(NamedTuple):
 
 def start(asked: Calibration) -> Constants:
     """The constants that a calibration starts from."""
-    return Constants(asked.material, asked.contact, asked.spacing)
+    made = Constants(asked.material, asked.contact, asked.spacing)
+    return made._replace(cutoff=made.angles[1]) if "contact_cutoff" in asked.fit else made

@@ -116,6 +116,19 @@ class FreeDecay(Section):
         return self
 
 
+class LoadCell(Section):
+    """A load cell that was read during a recording, along the drive of a static load case.
+
+    Attributes:
+        noise: standard deviation of the forces; where the tracker's uncertainties are ratios only,
+            it is one to them, too.
+        tare: whether the cell's zero is unknown.
+    """
+
+    noise: Annotated[Force, Field(gt=0.0)]
+    tare: bool = False
+
+
 class TrackedMotion(Section):
     """The motion of a whole specimen, as `pipeline.track` writes it.
 
@@ -126,11 +139,12 @@ class TrackedMotion(Section):
         problem: of the study that was filmed, likewise.
         preset: of the problem.
         structure: which of the study's structures it is.
-        case: number of the study's load case; only for what is computed.
+        case: number of the study's load case; for what is computed, and for the load cell.
         every: takes every so many frames.
         noise: whether the tracker's uncertainties hold, or only their ratios do.
         bias: standard deviation of what stays with a unit through all frames (registration); where
             it is not given, each unit's is unknown and nothing is learnt from its mean place.
+        load: the load cell whose readings are in the track; without it they are left out.
     """
 
     kind: Literal["track"]
@@ -144,6 +158,7 @@ class TrackedMotion(Section):
     every: Count = 1
     noise: Literal["tracker", "estimated"] = "estimated"
     bias: Error | None = None
+    load: LoadCell | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -204,9 +219,12 @@ def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
         form = "ratio" if by_ratio else "translation and rotation"
         remedy = "write material.damping in the form that is wanted in fit"
         found.append((f"the damping starts from {form}", remedy, "fit"))
-    if "contact_cutoff" in asked.fit and (asked.contact is None or asked.contact.law != "angle"):
+    if "contact_cutoff" in asked.fit and asked.contact is None:
         remedy = "give contact, with law: angle"
         found.append(("the cut-off of no contact is wanted", remedy, "fit"))
+    if asked.contact is not None and asked.contact.law != "angle":
+        remedy = "give contact of law: angle, or none"
+        found.append(("contact by the law of distance is not known here", remedy, "contact"))
     computed = [each.virtual is not None for each in asked.data]
     if any(computed) != (asked.virtual is not None):
         remedy = "give virtual.truth with virtual sets, and only then"

@@ -35,12 +35,14 @@ class Measured:
         values: (n,) forces in N, angles in rad, or displacements in mm and rad.
         sigma: (n,) standard deviations, or their ratios only.
         known: whether the standard deviations hold as they are.
-        channel: (n,) which course each value belongs to; of a track, 3 unit + dof.
+        channel: (n,) which course each value belongs to; of a track, 3 unit + dof, the load cell's
+            last.
         bias: (n,) standard deviation of what a channel's values have in common besides; infinite
             where it is unknown, so that a channel's mean tells nothing.
         axes: (n, r) orthonormal directions of whitened values in which a common cause, such as
             the noise of the drive, scatters them besides.
         spread: (r,) standard deviation along them by that cause alone.
+        remarks: what a reader should know of the set, a sentence each.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Measured:
     bias: Floats = field(default_factory=lambda: np.zeros(0))
     axes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Floats = field(default_factory=lambda: np.zeros(0))
+    remarks: tuple[str, ...] = ()
 
     def whitened(self, deviation: Floats) -> Floats:
         """Deviations (n, ...) from the values as numbers of unit variance, without correlation.

@@ -4,34 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from jax import Array
 
-from pipeline import datasets
-from pipeline import problem as problems
 from pipeline.calibration.constants import Constants
 from pipeline.calibration.description import Name, TrackedMotion
-from pipeline.calibration.drivenoise import changes
+from pipeline.calibration.drive import Change, followed
 from pipeline.calibration.experiment import ELASTIC, Measured
-from pipeline.calibration.simulated import AnySolver, KnownDrive, Simulation
+from pipeline.calibration.loadcell import Load, load_of
+from pipeline.calibration.simulated import AnySolver, KnownDrive, Seen, Simulation
+from pipeline.calibration.specimen import specimen
 from pipeline.calibration.virtual import Error
 from pipeline.comparison import redrive
-from pipeline.comparison.registration import measured_places, register
 from pipeline.datasets import TABLES
 from pipeline.errors import UserError
-from pipeline.problem import Problem
-from pipeline.scenes import scene_of
-from pipeline.structures import flat_vertices, spread
 from sim.arrays import Floats, Ints, Numbers
-from sim.explicit import ExplicitSolver
-from sim.geometry import shape
 from sim.implicit import ImplicitSolver
 from sim.model import Parameters, topology
-from sim.plan import make_plan
+from sim.plan import TURN_ALLOWANCE
 from sim.scene import Scene
 from sim.statics import StaticSolver
 
@@ -39,24 +32,15 @@ TOLERANCE = 1e-12
 """Of equilibria, relative."""
 STAGES = 1e-7
 """Of the stages of a motion in time, mm/s."""
-LEAST_FRAMES = 8
+STEPS = 2
+"""In time, between knots of the drive; more where it matters (``fitting``)."""
 UNKNOWN = np.array([0.1, 0.1, np.deg2rad(0.5)])
 """Standard deviation (mm, mm, rad) of what stays with a held unit, where it is not stated."""
 DAMPING: tuple[Name, ...] = ("damping_ratio", "damping_translation", "damping_rotation")
-
-
-class Specimen(NamedTuple):
-    """A structure of a study.
-
-    Attributes:
-        problem: of the study.
-        scene: of the structure, under the problem's drives.
-        stiffer: (n_ligaments,) factor on the stiffness of each ligament.
-    """
-
-    problem: Problem
-    scene: Scene
-    stiffer: Floats
+COARSE = (
+    "the frames are too few for the motion of the drive, so that what is between them may be"
+    " missed: film faster, or drive more slowly"
+)
 
 
 @dataclass(frozen=True)
@@ -64,16 +48,16 @@ class Field:
     """A track as an experiment (``experiment.Experiment``).
 
     Attributes:
-        measured: displacements of the free units, one course after the other.
+        measured: displacements of the free units, one course after the other; then the load.
         simulation: of the specimen under the measured motion of the held units.
         sees: the constants that the motion depends on.
-        drives: that motion changed by one standard deviation of its noise, in independent ways.
+        changes: of that motion by one standard deviation of its noise, in independent ways.
     """
 
     measured: Measured
     simulation: Simulation
     sees: tuple[Name, ...]
-    drives: tuple[redrive.Course, ...]
+    changes: tuple[Change, ...]
 
     @property
     def own_start(self) -> Floats:
@@ -92,39 +76,16 @@ class Field:
 
     def with_drive_noise(self, constants: Constants) -> Field:
         """The same, knowing what the noise of the measured drive does to the prediction."""
-        middle = self.simulation.predict(constants)
-        causes = [self.simulation.predict(constants, each) - middle for each in self.drives]
-        return replace(self, measured=self.measured.with_common(np.stack(causes, axis=1)))
+        simulation, motion = self.simulation, self.simulation.drive.motion
+        assert isinstance(motion, redrive.Course)
+        middle = simulation.predict(constants)
+        moved = (simulation.predict(constants, each.of(motion)) for each in self.changes)
+        causes = np.stack([each - middle for each in moved], axis=1)
+        return replace(self, measured=self.measured.with_common(causes))
 
-
-def specimen(asked: TrackedMotion, folder: Path) -> Specimen:
-    """The structure that a set is of.
-
-    Raises:
-        UserError: the problem is wrong.
-    """
-    path = folder / asked.problem
-    problem = problems.load(path, asked.preset)
-    scene = scene_of(problem, path.parent)
-    if asked.structure == "intact" and scene.reference is not None:
-        scene = scene.reference
-    ones = np.ones(scene.lattice.n_ligaments)
-    return Specimen(problem, scene, ones * scene.material.axial / problem.material.axial_stiffness)
-
-
-def read(asked: TrackedMotion, folder: Path) -> xr.Dataset:
-    """The track of a set.
-
-    Raises:
-        UserError: it cannot be read, or is too short.
-    """
-    assert asked.file is not None
-    track = datasets.read(folder / asked.file, "track")
-    if track.sizes["time"] < LEAST_FRAMES * asked.every:
-        what = f"only {track.sizes['time']} frames, of which every {asked.every}th is taken"
-        remedy = f"give a track of {LEAST_FRAMES} frames or more, or a smaller `every`"
-        raise UserError(what, file=folder / asked.file, remedy=remedy)
-    return track
+    def finer(self) -> Field:
+        """The same with half the steps in time; of equilibria there are none."""
+        return replace(self, simulation=self.simulation.finer())
 
 
 def experiment(asked: TrackedMotion, folder: Path, begin: Constants, track: xr.Dataset) -> Field:
@@ -133,60 +94,39 @@ def experiment(asked: TrackedMotion, folder: Path, begin: Constants, track: xr.D
     Raises:
         UserError: the problem is wrong, or the track is of something else.
     """
-    made = specimen(asked, folder)
-    lattice, path = made.scene.lattice, folder / str(asked.file)
-    if track.sizes["unit"] != made.problem.lattice.n_units:
-        remedy = "name the problem of the study that was filmed"
-        raise UserError("the track is of another lattice", file=path, key="unit", remedy=remedy)
-    vertices = flat_vertices(lattice, track["vertices"])
-    if not np.isfinite(vertices).all():
-        remedy = "name the structure that was filmed: intact, altered or cloaked"
-        raise UserError("the track lacks units of the structure", file=path, remedy=remedy)
-    upright = _upright(track, made, vertices)
+    made, path = specimen(asked, folder), folder / str(asked.file)
+    _refuse_other_contact(made.scene, begin, folder / asked.problem)
+    vertices = made.vertices(track, path)
+    upright = made.upright(track, vertices)
     bias = UNKNOWN if asked.bias is None else three(asked.bias)
     try:
-        held = redrive.held_motion(upright, made.scene)
+        drive = followed(upright, made.scene, bias)
     except UserError as error:
         error.file = str(path)
         raise
-    driven = redrive.under(made.scene, held)
+    driven = redrive.under(made.scene, drive.held)
     frames = np.arange(0, track.sizes["time"], asked.every)
-    time = (track["time"].values - track["time"].values[0])[frames]
-    chosen = _chosen(upright.isel(time=frames), driven)
-    unit, dof, frame = chosen.T
-    values, sigma = (
-        upright[name]
-        .transpose("unit", "dof", "time")
-        .values.astype(float)[lattice.id[unit], dof, frames[frame]]
-        for name in ("displacement", "sigma")
-    )
-    measured = Measured(
-        asked.name,
-        asked.kind,
-        time[frame],
-        values,
-        sigma,
-        asked.noise == "tracker",
-        3 * lattice.id[unit] + dof,
-        np.full(len(values), np.inf) if asked.bias is None else bias[dof],
-    )
-
-    def seen(motion: Numbers, made: Parameters) -> Array:
-        del made
-        return jnp.asarray(motion)[frame, unit, dof]
-
+    shown = upright.isel(time=frames)
+    chosen = _chosen(shown, driven)
+    measured, load = _measured(asked, shown, driven, chosen), None
+    if asked.load is not None:
+        load = load_of(asked.load, made, asked.case, shown, path)
+        measured = load.joined(measured)
     simulation = Simulation(
-        lattice,
+        driven.lattice,
         vertices,
         begin.material.density,
-        float(np.max(made.scene.material.contact)),
-        _solver(driven, vertices, time),
-        KnownDrive(held.unit, held.motion),
-        seen,
+        float(np.max(driven.material.contact)),
+        _solver(
+            driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
+        ),
+        KnownDrive(drive.held.unit, drive.held.motion),
+        _seen(chosen, load),
         made.stiffer,
     )
+    remarks = (COARSE,) if drive.coarse else ()
     sees = ELASTIC if driven.static else (*ELASTIC, *DAMPING)
-    return Field(measured, simulation, sees, tuple(changes(upright, made.scene, held.motion, bias)))
+    return Field(replace(measured, remarks=remarks), simulation, sees, drive.changes)
 
 
 def three(error: Error) -> Floats:
@@ -194,15 +134,14 @@ def three(error: Error) -> Floats:
     return np.array([error.displacement, error.displacement, error.rotation])
 
 
-def _upright(track: xr.Dataset, made: Specimen, vertices: Floats) -> xr.Dataset:
-    """The track turned into the design's frame."""
-    lattice = made.scene.lattice
-    centre = spread(np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"])
-    found = register(centre, measured_places(track, centre))
-    motion = found.upright(
-        track["displacement"].transpose("time", "unit", "dof").values.astype(float)
-    )
-    return track.assign(displacement=(("time", "unit", "dof"), motion))
+def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
+    """Raises a UserError where the cut-off is wanted of contact that the study has otherwise."""
+    if begin.cutoff is None:
+        return
+    if scene.contact_distance is not None or not np.isclose(scene.barrier, begin.angles[0]):
+        what = "the contact of the problem is not that of which the cut-off is wanted"
+        remedy = "give the calibration's contact the law and the barrier_angle of the problem"
+        raise UserError(what, file=path, key="contact", remedy=remedy)
 
 
 def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
@@ -221,16 +160,45 @@ def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
     return np.argwhere(counts)
 
 
-def _solver(driven: Scene, vertices: Floats, time: Floats) -> AnySolver:
-    """The solver of the motion, differentiable by the constants of every ligament."""
-    plan = make_plan(driven, vertices, time, every_case=True)
+def _measured(asked: TrackedMotion, track: xr.Dataset, driven: Scene, chosen: Ints) -> Measured:
+    """What counts of a track in the design's frame."""
+    place, dof, frame = chosen.T
+    unit = driven.lattice.id[place]
+    values, sigma = (
+        track[name].transpose("unit", "dof", "time").values.astype(float)[unit, dof, frame]
+        for name in ("displacement", "sigma")
+    )
+    own = np.full(3, np.inf) if asked.bias is None else three(asked.bias)
+    return Measured(
+        asked.name,
+        asked.kind,
+        (track["time"].values - track["time"].values[0])[frame],
+        values,
+        sigma,
+        asked.noise == "tracker",
+        3 * unit + dof,
+        own[dof],
+    )
+
+
+def _seen(chosen: Ints, load: Load | None) -> Seen:
+    """What is measured of a motion: what counts of it, and the load if there is a cell."""
+    unit, dof, frame = chosen.T
+
+    def seen(motion: Numbers, made: Parameters) -> Array:
+        moved = jnp.asarray(motion)
+        parts = [] if load is None else [load.force(moved[load.frame], made)]
+        return jnp.concatenate([moved[frame, unit, dof], *parts])
+
+    return seen
+
+
+def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
+    """The solver of the motion at the asked times, differentiable by every ligament's constants."""
     whole = topology(
         driven.lattice, driven.held, driven.barrier, driven.cutoff, None, driven.contact_distance
     )
-    solver = plan.solver
-    if isinstance(solver, StaticSolver):
-        return replace(solver, topology=whole, relative=TOLERANCE)
-    if isinstance(solver, ImplicitSolver):
-        return replace(solver, topology=whole, tolerance=STAGES)
-    assert isinstance(solver, ExplicitSolver)
-    return replace(solver, topology=whole)
+    if driven.static:
+        return StaticSolver(whole, asked, relative=TOLERANCE)
+    steps = np.linspace(0.0, driven.duration, STEPS * (knots - 1) + 1)
+    return ImplicitSolver(whole, steps, asked, STAGES, turn_allowance=TURN_ALLOWANCE)

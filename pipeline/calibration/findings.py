@@ -163,7 +163,8 @@ def warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[st
 
 
 def _of_set(fit: Fit, told: Quality, k: int) -> list[str]:
-    measured, out = fit.model.experiments[k].measured, []
+    measured = fit.model.experiments[k].measured
+    out = [f"{measured.name}: {remark}" for remark in measured.remarks]
     excess = told.chi_square[k] / max(told.freedom[k], 1.0)
     if measured.known and excess > 1 + 4 * np.sqrt(2 / max(told.freedom[k], 1.0)):
         out.append(

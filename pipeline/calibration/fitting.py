@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.calibration import decay, field, forces
+import numpy as np
+
+from pipeline.calibration import decay, field, forces, specimen
 from pipeline.calibration.constants import Constants, start
 from pipeline.calibration.description import Calibration, ForceDisplacement, FreeDecay, Set
 from pipeline.calibration.estimate import Fit, Model, fit
 from pipeline.calibration.experiment import Experiment
+from pipeline.calibration.field import Field
+from pipeline.calibration.uncertainty import inverted
 from pipeline.errors import UserError
+from sim.arrays import Floats
 from sim.errors import SimulationError
 
-_ROUNDS = 1
-"""In which the effect of the drive's noise is found anew, at better constants."""
+_ROUNDS = 3
+"""At most, in which the effect of the drive's noise is found anew, at better constants."""
+_HALVINGS = 5
+"""At most, of the steps in time."""
+AGREED = 0.2
+"""Constants that change by less, in standard errors, are final."""
 
 
 def fitted(asked: Calibration, path: Path) -> Fit:
@@ -66,25 +75,48 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
         return forces.experiment(asked, begin, *forces.read(asked, folder))
     if isinstance(asked, FreeDecay):
         return decay.experiment(asked, *decay.read(asked, folder))
-    return field.experiment(asked, folder, begin, field.read(asked, folder))
+    return field.experiment(asked, folder, begin, specimen.read(asked, folder))
 
 
 def settled(model: Model) -> Fit:
-    """The fit with what the noise of measured drives does at the constants that it finds."""
-    known = _noisy(model, model.begin)
-    found = fit(known)
-    for _ in range(_ROUNDS if known is not model else 0):
-        known = _noisy(model, model.constants(found.unknowns))
-        found = fit(known, found.unknowns)
+    """The fit with steps in time, and an effect of the drives' noise, that suit what it finds."""
+    if not any(isinstance(each, Field) for each in model.experiments):
+        return fit(model)
+    found = _resolved(fit(_noisy(model, model.begin)))
+    for _ in range(_ROUNDS):
+        before, known = found, _noisy(found.model, found.model.constants(found.unknowns))
+        found = _resolved(fit(known, before.unknowns))
+        if _moved(found, found.unknowns - before.unknowns) < AGREED:
+            break
     return found
 
 
+def _resolved(found: Fit) -> Fit:
+    """The fit with steps in time so short that half of them would move no constant."""
+    for _ in range(_HALVINGS):
+        finer = found.model._replace(experiments=[_finer(each) for each in found.model.experiments])
+        change = finer.residual(found.unknowns) - found.model.residual(found.unknowns)
+        level = found.level[found.model.set_of_row]
+        shift = -inverted(found.jacobian) @ (found.jacobian.T @ (change / level))
+        if _moved(found, shift) < AGREED:
+            return found
+        found = fit(finer, found.unknowns)
+    return found
+
+
+def _moved(found: Fit, change: Floats) -> float:
+    """The largest of the constants' changes, in standard errors."""
+    error = np.sqrt(np.diag(inverted(found.jacobian)))
+    return float(np.abs(change / error)[: len(found.model.names)].max())
+
+
 def _noisy(model: Model, at: Constants) -> Model:
-    """The model with what the noise of its drives does at some constants, if it has any."""
-    if not any(isinstance(each, field.Field) for each in model.experiments):
-        return model
+    """The model with what the noise of its drives does at some constants."""
     knowing = [
-        each.with_drive_noise(at) if isinstance(each, field.Field) else each
-        for each in model.experiments
+        each.with_drive_noise(at) if isinstance(each, Field) else each for each in model.experiments
     ]
     return model._replace(experiments=knowing)
+
+
+def _finer(each: Experiment) -> Experiment:
+    return each.finer() if isinstance(each, Field) else each

@@ -13,10 +13,9 @@ import numpy as np
 from jax import Array
 
 from pipeline.calibration.constants import Constants
-from sim import dynamics
+from sim import dynamics, grid
 from sim.arrays import Floats, Ints, Numbers
 from sim.dynamics import Drive
-from sim.explicit import ExplicitSolver
 from sim.geometry import shape
 from sim.implicit import ImplicitSolver
 from sim.lattice import Lattice
@@ -24,7 +23,7 @@ from sim.loads import Motion, held_values
 from sim.model import Material, Parameters, Values, parameters
 from sim.statics import StaticSolver
 
-AnySolver = StaticSolver | ImplicitSolver | ExplicitSolver
+AnySolver = StaticSolver | ImplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
 """What is measured of a motion (n_asked, n_units, 3) of given parameters."""
@@ -143,6 +142,13 @@ class Simulation:
         pulled = dynamics.backward(solver, records, np.asarray(by_motion)[None], still)
         total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
         return np.asarray(self._parameters_back(numbers, Parameters(*total)))
+
+    def finer(self) -> Simulation:
+        """The same with half the steps in time; of equilibria there are none."""
+        solver = self.solver
+        if isinstance(solver, StaticSolver):
+            return self
+        return replace(self, solver=replace(solver, times=grid.halved(solver.times)))
 
     @cached_property
     def _seen_back(self) -> Callable[[Numbers, Parameters, Numbers], tuple[Array, Parameters]]:

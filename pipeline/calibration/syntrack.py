@@ -10,14 +10,18 @@ import xarray as xr
 
 from pipeline.calibration.constants import Constants
 from pipeline.calibration.description import TrackedMotion
-from pipeline.calibration.field import Specimen, specimen, three
+from pipeline.calibration.field import three
+from pipeline.calibration.specimen import Specimen, specimen
+from pipeline.errors import UserError
 from pipeline.scenes import lattice_of
 from pipeline.structures import network_variables, spread, unit_coordinates
 from pipeline.tracking.dataset import absent, labelled
 from sim.arrays import Floats
 from sim.dynamics import solve_case
 from sim.model import Material
+from sim.observables import observe
 from sim.plan import concrete_parameters, make_plan
+from sim.scene import Scene
 
 
 def track_of(
@@ -32,16 +36,21 @@ def track_of(
     made = specimen(asked, folder)
     count = 1 + int(made.scene.duration * asked.virtual.rate * (1 + 1e-9))
     time = np.arange(count) / asked.virtual.rate
-    motion = _motion(made, asked.case, true, time)
+    posed = _posed(made, true)
+    motion = _motion(posed, asked.case, time)
+    force = np.full(count, np.nan)
+    if asked.virtual.load is not None:
+        clean = _force(made, posed, asked, motion, folder)
+        force = clean + asked.virtual.load * random.normal(size=count)
     noise = three(asked.virtual.noise)
     bias = np.zeros(3) if asked.virtual.bias is None else three(asked.virtual.bias)
     shape = motion.shape
     motion = motion + noise * random.normal(size=shape) + bias * random.normal(size=shape[1:])
-    return _dataset(made, time, motion, np.broadcast_to(noise, shape))
+    return _dataset(made, time, motion, np.broadcast_to(noise, shape), force)
 
 
-def _motion(made: Specimen, case: int, true: Constants, time: Floats) -> Floats:
-    """Motion (n_times, n_units, 3) without noise, on a finer grid than a fit would take."""
+def _posed(made: Specimen, true: Constants) -> Scene:
+    """The scene made of the true constants, to be simulated much finer than a fit would."""
     scene = made.scene
     axial, shear, bending, translation, rotation = true.numbers
     constants = Material(
@@ -53,15 +62,40 @@ def _motion(made: Specimen, case: int, true: Constants, time: Floats) -> Floats:
         translation,
         rotation,
     )
-    posed = replace(scene, material=constants, reference=None)
-    plan = make_plan(posed, scene.lattice.vertices, time, every_case=True)
-    values, drive = concrete_parameters(posed, scene.lattice.vertices), scene.drives[case]
+    cutoff = scene.cutoff if true.cutoff is None else true.cutoff
+    return replace(scene, material=constants, cutoff=cutoff, reference=None, accuracy="tight")
+
+
+def _motion(posed: Scene, case: int, time: Floats) -> Floats:
+    """Motion (n_times, n_units, 3) without noise."""
+    plan = make_plan(posed, posed.lattice.vertices, time, every_case=True)
+    values, drive = concrete_parameters(posed, posed.lattice.vertices), posed.drives[case]
     _, _, record = solve_case(plan.solver, values, drive)
     finer = solve_case(plan.solver.refined(record), values, drive)[0]
-    return finer.reshape(len(time), scene.lattice.n_units, 3)
+    return finer.reshape(len(time), posed.lattice.n_units, 3)
 
 
-def _dataset(made: Specimen, time: Floats, motion: Floats, sigma: Floats) -> xr.Dataset:
+def _force(
+    made: Specimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
+) -> Floats:
+    """Force (n_times,) of the drive along its direction, N.
+
+    Raises:
+        UserError: it has no direction.
+    """
+    towards = made.towards(asked.case)
+    if towards is None:
+        what = "a drive by a time series does not tell the direction of a load cell"
+        remedy = "leave out load, or name a problem whose drive has directions"
+        raise UserError(what, file=folder / asked.problem, key="load", remedy=remedy)
+    values = concrete_parameters(posed, posed.lattice.vertices)
+    reaction = observe(posed.topology, values, motion).reaction
+    return np.asarray(reaction[:, posed.driven].sum(axis=1) @ towards)
+
+
+def _dataset(
+    made: Specimen, time: Floats, motion: Floats, sigma: Floats, force: Floats
+) -> xr.Dataset:
     intact, lattice = lattice_of(made.problem), made.scene.lattice
     network = network_variables(made.problem, made.scene)
     vertices = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
@@ -74,14 +108,13 @@ def _dataset(made: Specimen, time: Floats, motion: Floats, sigma: Floats) -> xr.
     )
     there = np.isin(intact.id, lattice.id)
     quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))
-    nothing = np.full(len(time), np.nan)
     variables = {
         "displacement": (("time", "unit", "dof"), moved),
         "sigma": (("time", "unit", "dof"), told),
         "quality": (("time", "unit"), quality.astype(np.int8)),
         "timing": (("time",), np.zeros(len(time), np.int8)),
         "frame": (("time",), np.arange(len(time))),
-        "load_force": (("time",), nothing),
+        "load_force": (("time",), force),
         "camera_homography": (("row", "column"), np.full((3, 3), np.nan)),
         "camera_centre": (("xy",), np.full(2, np.nan)),
         "camera_radial": (("power",), np.full(2, np.nan)),

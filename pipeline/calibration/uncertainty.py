@@ -39,7 +39,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
         SimulationError: an equilibrium on the way is not stable.
     """
     wanted = slice(len(fit.model.names))
-    inverse = _inverse(fit.jacobian)
+    inverse = inverted(fit.jacobian)
     by_adjoint = fit.jacobian.T @ fit.residual
     by_adjoint[wanted] = gradient(fit)
     step = inverse @ by_adjoint
@@ -47,7 +47,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
     return Uncertainty(inverse[wanted, wanted], float(np.abs(step / bound)[wanted].max()))
 
 
-def _inverse(jacobian: Floats) -> Floats:
+def inverted(jacobian: Floats) -> Floats:
     """Inverse of the information J'J; huge, not infinite, where the data tell nothing."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), _TINY)
     _, singular, right = np.linalg.svd(jacobian / size, full_matrices=False)

@@ -62,11 +62,13 @@ class VirtualTrack(Section):
         rate: frames per second.
         noise: of every frame.
         bias: that stays with each unit.
+        load: standard deviation of the noise of a load cell; without it there is none.
     """
 
     rate: Frequency
     noise: Error
     bias: Error | None = None
+    load: Force | None = None
 
 
 class Virtual(Section):

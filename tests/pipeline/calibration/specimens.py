@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pipeline import calibrate
 from pipeline.calibration.description import Calibration
 from pipeline.problem.loading import section
 
@@ -75,3 +76,11 @@ def written(folder: Path, described: dict[str, Any]) -> Path:
 def loaded(folder: Path, described: dict[str, Any]) -> Calibration:
     """The calibration as it is read."""
     return section(written(folder, described), Calibration)
+
+
+def synthesised(folder: Path, text: dict[str, object]) -> Path:
+    """The calibration of computed files."""
+    source = written(folder, text)
+    done = ["synthesise", str(source), "--out-dir", str(folder / "data"), "--quiet"]
+    assert calibrate.main(done) == 0
+    return folder / "data/calibration.yaml"

@@ -20,20 +20,12 @@ from tests.pipeline.calibration.specimens import (
     decay_set,
     described,
     force_sets,
-    written,
+    synthesised,
 )
 
 ALL = [*STIFFNESS, "damping_ratio"]
 TRUE = {"axial_stiffness": 120.0, "shear_stiffness": 1.19, "bending_stiffness": 1.5}
 TRUE |= {"damping_ratio": 0.0186, "damping_translation": 2.8768e-5, "damping_rotation": 1.1884e-4}
-
-
-def synthesised(folder: Path, text: dict[str, object]) -> Path:
-    """The calibration of computed files."""
-    source = written(folder, text)
-    done = ["synthesise", str(source), "--out-dir", str(folder / "data"), "--quiet"]
-    assert calibrate.main(done) == 0
-    return folder / "data/calibration.yaml"
 
 
 @pytest.fixture(scope="module")

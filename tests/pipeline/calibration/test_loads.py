@@ -1,0 +1,130 @@
+"""Zeros of load cells, the cell of a track, and the cut-off of contact: found, or refused."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import calibrate, datasets
+from pipeline.calibration.readings import read
+from pipeline.environment import ROOT
+from pipeline.units import FORCE, LENGTH
+from tests.pipeline.calibration.specimens import (
+    TRUTH,
+    described,
+    force_sets,
+    synthesised,
+    written,
+)
+
+SPECIMENS = ROOT / "experiments/calibration/specimens"
+ERROR = {"displacement": "0.005 mm", "rotation": "0.02 deg"}
+FAST = {"rate": "60 Hz", "noise": ERROR, "load": "0.01 N"}
+CONTACT = {
+    "law": "angle",
+    "stiffness": "1.5 N mm/rad^2",
+    "barrier_angle": "-15 deg",
+    "cutoff_angle": "5 deg",
+}
+
+START = TRUTH | {"shear_stiffness": "1.1 N/mm", "bending_stiffness": "1.6 N mm/rad"}
+WANTED = ["shear_stiffness", "bending_stiffness"]
+
+
+def found_from(path: Path, folder: Path) -> xr.Dataset:
+    out = folder / "found.nc"
+    assert calibrate.main([str(path), "--out", str(out), "--quiet"]) == 0
+    return datasets.read(out, "calibration").set_index(parameter="parameter")
+
+
+def assert_inside(found: xr.Dataset, true: dict[str, float]) -> None:
+    for name, value in true.items():
+        one = found.sel(parameter=name)
+        assert one["lower"] < value < one["upper"], name
+
+
+def test_the_zero_of_a_load_cell_is_found(tmp_path: Path) -> None:
+    sets = [each | {"tare": True} for each in force_sets()[1:]]
+    path = synthesised(tmp_path, described(sets, WANTED, material=START))
+    for each in sets:
+        file = tmp_path / f"data/{each['name']}.csv"
+        along, force = read(file, {"displacement": LENGTH, "force": FORCE}).T
+        lines = [f"{x},{y + 0.7}" for x, y in zip(along, force, strict=True)]
+        file.write_text("\n".join(["displacement (mm),force (N)", *lines]))
+    found = found_from(path, tmp_path)
+    assert_inside(found, {"shear_stiffness": 1.19, "bending_stiffness": 1.5})
+    assert (found["standard_error"] < 0.1).all()
+
+
+def test_the_cutoff_of_contact_is_found(tmp_path: Path) -> None:
+    deep = force_sets(points=24)[1]
+    deep["virtual"]["end"] = "6.5 mm"
+    asked = described(
+        [deep],
+        ["bending_stiffness", "contact_cutoff"],
+        material=TRUTH | {"bending_stiffness": "1.8 N mm/rad"},
+        contact=CONTACT,
+        virtual={"truth": TRUTH, "cutoff_angle": "12 deg", "seed": 1},
+    )
+    found = found_from(synthesised(tmp_path, asked), tmp_path)
+    assert_inside(found, {"bending_stiffness": 1.5, "contact_cutoff": np.deg2rad(12)})
+    assert (found["status"] == 0).all()
+
+
+def track(**changed: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A squeezed specimen with a load cell."""
+    virtual = {"rate": "6 Hz", "noise": ERROR, "load": "0.01 N"}
+    return {
+        "kind": "track",
+        "name": "motion",
+        "problem": "squeezed.yaml",
+        "structure": "altered",
+        "virtual": virtual,
+        "load": {"noise": "0.01 N", "tare": True},
+        **changed,
+    }
+
+
+def test_the_load_cell_of_a_track_tells_the_scale(tmp_path: Path) -> None:
+    shutil.copy(SPECIMENS / "squeezed.yaml", tmp_path)
+    path = synthesised(tmp_path, described([track()], WANTED, material=START))
+    file = tmp_path / "data/motion.nc"
+    seen = datasets.read(file, "track")
+    seen["load_force"] += 0.3
+    datasets.write(seen, file, "track", seen.attrs)
+    found = found_from(path, tmp_path)
+    assert_inside(found, {"shear_stiffness": 1.19, "bending_stiffness": 1.5})
+    assert (found["standard_error"] < 0.1).all()
+    assert found["newton_step"] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("problem", "changed", "told"),
+    [
+        ("squeezed.yaml", {"virtual": {"rate": "6 Hz", "noise": ERROR}}, "has no readings"),
+        ("shaken.yaml", {"virtual": FAST}, "the cell feels the inertia of the grips"),
+        ("squeezed.yaml", {"case": 3}, "the problem has 1 load cases"),
+    ],
+)
+def test_loads_that_are_refused(
+    problem: str,
+    changed: dict[str, Any],
+    told: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copy(SPECIMENS / problem, tmp_path)
+    asked = described([track(problem=problem, **changed)], WANTED, material=START)
+    path, folder = written(tmp_path, asked), tmp_path / "data"
+    failed = calibrate.main(["synthesise", str(path), "--out-dir", str(folder), "--quiet"])
+    if not failed:
+        path = folder / "calibration.yaml"
+        failed = calibrate.main([str(path), "--out", str(tmp_path / "found.nc"), "--quiet"])
+    assert failed == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "found.nc").exists()
