@@ -19,10 +19,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.custom_derivatives import SymbolicZero
-from jax.flatten_util import ravel_pytree
 
+from sim.admission import refuse_idle, refuse_nonsense
 from sim.arrays import Floats, Ints
-from sim.errors import SimulationError, StrangersMeet
+from sim.errors import StrangersMeet
 from sim.loads import Motion, held_values
 from sim.model import Parameters, Topology, Values
 
@@ -52,6 +52,12 @@ class Drive(NamedTuple):
         """Values (n_times, n_held) of the held dofs."""
         every = held_values(held, self.units, self.motion, _padded(times))
         return np.asarray(every)[: len(times)]
+
+    def start(self, topology: Topology, time: float) -> Floats:
+        """State (n_dofs,) in which a motion from rest begins: the held dofs are in place."""
+        state = np.zeros(topology.n_dofs)
+        state[topology.held] = self.values(topology.held, np.array([time]))[0]
+        return state
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """Their rates of change, per s."""
@@ -117,9 +123,10 @@ def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Fl
     """One case: displacement and velocity (n_asked, n_dofs), and the solver's record.
 
     Raises:
-        SimulationError: a step failed, or there are no finite numbers to start from.
+        SimulationError: a step failed, or there is nothing meaningful to start from.
     """
-    _refuse_nan(values, drive)
+    refuse_idle(solver.topology)
+    refuse_nonsense(values, drive.motion)
     try:
         displacement, velocity, record = solver.forward(values, drive)
     except StrangersMeet as met:
@@ -128,17 +135,6 @@ def solve_case(solver: Solver, values: Values, drive: Drive) -> tuple[Floats, Fl
     displacement[:, held] = drive.values(held, solver.asked)
     velocity[:, held] = drive.rates(held, solver.asked)
     return displacement, velocity, record
-
-
-def _refuse_nan(values: Values, drive: Drive) -> None:
-    parts = {f"{name} of the structure": part for name, part in values._asdict().items()}
-    parts["motion of the driven units"] = ravel_pytree(drive.motion)[0]
-    for name, part in parts.items():
-        if not np.isfinite(part).all():
-            raise SimulationError(
-                f"the {name} is not everywhere a finite number; try another design (no unit without"
-                " area, no edge without length) or mend the series that drives it"
-            )
 
 
 @jax.tree_util.register_static

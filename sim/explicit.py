@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim import grid
+from sim.admission import refuse_massless, refuse_start
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.kickdrift import Outputs, Steps, run, sweep_back
-from sim.meeting import refuse_overlap, refuse_strangers
+from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
 from sim.modes import highest_frequency
 from sim.observables import observe
@@ -82,7 +83,8 @@ class ExplicitSolver:
         """See ``dynamics.Solver``."""
         top = self.topology
         system = system_of(top, values, NONE)
-        refuse_overlap(system.contacts)
+        refuse_massless(values)
+        refuse_start(top, values, system.contacts, drive.start(top, 0.0))
         stable = self._steps_for(MOVING * highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(values, drive, stable)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from sim.arrays import Floats
+from sim.arrays import Floats, Ints
 
 
 def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
@@ -30,9 +30,15 @@ def halved(times: Floats) -> Floats:
     return np.sort(np.concatenate([times, middles]))
 
 
-def split_step(times: Floats, step: int) -> Floats:
-    """The grid with one step cut in two."""
-    return np.insert(times, step + 1, (times[step] + times[step + 1]) / 2)
+def split_steps(times: Floats, steps: Ints) -> Floats:
+    """The grid with some of its steps cut in two."""
+    return np.insert(times, steps + 1, (times[steps] + times[steps + 1]) / 2)
+
+
+def steps_of(times: Floats, asked: Floats) -> Ints:
+    """The steps (n,) in which the asked times lie, each once."""
+    found = np.searchsorted(times, asked, side="right") - 1
+    return np.unique(np.clip(found, 0, len(times) - 2))
 
 
 def stage_times(times: Floats, nodes: Floats) -> Floats:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim import grid
+from sim.admission import inadmissible, refuse_massless, refuse_start
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.esdirk import march
 from sim.esdirk_adjoint import adjoint
 from sim.esdirk_stage import CONVERGED
-from sim.meeting import refuse_overlap, refuse_strangers
+from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 from sim.tableau import ESDIRK3, Tableau
@@ -46,7 +47,8 @@ class Record:
 class ImplicitSolver:
     """Integrates one case with an L-stable implicit method on a frozen grid (``dynamics.Solver``).
 
-    A step that fails is cut in two, for this solve alone, until it passes.
+    A step that fails is cut in two, for this solve alone, until it passes; so is one within which
+    the output, interpolated, has units in one another.
 
     Attributes:
         topology: the structure.
@@ -82,12 +84,23 @@ class ImplicitSolver:
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
-        record = self._march(values, drive, self.touching(values))
+        record = self._march(values, drive, self.touching(values), self.times)
         if self._untouched_voids_close(values, record):
-            record = self._march(values, drive, np.arange(len(values.void)))
-        value, slope = grid.hermite_matrices(record.times, self.asked)
-        states = np.concatenate([record.u[:, 0], record.v[:, 0]])
-        return value @ states, slope @ states, record
+            record = self._march(values, drive, np.arange(len(values.void)), self.times)
+        for _ in range(MAX_SPLITS):
+            value, slope = grid.hermite_matrices(record.times, self.asked)
+            states = np.concatenate([record.u[:, 0], record.v[:, 0]])
+            u, v = value @ states, slope @ states
+            u[:, self.topology.held] = drive.values(self.topology.held, self.asked)
+            beyond = self.asked[inadmissible(record.topology, values, u)]
+            if len(beyond) == 0:
+                return u, v, record
+            times = grid.split_steps(record.times, grid.steps_of(record.times, beyond))
+            record = self._march(values, drive, record.touching, times)
+        raise SimulationError(
+            f"at t = {beyond[0]:.6g} s units pass through each other between two steps; try"
+            " more output times, a smaller drive or accuracy: tight"
+        )
 
     def _untouched_voids_close(self, values: Values, record: Record) -> bool:
         """Whether a void whose contact was skipped came to the cutoff in any stage."""
@@ -96,10 +109,11 @@ class ImplicitSolver:
         closest[record.touching] = np.inf
         return bool(closest.min() < self.topology.cutoff)
 
-    def _march(self, values: Values, drive: Drive, touching: Ints) -> Record:
-        top, tableau, times = self.topology, self.tableau, self.times
+    def _march(self, values: Values, drive: Drive, touching: Ints, times: Floats) -> Record:
+        top, tableau = self.topology, self.tableau
         system = system_of(top, values, touching)
-        refuse_overlap(system.contacts)
+        refuse_massless(values)
+        refuse_start(top, values, system.contacts, drive.start(top, float(times[0])))
         counts = np.zeros(3, dtype=np.int64)
         for _ in range(MAX_SPLITS):
             shape = (len(times), len(tableau.nodes), top.n_dofs)
@@ -111,7 +125,7 @@ class ImplicitSolver:
             refuse_strangers(system.contacts)
             if status == CONVERGED:
                 return Record(times, u, v, a, touching, counts, top)
-            times = grid.split_step(times, step)
+            times = grid.split_steps(times, np.array([step]))
         raise SimulationError(
             f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
             f" {worst // 3} (the tangent is indefinite or a contact jams); try a smaller drive or"

@@ -9,9 +9,9 @@ import numpy as np
 
 from sim.arrays import Ints
 from sim.clearance import close_pairs
-from sim.errors import SimulationError, StrangersMeet
+from sim.errors import StrangersMeet
 from sim.lattice import Lattice
-from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX, find
+from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX
 from sim.outlines import Contacts, Watch
 
 if TYPE_CHECKING:
@@ -91,17 +91,6 @@ def contacts_of(meeting: Meeting | None, values: Values, n_units: int) -> Contac
         margin=MARGIN * meeting.reach,
         watch=_watch(meeting, n_units),
     )
-
-
-def refuse_overlap(contacts: Contacts) -> None:
-    """Raises an error that names two units which overlap before anything moves."""
-    rest = np.zeros_like(contacts.watch.state)
-    if len(contacts.pairs) > 0 and find(rest, contacts) < 0:
-        refuse_strangers(contacts)
-        raise SimulationError(
-            f"units {contacts.watch.overlap[0]} and {contacts.watch.overlap[1]} overlap at rest;"
-            " ask for a gap between units, or take contact: angle"
-        )
 
 
 def refuse_strangers(contacts: Contacts) -> None:

@@ -36,7 +36,12 @@ def highest_frequency(
 
 
 def lowest_frequency(topology: Topology, values: Values) -> float:
-    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable."""
+    """Lowest angular eigenfrequency at rest, rad/s; zero if the rest is not stable.
+
+    It is infinite where no dof is free.
+    """
+    if topology.n_free == 0:
+        return float("inf")
     system = system_of(topology, values)
     made = matrix(system.pattern)
     clear(made)
@@ -60,6 +65,8 @@ def _root_mass(topology: Topology, values: Values) -> Floats:
 
 def _largest(product: Callable[[Floats], Floats], size: int, tolerance: float) -> float:
     """Eigenvalue of largest magnitude of a symmetric operator."""
+    if size == 0:
+        return 0.0
     if size <= 2:
         return float(np.linalg.norm(np.stack([product(e) for e in np.eye(size)]), 2))
     operator = spla.LinearOperator((size, size), matvec=product, dtype=float)

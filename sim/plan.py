@@ -249,5 +249,7 @@ def _explicit(
     scene: Scene, values: Values, end: float, times: Floats, threads: int
 ) -> ExplicitSolver:
     highest = STIFFENING * highest_frequency(scene.topology, values)
-    largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / highest
+    largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)
+    if scene.frequency is not None:  # a heavy or soft structure is stable with steps far too long
+        largest = min(largest, 1 / (scene.frequency * GRIDS[scene.accuracy].per_period))
     return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)

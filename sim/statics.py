@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.admission import refuse_floating, refuse_start
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive
 from sim.equilibrium import adjoint, follow
 from sim.errors import SimulationError
-from sim.meeting import refuse_overlap, refuse_strangers
+from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 
@@ -79,6 +80,7 @@ class StaticSolver:
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
+        refuse_floating(top)
         loads = drive.values(top.held, self._passed)
         states, tangents = (np.zeros((len(loads), top.n_dofs)) for _ in range(2))
         stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
@@ -86,7 +88,7 @@ class StaticSolver:
         bends, trusted = self._known(states)
         system = system_of(top, values)
         floor = max(self.absolute, ROUNDING * float(values.law[:, 0].max()))
-        refuse_overlap(system.contacts)
+        refuse_start(top, values, system.contacts, np.zeros(top.n_dofs))
         reached, fraction = follow(
             loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
             counts,

@@ -33,7 +33,7 @@ def test_halving_and_splitting_keep_the_old_points() -> None:
     halves = grid.halved(times)
     np.testing.assert_array_equal(halves[::2], times)
     np.testing.assert_allclose(np.diff(halves)[::2], np.diff(times) / 2)
-    split = grid.split_step(times, 3)
+    split = grid.split_steps(times, np.array([3]))
     np.testing.assert_array_equal(np.delete(split, 4), times)
     assert split[4] == (times[3] + times[4]) / 2
 
