@@ -87,6 +87,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     from pipeline.comparison.dataset import Compared
     from pipeline.comparison.measurement import measurement
     from pipeline.comparison.nominal import along, axis, nominal
+    from pipeline.comparison.quantities import quantities
     from pipeline.comparison.registration import pixel_size
     from pipeline.comparison.simulation import simulation
     from pipeline.scenes import scene_of
@@ -102,11 +103,14 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     shown = axis(measured.time, measured.drive, response, static=asked.static)
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
     way = along(response)
+    inside = measured.compared & (built["roi"].values == 1)
+    every = whole.isel(case=recording.case)
     return Compared(
         measurement=measured,
         axis=shown,
         simulation=simulation(asked, structure, measured.track, measured.time, way, args.threads),
         nominal=nominal(response, shown.time),
+        quantities=quantities(asked, every, shown.time, inside),
         design=built,
         frequency=np.nan if asked.frequency is None else asked.frequency,
         level=asked.prediction.level,

@@ -1,4 +1,4 @@
-"""Specimens as they come out: shapes, stiffnesses and damping off by the tolerances."""
+"""Specimens as they come out: shapes, places, stiffnesses and damping off by the tolerances."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.problem.prediction import Tolerances
-from sim.imperfection import LARGEST_FACTOR, Copy, shifted, stiffened
+from sim.imperfection import LARGEST_FACTOR, Copy, assembled, shifted, stiffened
 from sim.model import Material
 from sim.scene import Scene
 
@@ -40,7 +40,11 @@ def drawn(
         damping_translation=material.damping_translation * damping,
         damping_rotation=material.damping_rotation * damping,
     )
-    return replace(scene, material=constants), copy
+    joints = np.random.default_rng((*seed, 1))
+    spread = (asked.assembly.shift, asked.assembly.turn)
+    return replace(scene, material=constants), assembled(
+        lattice, copy, spread, scene.cutoff, joints
+    )
 
 
 def _factors(count: int, deviation: float, random: np.random.Generator) -> Floats:

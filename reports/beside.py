@@ -40,7 +40,7 @@ def band(axes: Axes, along: Array, low: Array, high: Array, colour: str) -> None
     axes.fill_between(along, low, high, color=colour, alpha=0.22, lw=0, zorder=2)
 
 
-def handles(recordings: Sequence[Recorded], *, bands: bool) -> list[Artist]:
+def handles(recordings: Sequence[Recorded]) -> list[Artist]:
     """What a legend tells of continuous and dashed lines, and of bands."""
     if not recordings:
         return []
@@ -51,7 +51,7 @@ def handles(recordings: Sequence[Recorded], *, bands: bool) -> list[Artist]:
     )  # fmt: skip
     lines: list[Artist] = [Line2D([], [], color=style.GREY, lw=1.2, label="simulation"), dashed]
     shade = Patch(color=style.GREY, alpha=0.3, lw=0, label="prediction band")
-    return [*lines, shade] if bands else lines
+    return [*lines, shade]
 
 
 def clips(

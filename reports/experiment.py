@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from reports.facts import Fact, grouped, number, share, worded
-from reports.recorded import Recorded
+from reports.recorded import Array, Recorded
 
 DOFS = {"ux": "u_x", "uy": "u_y", "theta": "θ"}
 
@@ -19,6 +19,14 @@ def facts(recordings: Sequence[Recorded]) -> list[Fact]:
         for each in recordings
         for fact in grouped(f"Recording “{each.name}”: {each.source}", _facts(each))
     ]
+
+
+def intervals(measured: Array, predicted: Array, unit: str = "") -> str:
+    """The ends (2,) of an interval, and of that which imperfect specimens span, in words."""
+    words = f"95 %: {measured[0]:.3g} to {measured[1]:.3g}{unit}"
+    if np.isfinite(predicted).all():
+        words += f"; predicted {predicted[0]:.3g} to {predicted[1]:.3g}{unit}"
+    return words
 
 
 def _facts(recording: Recorded) -> Iterator[Fact]:

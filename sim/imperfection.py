@@ -1,4 +1,4 @@
-"""Imperfect copies of a structure: vertices off their place, ligaments of another stiffness.
+"""Imperfect copies of a structure: vertices and units off their place, ligaments off in stiffness.
 
 A copy whose units overlap cannot be made, so such a place is drawn again until none is left: the
 shifts of the units concerned and of nothing else (partial resampling, Moser and Tardos 2010).
@@ -6,7 +6,7 @@ shifts of the units concerned and of nothing else (partial resampling, Moser and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -59,6 +59,47 @@ def shifted(
         shifts[groups] = random.uniform(-largest, largest, (len(groups), 2))
         redrawn += len(groups)
     return Copy(moved, first, redrawn, sound=False)
+
+
+def assembled(
+    lattice: Lattice,
+    copy: Copy,
+    spread: tuple[float, float],
+    cutoff: float,
+    random: np.random.Generator,
+) -> Copy:
+    """The copy once its units are joined, each off its place.
+
+    The ligaments are at rest there: they are as long and as inclined as the units leave them. Units
+    that would overlap or touch are put elsewhere.
+
+    Args:
+        lattice: of the copy.
+        copy: its units as they were cut.
+        spread: standard deviations of the units' shifts along x and along y, mm, and of their
+            rotations, rad.
+        cutoff: void angle at which contact sets in, rad.
+        random: draws the places.
+    """
+    deviation = np.array([spread[0], *spread])
+    pose = deviation * random.standard_normal((lattice.n_units, 3))
+    for _ in range(MOST_ROUNDS):
+        placed = _placed(lattice, copy.vertices, pose)
+        clashing = clashing_units(lattice, placed, cutoff)
+        if len(clashing) == 0:
+            return replace(copy, vertices=placed)
+        pose[clashing] = deviation * random.standard_normal((len(clashing), 3))
+    return replace(copy, vertices=placed, sound=False)
+
+
+def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
+    """Vertices (n_vertices, 2) of units that are moved by a pose (n_units, 3) each, mm and rad."""
+    middle = np.add.reduceat(vertices, lattice.first_vertex[:-1])
+    middle /= np.diff(lattice.first_vertex)[:, None]
+    arm = vertices - middle[lattice.unit]
+    cos, sin = (of(pose[lattice.unit, 2, None]) for of in (np.cos, np.sin))
+    across = np.column_stack([-arm[:, 1], arm[:, 0]])
+    return np.asarray((middle + pose[:, :2])[lattice.unit] + cos * arm + sin * across)
 
 
 def clashing_units(lattice: Lattice, vertices: Floats, cutoff: float) -> Ints:

@@ -1,8 +1,7 @@
-"""Curves and maps of both sides: means over the region of interest, peak to peak of every unit."""
+"""Curves and maps of both sides: what is followed along the frames, peak to peak of every unit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +9,13 @@ from scipy.special import ndtri
 
 from pipeline.comparison import band as bands
 from pipeline.comparison.metrics import COPIES, LEVEL, limits
-from pipeline.tracking.arrays import Floats, Mask
-
-Reduction = Callable[[Floats], Floats]
+from pipeline.comparison.quantities import Quantity
+from pipeline.comparison.redrive import filtered
+from pipeline.tracking.arrays import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
 """Standard deviations at the ends of an interval."""
+_TRIALS = 50
 _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
@@ -48,76 +48,94 @@ class Sides(NamedTuple):
         return bands.limits(copies, self.level)
 
 
-def rotation(motion: Floats) -> Floats:
-    """|theta| (..., units) of motions (..., units, 3), rad."""
-    return np.asarray(np.abs(motion[..., 2]))
-
-
-def distance(motion: Floats) -> Floats:
-    """|u| (..., units) of motions (..., units, 3), mm."""
-    return np.asarray(np.linalg.norm(motion[..., :2], axis=-1))
-
-
-def curve(sides: Sides, inside: Mask, of: Reduction, random: np.random.Generator) -> Floats:
-    """Means (3 sides, frames, 3 estimates) of what ``of`` makes of motions, over some units.
+def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+    """A quantity along the frames (3 sides, frames, 3 estimates).
 
     Args:
         sides: of the comparison.
-        inside: (units,) which count.
-        of: what is averaged.
+        quantity: what is followed.
         random: draws the copies of the measured side.
     """
-    measured = sides.measured[:, inside]
-    out = np.full((3, len(measured), 3), np.nan)
+    of, units = quantity.along, quantity.units
+    out = np.full((3, len(sides.measured), 3), np.nan)
     for place, motion in enumerate(sides.motions):
-        out[place, :, 0] = _mean(of(motion[:, inside]))
-    out[0, :, 1:] = _measured_limits(measured, sides.sigma[:, inside], of, random).T
-    out[1, :, 1:] = sides.within(_mean(of(sides.copies[:, :, inside])))[::2].T
+        out[place, :, 0] = of(motion[:, units], units)
+    out[0, :, 1:] = _measured_limits(sides, quantity, random).T
+    out[1, :, 1:] = sides.within(of(sides.copies[:, :, units], units))[::2].T
     return out
 
 
-def _measured_limits(
-    motion: Floats, sigma: Floats, of: Reduction, random: np.random.Generator
-) -> Floats:
-    """Interval (2, frames) of a mean over units, by a bootstrap over them with the noise added."""
-    units = motion.shape[1]
-    copies = np.empty((COPIES, len(motion)))
+def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+    """Interval (2, frames) by a bootstrap over the units that stand for others, with the noise."""
+    units, count = quantity.units, len(quantity.units)
+    copies = np.empty((COPIES, len(sides.measured)))
     for copy in copies:
-        drawn = random.integers(units, size=units) if units else slice(None)
-        noise = random.standard_normal(motion.shape) * sigma[:, drawn]
-        copy[:] = _mean(of(motion[:, drawn] + noise))
+        sampled = quantity.sampled and count > 0
+        drawn = units[random.integers(count, size=count)] if sampled else units
+        noise = random.standard_normal((len(copy), count, 3)) * sides.sigma[:, drawn]
+        copy[:] = quantity.along(sides.measured[:, drawn] + noise, drawn)
     return limits(copies)
 
 
-def _mean(values: Floats) -> Floats:
-    """Mean over the last axis of those that are known; NaN of none."""
-    known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    total = np.where(known, values, 0.0).sum(axis=-1)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
-
 def peak_to_peak(motion: Floats) -> Floats:
-    """Largest less smallest (..., units, 3) of motions (..., frames, units, 3); NaN of none."""
-    known = np.isfinite(motion)
-    enough = known.mean(axis=-3) >= _SEEN
-    high = np.where(known, motion, -np.inf).max(axis=-3)
-    low = np.where(known, motion, np.inf).min(axis=-3)
-    return np.where(enough, high - np.where(enough, low, 0.0), np.nan)
+    """Largest less smallest (..., units, 3) of motions (..., frames, units, 3); NaN of none.
+
+    The extremes are those of parabolas through the extreme frames and their neighbours: a peak
+    between two frames is not missed.
+    """
+    enough = np.isfinite(motion).mean(axis=-3) >= _SEEN
+    span = _highest(motion) + _highest(-motion)
+    return np.where(enough, span, np.nan)
 
 
-def peaks(sides: Sides) -> Floats:
+def _highest(motion: Floats) -> Floats:
+    """The highest value (..., units, 3) along the frames."""
+    values = np.where(np.isfinite(motion), motion, -np.inf)
+    at = values.argmax(axis=-3, keepdims=True)
+    near = [np.clip(at + step, 0, motion.shape[-3] - 1) for step in (-1, 0, 1)]
+    before, top, after = (np.take_along_axis(values, each, axis=-3) for each in near)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rise = (after - before) ** 2 / (8 * (2 * top - before - after))
+    inner = (near[0] < at) & (at < near[2]) & np.isfinite(rise)
+    return np.asarray(np.where(inner, top + rise, top).squeeze(axis=-3))
+
+
+def peaks(sides: Sides, random: np.random.Generator) -> Floats:
     """Peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
-    The measured interval is that of the two extreme frames.
+    Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
+    noise at the two extreme frames, about the value less what noise adds to it.
     """
     out = np.full((3, *sides.measured.shape[1:], 3), np.nan)
     for place, motion in enumerate(sides.motions):
         out[place, ..., 0] = peak_to_peak(motion)
     ends = [end(np.nan_to_num(sides.measured), axis=0) for end in (np.argmin, np.argmax)]
     sigma = np.hypot(*(np.take_along_axis(sides.sigma, end[None], axis=0)[0] for end in ends))
-    out[0, ..., 1], out[0, ..., 2] = (out[0, ..., 0] + sign * _SPREAD * sigma for sign in (-1, 1))
+    middle = out[0, ..., 0] - _added_by_noise(sides, random)
+    out[0, ..., 1], out[0, ..., 2] = (middle + sign * _SPREAD * sigma for sign in (-1, 1))
     out[1, ..., 1:] = np.moveaxis(sides.within(peak_to_peak(sides.copies))[::2], 0, -1)
+    return out
+
+
+def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
+    """By how much (units, dofs) noise makes peak to peak larger: that of the smoothed motion."""
+    smooth = _smooth(sides)
+    still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
+    for _ in range(_TRIALS):
+        noise = random.standard_normal(smooth.shape) * sides.sigma
+        added += (peak_to_peak(smooth + noise) - still) / _TRIALS
+    return added
+
+
+def _smooth(sides: Sides) -> Floats:
+    """The measured motion without its noise; NaN for units that are seldom seen."""
+    out = np.full_like(sides.measured, np.nan)
+    frames = np.arange(len(out), dtype=np.float64)
+    there = np.isfinite(sides.measured + sides.sigma)
+    for unit, dof in np.argwhere(there.mean(axis=0) >= _SEEN):
+        known = there[:, unit, dof]
+        course, sigma = (each[known, unit, dof] for each in (sides.measured, sides.sigma))
+        out[known, unit, dof] = filtered(frames[known], course, sigma)(frames[known])
     return out
 
 

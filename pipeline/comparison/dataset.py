@@ -12,6 +12,7 @@ from pipeline.comparison.curves import Sides
 from pipeline.comparison.measurement import Measurement
 from pipeline.comparison.metrics import METRICS, Pair, estimates
 from pipeline.comparison.nominal import Axis, Nominal
+from pipeline.comparison.quantities import FOLLOWED, Quantity
 from pipeline.comparison.simulation import Simulation
 from pipeline.datasets.designs import NETWORK
 from pipeline.tracking.arrays import Floats
@@ -31,6 +32,7 @@ class Compared(NamedTuple):
         axis: time or load.
         simulation: under the measured motion, with its imperfect copies.
         nominal: as the problem says.
+        quantities: what is followed, by its name.
         design: as built.
         frequency: of the drive, Hz; NaN without.
         level: part of the copies in a band.
@@ -41,6 +43,7 @@ class Compared(NamedTuple):
     axis: Axis
     simulation: Simulation
     nominal: Nominal
+    quantities: dict[str, Quantity]
     design: xr.Dataset
     frequency: float
     level: float
@@ -152,13 +155,17 @@ def _forces(made: Compared, random: np.random.Generator) -> Variables:
 
 
 def _curves(made: Compared, random: np.random.Generator) -> Variables:
-    sides = made.sides
-    inside = made.measurement.compared & (made.design["roi"].values == 1)
-    along = ("source", "time", "estimate")
+    sides, along = made.sides, ("source", "time", "estimate")
+    nothing = np.full((3, len(sides.measured), 3), np.nan)
+    followed = {
+        name: curves.curve(sides, made.quantities[name], random)
+        if name in made.quantities
+        else nothing
+        for name in FOLLOWED
+    }
     return {
-        "mean_rotation": (along, curves.curve(sides, inside, curves.rotation, random)),
-        "mean_displacement": (along, curves.curve(sides, inside, curves.distance, random)),
-        "peak_to_peak": (("source", "unit", "dof", "estimate"), curves.peaks(sides)),
+        **{name: (along, values) for name, values in followed.items()},
+        "peak_to_peak": (("source", "unit", "dof", "estimate"), curves.peaks(sides, random)),
     }
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.comparison.dataset import SEED, Compared
 from pipeline.comparison.metrics import COPIES, LEVEL
 from pipeline.problem import Problem
@@ -50,6 +52,11 @@ def _resampling(made: Compared) -> str:
 
 
 def _band(asked: Problem, made: Compared) -> str:
-    sizes = ", ".join(f"{name} {size:g}" for name, size in asked.tolerances.model_dump().items())
+    shares = asked.tolerances.model_dump(exclude={"assembly"})
+    sizes = ", ".join(f"{name} {size:g}" for name, size in shares.items())
+    off = asked.tolerances.assembly
+    places = f"assembly {off.shift:g} mm and {np.rad2deg(off.turn):.2g} deg"
     samples = len(made.simulation.copies)
-    return f"{100 * made.level:g} % of {samples} imperfect copies ({sizes}), at each instant"
+    return (
+        f"{100 * made.level:g} % of {samples} imperfect copies ({sizes}, {places}), at each instant"
+    )

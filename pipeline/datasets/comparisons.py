@@ -85,6 +85,19 @@ _MOTIONS: Table = {
     "mean_displacement": Variable(
         _CURVE, "mm", "mean |u| over the compared units of the region of interest", gaps=True
     ),
+    "contraction": Variable(
+        _CURVE,
+        "mm",
+        "loss of distance between top and bottom units of the lattice's middle half",
+        gaps=True,
+    ),
+    "mimicking_error": Variable(
+        _CURVE,
+        "1",
+        "norm of U less that of the intact structure as the problem says, over the size of the"
+        " latter, over the compared units of the region of interest",
+        gaps=True,
+    ),
 }
 
 _METRICS: Table = {

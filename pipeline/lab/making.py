@@ -11,12 +11,10 @@ from jax import Array
 from numpy.typing import NDArray
 
 from pipeline.errors import UserError
-from pipeline.lab.specimens import Assembly, Making, Shaking
+from pipeline.lab.specimens import Making, Shaking
 from pipeline.measuring import Structure
 from pipeline.tolerances import drawn
 from sim.arrays import Numbers
-from sim.imperfection import MOST_ROUNDS, clashing_units
-from sim.lattice import Lattice
 from sim.loads import Motion
 from sim.scene import Scene
 
@@ -92,13 +90,13 @@ def specimen(structure: Structure, case: int, asked: Making, end: float) -> Stru
     Raises:
         UserError: its units would overlap.
     """
-    seed = (STREAM, asked.seed)
-    scene, copy = drawn(*structure, asked, seed)
-    random = np.random.default_rng((*seed, 1))
-    vertices = assembled(scene, copy.vertices, asked.assembly, random)
+    scene, copy = drawn(*structure, asked, (STREAM, asked.seed))
+    if not copy.sound:
+        remedy = "give another seed, or smaller tolerances"
+        raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
     made = replace(
         scene,
-        lattice=replace(scene.lattice, vertices=vertices),
+        lattice=replace(scene.lattice, vertices=copy.vertices),
         motions=(shaken(scene, case, asked.drive, end, asked.unload),),
         weights=np.ones(1),
         duration=end,
@@ -106,41 +104,7 @@ def specimen(structure: Structure, case: int, asked: Making, end: float) -> Stru
         reference=None,
         symmetry="none",
     )
-    return Structure(made, vertices)
-
-
-def assembled(
-    scene: Scene, vertices: Floats, asked: Assembly, random: np.random.Generator
-) -> Floats:
-    """Vertices (n_vertices, 2) once the units are joined, each off its place; mm.
-
-    The ligaments are at rest there: they are as long and as inclined as the units leave them. Units
-    that would overlap or touch are put elsewhere.
-
-    Raises:
-        UserError: some still do after many tries.
-    """
-    lattice = scene.lattice
-    spread = np.array([asked.shift, asked.shift, asked.turn])
-    pose = spread * random.standard_normal((lattice.n_units, 3))
-    for _ in range(MOST_ROUNDS):
-        placed = _placed(lattice, vertices, pose)
-        clashing = clashing_units(lattice, placed, scene.cutoff)
-        if len(clashing) == 0:
-            return placed
-        pose[clashing] = spread * random.standard_normal((len(clashing), 3))
-    remedy = "give another seed, or smaller tolerances"
-    raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
-
-
-def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
-    """Vertices (n_vertices, 2) of units that are moved by a pose (n_units, 3) each, mm and rad."""
-    middle = np.add.reduceat(vertices, lattice.first_vertex[:-1])
-    middle /= np.diff(lattice.first_vertex)[:, None]
-    arm = vertices - middle[lattice.unit]
-    cos, sin = (of(pose[lattice.unit, 2, None]) for of in (np.cos, np.sin))
-    across = np.column_stack([-arm[:, 1], arm[:, 0]])
-    return np.asarray((middle + pose[:, :2])[lattice.unit] + cos * arm + sin * across)
+    return Structure(made, copy.vertices)
 
 
 def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) -> Shaken:

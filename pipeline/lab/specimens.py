@@ -13,22 +13,9 @@ from pipeline.problem.quantities import (
     Delay,
     Force,
     Frequency,
-    Gap,
     Positive,
 )
 from pipeline.problem.section import Section
-
-
-class Assembly(Section):
-    """How far units are off their place once they are joined, at rest and without force.
-
-    Attributes:
-        shift: standard deviation along x and along y.
-        turn: standard deviation of the rotation.
-    """
-
-    shift: Gap = 0.0
-    turn: Angle = 0.0
 
 
 class Shaking(Section):
@@ -53,16 +40,14 @@ class Shaking(Section):
 
 
 class Making(Tolerances):
-    """A specimen that is drawn within tolerances, assembled and driven as labs do.
+    """A specimen that is drawn within tolerances, and driven as labs do.
 
     Attributes:
-        assembly: how far units are off their place.
         drive: in what the drive differs from the planned one.
         unload: whether a static load is taken off again, as fast as it was put on.
         seed: of the draws.
     """
 
-    assembly: Assembly = Assembly()
     drive: Shaking = Shaking()
     unload: bool = False
     seed: Annotated[int, Field(ge=0, strict=True)] = 0

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import math
+from typing import Annotated, Any
 
 from pydantic import Field
 
-from pipeline.problem.quantities import Ratio, Samples
+from pipeline.problem.quantities import Angle, Gap, Ratio, Samples
 from pipeline.problem.section import Section
+
+
+class Assembly(Section):
+    """How far units are off their place once they are joined, at rest and without force.
+
+    Attributes:
+        shift: standard deviation along x and along y.
+        turn: standard deviation of the rotation.
+    """
+
+    shift: Gap = 0.1
+    turn: Angle = math.radians(0.4)
 
 
 class Tolerances(Section):
@@ -20,6 +33,7 @@ class Tolerances(Section):
         stiffness: the same of each of the three stiffnesses, of all ligaments together.
         units: standard deviation of every unit's damping, as a share of it.
         damping: the same of the damping of all units together.
+        assembly: how far units are off their place.
     """
 
     geometry: Ratio = 0.01
@@ -27,6 +41,7 @@ class Tolerances(Section):
     stiffness: Ratio = 0.05
     units: Ratio = 0.1
     damping: Ratio = 0.2
+    assembly: Assembly = Assembly()
 
 
 class Prediction(Section):
@@ -45,6 +60,7 @@ class Prediction(Section):
         stiffness: the same of each of the three stiffnesses, of all ligaments together.
         units: standard deviation of every unit's damping, as a share of it.
         damping: the same of the damping of all units together.
+        assembly: how far units are off their place.
     """
 
     samples: Samples = 64
@@ -55,8 +71,10 @@ class Prediction(Section):
     stiffness: Ratio | None = None
     units: Ratio | None = None
     damping: Ratio | None = None
+    assembly: Assembly | None = None
 
     @property
-    def given(self) -> dict[str, float]:
+    def given(self) -> dict[str, Any]:
         """The sizes that are given, by name."""
-        return self.model_dump(include=set(Tolerances.model_fields), exclude_none=True)
+        sizes = {name: getattr(self, name) for name in Tolerances.model_fields}
+        return {name: size for name, size in sizes.items() if size is not None}

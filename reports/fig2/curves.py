@@ -87,7 +87,7 @@ def motion_panel(
     axes.xaxis.set_major_locator(FixedLocator(list(np.arange(0, end + 1e-9, scene.period / 2))))
     axes.spines["bottom"].set_bounds(0, end)
     axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
-    lines = [*axes.get_legend_handles_labels()[0], *beside.handles(recordings, bands=True)]
+    lines = [*axes.get_legend_handles_labels()[0], *beside.handles(recordings)]
     axes.legend(handles=lines, loc="upper left", ncols=3, borderaxespad=0.0, columnspacing=1.0)
     axes.text(
         1.0,

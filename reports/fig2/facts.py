@@ -196,19 +196,22 @@ def monitored_recordings(study: Study) -> list[Recorded]:
 def recorded_facts(study: Study) -> Iterator[Fact]:
     """Peak-to-peak u_y of the same unit as it was measured."""
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
-    spans: dict[str, Array] = {}
+    spans: dict[str, list[Array]] = {}
     for each in monitored_recordings(study):
-        found = each.data["peak_to_peak"].isel(unit=unit).sel(source="measured", dof="uy")
-        value, low, high = spans[each.structure] = found.values
-        note = f"{each.source}; 95 %: {low:.3g} to {high:.3g} mm"
+        found = each.data["peak_to_peak"].isel(unit=unit).sel(dof="uy")
+        sides = spans[each.structure] = [
+            found.sel(source=source).values for source in ("measured", "simulated")
+        ]
+        words = experiment.intervals(sides[0][1:], sides[1][1:], " mm")
+        note = f"{each.source}; {words}"
         label = f"u_y peak-to-peak, {each.structure}, measured"
         key = f"{MEASURED}peak_to_peak_{each.structure}"
-        yield number(key, label, float(value), "mm", digits=3, note=note)
+        yield number(key, label, float(sides[0][0]), "mm", digits=3, note=note)
     if {"altered", "cloaked"} <= spans.keys():
         label = "u_y peak-to-peak reduced by, measured"
-        gain, low, high = reduction(spans["altered"], spans["cloaked"])
-        note = f"95 %: {100 * low:.3g} to {100 * high:.3g} %"
-        yield share(f"{MEASURED}peak_to_peak_reduction", label, float(gain), note=note)
+        gain, predicted = map(reduction, spans["altered"], spans["cloaked"])
+        note = experiment.intervals(100 * gain[1:], 100 * predicted[1:], " %")
+        yield share(f"{MEASURED}peak_to_peak_reduction", label, float(gain[0]), note=note)
 
 
 def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:

@@ -15,10 +15,19 @@ from pipeline.provenance import git_commit, package_versions
 from reports import citation, claims, templating
 from reports.claims import Judged
 from reports.index import found
-from reports.index.found import Built
+from reports.index.found import Built, Link
 
 WIDTH = 560
 """Of a thumbnail in pixels."""
+LARGEST_MOVIES = 12_000_000
+"""Bytes of all movies that the page holds itself."""
+
+
+class Movie(NamedTuple):
+    """A movie, and its bytes as base64 where the page holds it."""
+
+    link: Link
+    data: str
 
 
 class Table(NamedTuple):
@@ -40,7 +49,7 @@ def page(results: Path) -> str:
         "others": [(each, thumbnail(each.picture)) for each in built if not each.figure],
         "tables": tables(built),
         "source": claims.listed().source,
-        "movies": found.others(results, "movies", "*.mp4"),
+        "movies": movies(results),
         "benchmark": found.others(results, "benchmark", "*.*"),
         "datasets": [each for study in built for each in study.datasets],
         "made": _made(),
@@ -61,6 +70,20 @@ def tables(built: Sequence[Built]) -> list[Table]:
     return made
 
 
+def movies(results: Path) -> list[Movie]:
+    """All movies; the page holds as many of them as it has room for, the smallest first."""
+    links = found.others(results, "movies", "*.mp4")
+    files = {link.address: (results / link.address).read_bytes() for link in links}
+    held, room = set(), LARGEST_MOVIES
+    for address in sorted(files, key=lambda each: len(files[each])):
+        room -= len(files[address])
+        if room >= 0:
+            held.add(address)
+    return [
+        Movie(link, _base64(files[link.address]) if link.address in held else "") for link in links
+    ]
+
+
 def thumbnail(picture: Path) -> str:
     """A picture made small, as base64 of a JPEG; empty where there is none."""
     image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
@@ -69,7 +92,11 @@ def thumbnail(picture: Path) -> str:
     rows = round(image.shape[0] * WIDTH / image.shape[1])
     small = cv2.resize(image, (WIDTH, rows), interpolation=cv2.INTER_AREA)
     _, data = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 86])
-    return base64.b64encode(data.tobytes()).decode("ascii")
+    return _base64(data.tobytes())
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")
 
 
 def _made() -> list[tuple[str, Any]]:

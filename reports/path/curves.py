@@ -78,7 +78,7 @@ def measure_panel(axes: Axes, study: Study, course: Course, measure: Measure) ->
         axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
         _bands(axes, study, course, measure, study.scatter)
-    measured.bands(axes, study, measure)
+    measured.bands(axes, study, measure.key)
     measured.curves(axes, study, course, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
     axes.set_ylim(0, (1.1 + 0.1 * len(legend.get_texts())) * axes.get_ylim()[1])
@@ -139,6 +139,7 @@ def contraction_panel(axes: Axes, study: Study, course: Course) -> None:
         return measures.contraction(study.problem, response)
 
     _plain_panel(axes, study.problem, course, of(study.response), "contraction (mm)")
+    measured.bands(axes, study, "contraction")
     measured.curves(axes, study, course, of, structures(study.response))
     _sides(axes, study)
 
@@ -154,7 +155,7 @@ def reaction_panel(axes: Axes, study: Study, course: Course) -> None:
 def _sides(axes: Axes, study: Study) -> None:
     """Which curves are measured, and which simulated."""
     if study.recordings:
-        told = beside.handles(study.recordings, bands=study.problem.objective.target == "rest")
+        told = beside.handles(study.recordings)
         axes.legend(handles=told, loc="upper left", handlelength=1.6)
         axes.set_ylim(None, (1.0 + 0.13 * len(told)) * axes.get_ylim()[1])
 

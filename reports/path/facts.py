@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.comparison.quantities import middle_units
 from pipeline.problem import Problem
 from pipeline.problem.drives import Harmonic, RampHarmonic
 from pipeline.problem.lattices import Lattice, Quads
@@ -171,7 +172,7 @@ def contraction_facts(study: Study, path: Course) -> Iterator[Fact]:
     nearer = over_cases(study.problem, measures.contraction(study.problem, study.response)).isel(
         time=-1
     )
-    count = len(measures.middle_units(study.problem, "top"))
+    count = len(middle_units(study.problem, "top"))
     note = f"loss of distance between top and bottom rows, mean of the middle {count} units"
     for name in structures(study.response):
         label = f"Contraction, {display_name(study.problem, name).lower()}"

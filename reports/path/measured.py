@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pipeline.comparison.reduction import reduction
 from reports import beside, style
 from reports.claims import MEASURED
+from reports.experiment import intervals
 from reports.facts import Fact, number, share
 from reports.path import measures
 from reports.path.course import Course, display_name
@@ -21,6 +22,15 @@ from reports.study import Study
 
 Array = NDArray[np.float64]
 Of = Callable[[xr.Dataset], xr.DataArray]
+
+_NAMES = {
+    "rotation": "mean_rotation",
+    "mismatch": "mimicking_error",
+    "contraction": "contraction",
+}
+"""What comparisons follow, by the key of the report's measure."""
+_ENDS = ("low", "high")
+_SIDES = ("measured", "simulated")
 
 
 def response(study: Study, path: Course, recording: Recorded) -> xr.Dataset:
@@ -54,14 +64,24 @@ def curves(axes: Axes, study: Study, path: Course, of: Of, names: Collection[str
         beside.measured_curve(axes, path.values, curve(study, path, each, of), colour)
 
 
-def bands(axes: Axes, study: Study, measure: Measure) -> None:
-    """Prediction bands of the measure, where the comparison has them."""
-    if measure.key != "rotation":
-        return
-    for each in study.recordings:
-        found = each.data["mean_rotation"].sel(source="simulated")
-        low, high = (np.degrees(each.values(found.sel(estimate=end))) for end in ("low", "high"))
+def bands(axes: Axes, study: Study, key: str) -> None:
+    """Prediction bands of a quantity, where comparisons have them."""
+    for each in study.recordings if key in _NAMES else ():
+        low, high = (each.values(_followed(each, key, "simulated", end)) for end in _ENDS)
         beside.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
+
+
+def _followed(recording: Recorded, key: str, source: str, estimate: str) -> xr.DataArray:
+    """A quantity (time,) of a comparison, in the unit of the report."""
+    values = recording.data[_NAMES[key]].sel(source=source, estimate=estimate)
+    return np.degrees(values) if key == "rotation" else values  # type: ignore[return-value]
+
+
+def _at_the_end(recording: Recorded, path: Course, key: str, source: str) -> Array:
+    """Value, lower and upper end of its interval (3,) at the end of the path."""
+    estimates = ("value", *_ENDS)
+    found = [_followed(recording, key, source, estimate) for estimate in estimates]
+    return np.array([recording.at(values, path.values)[-1] for values in found])
 
 
 def forces(axes: Axes, study: Study) -> None:
@@ -80,23 +100,24 @@ def facts(study: Study, path: Course) -> Iterator[Fact]:
     """The measure and the contraction at the end of the path, as they were measured."""
     measure = measures.measure_of(study.problem)
     yield from _measure_facts(study, path, measure)
-    ends: dict[str, float] = {}
     if not path.static:
         return
+    ends: dict[str, float] = {}
     for each in study.recordings:
         values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
         ends[each.structure] = values[-1]
         name = display_name(study.problem, each.structure).lower()
         key = f"{MEASURED}contraction_{each.structure}"
         label = f"Contraction, {name}, measured"
-        yield number(key, label, values[-1], "mm", digits=3, note=each.source)
+        note = f"{each.source}; {_interval(each, path, 'contraction')}"
+        yield number(key, label, values[-1], "mm", digits=3, note=note)
     for structure in ("altered", "cloaked"):
         if structure in ends and "intact" in ends:
             off = ends[structure] / ends["intact"] - 1.0
-            label = (
-                f"Contraction, {display_name(study.problem, structure).lower()}, off the intact by"
-            )
-            yield share(f"{MEASURED}contraction_error_{structure}", f"{label}, measured", off)
+            name = display_name(study.problem, structure).lower()
+            label = f"Contraction, {name}, off the intact by, measured"
+            note = _change(study, path, "contraction", ("intact", structure), sign=-1)
+            yield share(f"{MEASURED}contraction_error_{structure}", label, off, note=note)
 
 
 def _measure_facts(study: Study, path: Course, measure: Measure) -> Iterator[Fact]:
@@ -108,21 +129,31 @@ def _measure_facts(study: Study, path: Course, measure: Measure) -> Iterator[Fac
         ends[each.structure] = values[-1]
         label = f"{measure.label}, {display_name(study.problem, each.structure).lower()}, measured"
         key = f"{MEASURED}{measure.key}_{each.structure}"
-        yield number(key, label, values[-1], measure.unit, digits=3, note=each.source)
+        note = f"{each.source}; {_interval(each, path, measure.key)}"
+        yield number(key, label, values[-1], measure.unit, digits=3, note=note.removesuffix("; "))
         most = float(np.nanmax(values))
         yield number(f"{key}_most", f"{label}, at most", most, measure.unit, digits=3)
     if {"altered", "cloaked"} <= ends.keys():
         gain = 1.0 - ends["cloaked"] / ends["altered"]
         label = f"{measure.label} reduced by, measured"
-        note = _interval(study, path) if measure.key == "rotation" else ""
+        note = _change(study, path, measure.key, ("altered", "cloaked"))
         yield share(f"{MEASURED}{measure.key}_reduction", label, gain, note=note)
 
 
-def _interval(study: Study, path: Course) -> str:
-    """The interval of the reduction of mean |theta| at the end of the path, in words."""
-    ends = {
-        each.structure: each.at(each.data["mean_rotation"].sel(source="measured"), path.values)[-1]
-        for each in study.recordings
-    }
-    _, low, high = reduction(ends["altered"], ends["cloaked"])
-    return f"95 %: {100 * low:.3g} to {100 * high:.3g} %"
+def _interval(recording: Recorded, path: Course, key: str) -> str:
+    """The interval of a quantity at the end of the path, and what was predicted, in words."""
+    if key not in _NAMES:
+        return ""
+    measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
+    return intervals(measured[1:], predicted[1:])
+
+
+def _change(study: Study, path: Course, key: str, between: tuple[str, str], sign: int = 1) -> str:
+    """The same of what the second of two structures takes from a quantity of the first."""
+    if key not in _NAMES:
+        return ""
+    ends = []
+    for side in _SIDES:
+        of = {each.structure: _at_the_end(each, path, key, side) for each in study.recordings}
+        ends.append(np.sort(100 * sign * reduction(*(of[name] for name in between))[1:]))
+    return intervals(ends[0], ends[1], " %")

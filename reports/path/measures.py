@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline.comparison.quantities import middle_units
 from pipeline.problem import Problem
 from reports.structure import DRIVEN
 
@@ -104,15 +105,6 @@ def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     rise = response["displacement"].sel(dof="uy")
     nearer: xr.DataArray = rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
     return nearer
-
-
-def middle_units(problem: Problem, side: str) -> list[int]:
-    """Units of a side in the middle half of the lattice (7 columns of 15)."""
-    lattice = problem.lattice
-    along = {unit: x for unit, x, _ in lattice.sites()}
-    low, high = min(along.values()), max(along.values())
-    reach = (high - low + lattice.spacing) / 4
-    return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
 
 
 def reaction(response: xr.Dataset) -> xr.DataArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import shutil
 from pathlib import Path
 
@@ -68,3 +69,20 @@ def test_it_is_the_same_again(results: Path, html: str) -> None:
 
 def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
     assert "None has been built yet" in content.page(tmp_path)
+
+
+def test_movies_are_held_by_the_page_as_far_as_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The smallest first; others play from the file beside the page."""
+    (tmp_path / "movies").mkdir()
+    for name, size in (("S1", 50), ("S2", 20), ("S3", 30)):
+        (tmp_path / f"movies/{name}.mp4").write_bytes(name.encode() * (size // 2))
+    monkeypatch.setattr(content, "LARGEST_MOVIES", 55)
+    shown = content.page(tmp_path)
+    for name in ("S2", "S3"):
+        data = base64.b64encode((tmp_path / f"movies/{name}.mp4").read_bytes()).decode()
+        assert f'src="data:video/mp4;base64,{data}"' in shown
+    assert 'src="movies/S1.mp4"' in shown
+    assert shown.count("Too large for this page") == 1
+    assert content.page(tmp_path) == shown

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from pipeline.comparison.quantities import middle_units
 from pipeline.errors import UserError
 from pipeline.problem.report import Paper
 from reports import checks, facts, kinds, style
@@ -71,7 +72,7 @@ def test_contraction_is_that_of_the_middle_seven_columns(smile: Study) -> None:
     found = measures.contraction(smile.problem, smile.response).isel(case=0, time=-1)
     for name, pull in static.DRAW.items():
         assert float(found.sel(structure=name)) == pytest.approx(pull * waist)
-    assert measures.middle_units(smile.problem, "bottom") == list(range(4, 11))
+    assert middle_units(smile.problem, "bottom") == list(range(4, 11))
 
 
 def test_reaction_is_the_sum_over_the_driven_units_along_the_drive(smile: Study) -> None:

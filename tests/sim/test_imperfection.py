@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.clearance import overlapping_pairs
+from sim.clearance import overlapping_pairs, polygons
 from sim.geometry import void_angles
-from sim.imperfection import clashing_units, shifted, stiffened
+from sim.imperfection import Copy, assembled, clashing_units, shifted, stiffened
 from sim.lattice import quads
 from sim.model import Material
 
@@ -56,6 +56,20 @@ def test_a_place_without_room_gives_up() -> None:
     copy = shifted(LATTICE, squeezed, 1e-3, CUTOFF, np.random.default_rng(0))
     assert not copy.sound
     assert set(clashing_units(LATTICE, squeezed, CUTOFF)) >= {0, 1}
+
+
+def test_units_are_assembled_whole() -> None:
+    cut = Copy(LATTICE.vertices, 0, 0, sound=True)
+    made = assembled(LATTICE, cut, (0.2, np.deg2rad(1.0)), CUTOFF, np.random.default_rng(3))
+    assert made.sound
+    before, after = (polygons(LATTICE, each.vertices) for each in (cut, made))
+    np.testing.assert_allclose(shapely.area(after), shapely.area(before), rtol=1e-12)
+    apart = shapely.distance(shapely.centroid(before), shapely.centroid(after))
+    assert 0.15 < apart.mean() < 0.35
+    for corners, moved in zip(before, after, strict=True):
+        shapes = [shapely.get_coordinates(each) for each in (corners, moved)]
+        was, now = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in shapes)
+        np.testing.assert_allclose(now, was, rtol=1e-12)
 
 
 def test_every_ligament_gets_stiffnesses_of_its_own() -> None:

@@ -11,7 +11,7 @@ from pipeline import problem
 from pipeline.comparison.band import Samples, limits, sampled, widened
 from pipeline.measuring import Structure
 from pipeline.problem import Problem
-from pipeline.problem.prediction import Tolerances
+from pipeline.problem.prediction import Assembly, Tolerances
 from pipeline.scenes import scene_of
 from tests.pipeline import static
 
@@ -20,7 +20,7 @@ SIZES = "geometry: 0.03, ligaments: 0.1, stiffness: 0.05"
 TIMES = np.array([0.4, 0.7, 1.0])
 
 
-def draws(study: tuple[Problem, Path], **changes: float) -> Samples:
+def draws(study: tuple[Problem, Path], **changes: object) -> Samples:
     asked, folder = study
     changed = asked.prediction.model_copy(update=changes)
     scene = scene_of(asked, folder)
@@ -56,7 +56,8 @@ def test_the_band_holds_the_next_specimens(study: tuple[Problem, Path], samples:
 
 
 def test_without_tolerances_every_specimen_is_the_design(study: tuple[Problem, Path]) -> None:
-    nothing = dict.fromkeys(Tolerances.model_fields, 0.0)
+    exact = Assembly.model_validate({"shift": "0 mm", "turn": "0 deg"})
+    nothing = dict.fromkeys(Tolerances.model_fields, 0.0) | {"assembly": exact}
     made = draws(study, samples=3, **nothing)
     assert np.ptp(made.displacement, axis=0).max() < 1e-7
     assert made.failures == ()
@@ -70,6 +71,15 @@ def test_specimens_that_cannot_be_made_are_counted(
     assert len(made.failures) == 3
     assert "overlap" in made.failures[0]
     assert made.displacement.shape == (0, 3, 24, 3)
+
+
+def test_specimens_are_assembled_off_their_places(study: tuple[Problem, Path]) -> None:
+    """As those of the virtual lab are: nothing else is off here, and yet they differ."""
+    nothing = dict.fromkeys(set(Tolerances.model_fields) - {"assembly"}, 0.0)
+    wide = Assembly.model_validate({"shift": "0.3 mm", "turn": "1 deg"})
+    usual, wider = (draws(study, samples=6, **nothing, **more) for more in ({}, {"assembly": wide}))
+    spread = [made.displacement[:, -1].std(axis=0).max() for made in (usual, wider)]
+    assert 0.01 < spread[0] < spread[1]
 
 
 def test_limits_hold_the_next_draw() -> None:

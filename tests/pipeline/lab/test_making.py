@@ -6,25 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shapely
 import xarray as xr
 import yaml
 
 from pipeline import datasets, problem, specimen, track, virtual_lab
 from pipeline.errors import UserError
-from pipeline.lab.making import Shaken, assembled, shaken
-from pipeline.lab.specimens import Assembly, Shaking
+from pipeline.lab.making import Shaken, shaken
+from pipeline.lab.specimens import Shaking
 from pipeline.measuring import Structure
 from pipeline.problem import Problem
 from pipeline.scenes import scene_of
 from pipeline.tracking import loadcell
 from pipeline.tracking.recording import LoadCell, Recording
-from sim.clearance import polygons
 from sim.scene import Scene
 from tests.pipeline import static
 from tests.pipeline.lab.conftest import SETUP
 
-NOTHING = {"geometry": 0.0, "ligaments": 0.0, "stiffness": 0.0, "units": 0.0, "damping": 0.0}
+NOTHING = dict.fromkeys(("geometry", "ligaments", "stiffness", "units", "damping"), 0.0) | {
+    "assembly": {"shift": "0 mm", "turn": "0 deg"}
+}
 TIMES = np.linspace(0, 1, 5)
 
 
@@ -80,20 +80,6 @@ def test_each_fault_of_a_drive_does_what_it_says(study: tuple[Problem, Scene]) -
     np.testing.assert_allclose(half, [-2.0, -0.1, 0.0], atol=1e-9)  # as on an arc
 
 
-def test_units_are_assembled_whole(study: tuple[Problem, Scene]) -> None:
-    lattice = study[1].lattice
-    asked = Assembly.model_validate({"shift": "0.2 mm", "turn": "1 deg"})
-    placed = assembled(study[1], lattice.vertices, asked, np.random.default_rng(3))
-    before, after = (polygons(lattice, each) for each in (lattice.vertices, placed))
-    np.testing.assert_allclose(shapely.area(after), shapely.area(before), rtol=1e-12)
-    apart = shapely.distance(shapely.centroid(before), shapely.centroid(after))
-    assert 0.15 < apart.mean() < 0.35
-    for corners, moved in zip(before, after, strict=True):
-        shapes = [shapely.get_coordinates(each) for each in (corners, moved)]
-        was, now = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in shapes)
-        np.testing.assert_allclose(now, was, rtol=1e-12)
-
-
 def test_a_specimen_is_at_rest_until_it_is_loaded(study: tuple[Problem, Scene]) -> None:
     found = made(study, assembly={"shift": "0.1 mm", "turn": "0.5 deg"}, seed=3)
     first = found["displacement"].isel(time=0)
@@ -137,7 +123,7 @@ def test_a_specimen_that_cannot_be_is_refused(
     told: str,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("pipeline.lab.making.MOST_ROUNDS", 1)
+    monkeypatch.setattr("sim.imperfection.MOST_ROUNDS", 1)
     recording = {"structure": "altered", "virtual": {"specimen": {}}} | change
     held = {"altered": Structure(study[1], study[1].lattice.vertices)}
     with pytest.raises(UserError, match=told):
