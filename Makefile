@@ -13,10 +13,13 @@ PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients 
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
+# By the environment: names of folders never are words of a shell's command.
+export TARGET = $@
+
 .PHONY: help setup reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
-	@echo "make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES))"
+	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
 	@echo "make fig2@P    the same with preset P of experiments/fig2/problem.yaml"
 	@echo "make fig2_fabrication   drawings, meshes and papers of what is built: results/fig2/fabrication"
 	@echo "make fig2_recordings    videos of the specimens, tracked: results/fig2/recordings"
@@ -62,15 +65,15 @@ wheels:
 	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
-	@exec $(BIN)/python -m pipeline.run $@
+	@exec $(BIN)/python -m pipeline.run "$$TARGET"
 
 # what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings
 $(PRODUCTS): setup
-	@exec $(BIN)/python -m pipeline.run $@
+	@exec $(BIN)/python -m pipeline.run "$$TARGET"
 
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
-	@exec $(BIN)/python -m pipeline.run $@
+	@exec $(BIN)/python -m pipeline.run "$$TARGET"
 
 reproduce: setup
 	@$(BIN)/python -m pipeline.reproduce $(STUDY)

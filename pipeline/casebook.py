@@ -1,13 +1,15 @@
 """Cases with their results as they come: a CSV that is read while it grows, and resumed from.
 
-Every part of a sweep appends to a file of its own. A line counts once it is whole: whatever ends a
-process, at most the cases under way are lost.
+Every part of a sweep appends to a file of its own. A line counts if it is whole and its check, a
+CRC-32 of what is before it, holds: whatever ends a process, at most the cases under way are lost.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import os
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple, TextIO
@@ -30,24 +32,30 @@ class Found(NamedTuple):
 
 
 def header(keys: Sequence[str]) -> list[str]:
-    """The names of the columns: the case's number, what it sets, what came of it."""
-    return ["case", *keys, *COLUMNS]
+    """The names of the columns: the case's number, what it sets, what came of it, a check."""
+    return ["case", *keys, *COLUMNS, "check"]
 
 
 def known(folder: Path) -> dict[int, Found]:
-    """The results in all files of a folder, by number of the case."""
+    """The results in all files of a folder, by number of the case; damaged lines tell nothing."""
     found = {}
     for path in sorted(folder.glob("*.csv")):
-        for row in csv.DictReader(_whole_lines(path)):
-            loss, altered, void = (float(row[name]) for name in COLUMNS[:-1])
-            found[int(row["case"])] = Found(loss, altered, void, row["status"])
+        for number, *_, loss, altered, void, status in csv.reader(_whole_lines(path)):
+            found[int(number)] = Found(float(loss), float(altered), float(void), status)
     return found
 
 
 def _whole_lines(path: Path) -> Iterator[str]:
-    """The lines of a file but for one that was cut off."""
-    with path.open(encoding="utf-8", newline="") as file:
-        yield from (line for line in file if line.endswith("\n"))
+    """The lines of a file whose checks hold, without them; the heading is none."""
+    with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
+        for line in file:
+            told, _, check = line.rpartition(",")
+            if check == f"{_check(told)}\n":
+                yield told
+
+
+def _check(told: str) -> str:
+    return f"{zlib.crc32(told.encode()):08x}"
 
 
 class Casebook:
@@ -57,15 +65,15 @@ class Casebook:
         path.parent.mkdir(parents=True, exist_ok=True)
         _cut_off(path)
         self._file: TextIO = path.open("a", encoding="utf-8", newline="")
-        self._rows = csv.writer(self._file, lineterminator="\n")
         if path.stat().st_size == 0:
-            self._rows.writerow(header(keys))
+            self._file.write(f"{_row(header(keys))}\n")
 
     def add(self, rows: Iterable[tuple[int, Sequence[object], Found]]) -> None:
         """Numbers, settings and results of some cases, on the disk when this returns."""
         for number, setting, found in rows:
             status = " ".join(found.status.split())
-            self._rows.writerow([number, *setting, *map(repr, found[:-1]), status])
+            told = _row([number, *setting, *map(repr, found[:-1]), status])
+            self._file.write(f"{told},{_check(told)}\n")
         self._file.flush()
         os.fsync(self._file.fileno())
 
@@ -74,6 +82,12 @@ class Casebook:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+
+def _row(cells: Iterable[object]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
+    return text.getvalue()
 
 
 def _cut_off(path: Path) -> None:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from pipeline import streams
 from pipeline.errors import UserError, refusal
 from pipeline.progress import Progress as progress  # noqa: N813  (reads as a verb at its callers)
 
@@ -57,6 +58,7 @@ def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = 
         The exit code: 0 done, 2 a mistake in the input, 1 the machine refused or there is a bug,
         130 Ctrl-C; a SIGTERM exits with 143.
     """
+    streams.complete()
     args = made.parse_args(argv)
     try:
         with _logging(args.log, quiet=args.quiet), _terminable():

@@ -83,7 +83,7 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     Raises:
         UserError: they do not belong together, or cannot be aligned.
     """
-    from pipeline import datasets
+    from pipeline import datasets, provenance
     from pipeline.comparison.dataset import Compared
     from pipeline.comparison.measurement import measurement
     from pipeline.comparison.nominal import along, axis, nominal
@@ -92,11 +92,12 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     from pipeline.comparison.simulation import simulation
     from pipeline.scenes import scene_of
     from pipeline.simulate import structures_of
+    from pipeline.structures import read_design
     from pipeline.tracking.specimen import as_built
 
-    design = datasets.read(args.design, "design")
+    design = read_design(asked, args.design)
     whole = datasets.read(args.response, "response")
-    _check_parent(whole, args.response, args.design)
+    provenance.check_parent(whole, args.response, "design", args.design)
     response = chosen(whole, recording)
     built = as_built(design, recording.structure)
     measured = measurement(datasets.read(args.track, "track"), built)
@@ -119,14 +120,6 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
             recording.pixel_size or np.nan,
         ),
     )
-
-
-def _check_parent(response: xr.Dataset, path: Path, design: Path) -> None:
-    from pipeline import provenance
-
-    if json.loads(response.attrs["parents"]).get("design") != provenance.file_hash(design):
-        remedy = "simulate this design: python -m pipeline.simulate"
-        raise UserError("the response is that of another design", file=path, remedy=remedy)
 
 
 def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:

@@ -28,6 +28,9 @@ REPRODUCIBLE = {
     "PYTHONHASHSEED": "0",
     "SOURCE_DATE_EPOCH": "1735689600",  # 2025-01-01, the date that files with a date carry
 }
+BOUNDED = {
+    "OPENCV_IO_MAX_IMAGE_PIXELS": str(1 << 27),  # of a picture: more are refused, not allocated
+}
 CACHES = {
     "JAX_COMPILATION_CACHE_DIR": str(CACHE / "jax"),
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1",
@@ -41,7 +44,7 @@ _WORD = re.compile(r"\w+")
 
 def pin() -> None:
     """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
-    os.environ.update(ONE_THREAD | REPRODUCIBLE)
+    os.environ.update(ONE_THREAD | REPRODUCIBLE | BOUNDED)
     for name, value in (
         CACHES | {"NUMBA_CACHE_DIR": str(CACHE / "numba" / kernels_hash())}
     ).items():

@@ -134,14 +134,13 @@ def _held_out(asked: Problem) -> Problem:
 
 def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     """The loss of a design, or of the structure before any; over the copies, if there are any."""
-    from pipeline import datasets
     from pipeline.robust import design_scene
-    from pipeline.structures import flat_vertices
+    from pipeline.structures import flat_vertices, read_design
 
     scene = design_scene(asked, folder)
     vertices = scene.lattice.vertices
     if path is not None:
-        vertices = flat_vertices(scene.lattice, datasets.read(path, "design")["vertices"])
+        vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
     shifts = [0.0] if scene.copies is None else scene.copies[:, scene.lattice.group]
     return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
 

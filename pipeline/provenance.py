@@ -13,8 +13,13 @@ from collections.abc import Mapping
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from pipeline.errors import UserError
 from pipeline.problem import Problem, Stage, canonical_json, section_hash
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
 _ROOT = Path(__file__).resolve().parent.parent
@@ -70,6 +75,27 @@ def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
         "packages": _json(dict(package_versions())),
         "git_commit": git_commit(),
     }
+
+
+def check_parent(made: xr.Dataset, file: Path, role: str, parent: Path) -> None:
+    """Refuses a dataset that was made from another file than the one beside it.
+
+    Args:
+        made: the dataset.
+        file: its file.
+        role: what the other is to it.
+        parent: the other.
+
+    Raises:
+        UserError: it tells of another file, or of none.
+    """
+    try:
+        known = json.loads(made.attrs["parents"])[role]
+    except (LookupError, ValueError, TypeError):
+        known = None
+    if known != file_hash(parent):
+        remedy = f"make it again from {parent}"
+        raise UserError(f"it is that of another {role}", file=file, key="parents", remedy=remedy)
 
 
 def file_hash(path: Path) -> str:

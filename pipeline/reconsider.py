@@ -51,10 +51,11 @@ def work(args: argparse.Namespace) -> None:
     """
     from pipeline import datasets, provenance
     from pipeline.robust import design_scene
+    from pipeline.structures import read_design
     from sim.plan import make_plan
 
     asked = problem.load(args.problem, args.preset)
-    design = datasets.read(args.design, "design")
+    design = read_design(asked, args.design)
     angle, distance = contacts.cloak_losses(datasets.read(args.response, "response"))
     alike = abs(distance - angle) <= contacts.DIFFERENCE * angle
     LOG.info(

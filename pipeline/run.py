@@ -16,7 +16,7 @@ from pathlib import Path
 
 import psutil
 
-from pipeline import leftovers
+from pipeline import leftovers, streams
 from pipeline.environment import ROOT, RUN_MARK
 from pipeline.errors import UserError
 from pipeline.workflow import check_problems
@@ -27,6 +27,7 @@ _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 def main(arguments: list[str]) -> None:
     """Checks the problem files of the targets, clears what a killed run left, runs snakemake."""
+    streams.complete()
     os.chdir(ROOT)
     check_problems(arguments)
     try:

@@ -28,7 +28,7 @@ def work(args: argparse.Namespace) -> None:
 def _run(args: argparse.Namespace) -> None:
     from pipeline import copies, datasets, provenance
     from pipeline.scenes import scene_of
-    from pipeline.structures import flat_vertices
+    from pipeline.structures import flat_vertices, read_design
 
     asked = problem.load(args.problem, args.preset)
     if asked.robustness is None:
@@ -38,7 +38,7 @@ def _run(args: argparse.Namespace) -> None:
             key="robustness",
             remedy="add robustness.samples",
         )
-    design = datasets.read(args.design, "design")
+    design = read_design(asked, args.design)
     scene = scene_of(asked, args.problem.parent)
     vertices = flat_vertices(scene.lattice, design["vertices"])
     samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]

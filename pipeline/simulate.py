@@ -45,10 +45,11 @@ def work(args: argparse.Namespace) -> None:
     """
     from pipeline import datasets, provenance
     from pipeline.scenes import scene_of
+    from pipeline.structures import read_design
 
     asked = problem.load(args.problem, args.preset)
     asked = contacts.geometric(asked) if args.geometric else asked
-    design = datasets.read(args.design, "design")
+    design = read_design(asked, args.design)
     scene = scene_of(asked, args.problem.parent)
     structures = structures_of(scene, design)
     try:

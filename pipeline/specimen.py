@@ -40,11 +40,12 @@ def work(args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
     from pipeline.scenes import scene_of
     from pipeline.simulate import structures_of
+    from pipeline.structures import read_design
     from pipeline.tracking import recording as recordings
 
     recording = recordings.load(args.recording)
     asked = problem.load(args.problem, args.preset)
-    held = structures_of(scene_of(asked, args.problem.parent), datasets.read(args.design, "design"))
+    held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
     origin = provenance.attributes(asked, "simulate", parents={"design": args.design})

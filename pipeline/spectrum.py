@@ -80,15 +80,14 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
     """
     import xarray as xr
 
-    from pipeline import datasets
     from pipeline.responses import case_directions
     from pipeline.scenes import lattice_of, scene_of
     from pipeline.simulate import structures_of
-    from pipeline.structures import network_variables, spread, unit_coordinates
+    from pipeline.structures import network_variables, read_design, spread, unit_coordinates
     from pipeline.waves import waves
 
     scene = scene_of(asked, folder)
-    structures = structures_of(scene, datasets.read(design, "design"))
+    structures = structures_of(scene, read_design(asked, design))
     intact = lattice_of(asked)
     found = []
     with cli.progress(len(structures), "linear analysis") as bar:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from pipeline import datasets
 from pipeline import problem as problems
+from pipeline.errors import UserError
 from pipeline.problem import Problem
-from pipeline.scenes import lattice_of
+from pipeline.scenes import altered_lattice_of, lattice_of
 from sim.lattice import Lattice
 from sim.scene import Scene
 
@@ -19,6 +22,8 @@ Variables = dict[str, tuple[Any, ...]]
 
 SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
 FREE, CLAMPED, DRIVEN = range(3)
+
+_ALIKE = 1e-6  # mm
 
 
 def unit_coordinates(intact: Lattice) -> Variables:
@@ -71,6 +76,22 @@ def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:
     local = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
     unit = lattice.id[lattice.unit]
     return np.asarray(vertices.transpose("unit", "vertex", "xy").values[unit, local])
+
+
+def read_design(asked: Problem, path: Path) -> xr.Dataset:
+    """The design in a file, which must be one of the problem's lattice and void.
+
+    Raises:
+        UserError: it cannot be read, or is of another.
+    """
+    design = datasets.read(path, "design")
+    intact = lattice_of(asked)
+    start, found = intact.padded(intact.vertices), design["vertices_initial"].values
+    alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
+    if not alike or np.isnan(flat_vertices(altered_lattice_of(asked), design["vertices"])).any():
+        remedy = "give a design of this problem: run python -m pipeline.design again"
+        raise UserError("the design is of another lattice or void", file=path, remedy=remedy)
+    return design
 
 
 def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import yaml
-
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.filmed import RECORDINGS
 from pipeline.movies import MOVIES
-from pipeline.problem import Problem, joint, load, preset_names
+from pipeline.problem import Problem, joint, load, preset_names, yamlfile
 from pipeline.problem.families import count, numbered
 from pipeline.problem.loading import overlaid
 
@@ -70,11 +68,7 @@ def families(root: Path = ROOT) -> Mapping[Study, list[Study]]:
     """
     found = {}
     for path in sorted(root.glob("experiments/*/problem.yaml")):
-        try:
-            content = yaml.load(path.read_bytes(), Loader=yaml.CSafeLoader)
-        except yaml.YAMLError:
-            content = None
-        content = content if isinstance(content, dict) else {}
+        content = yamlfile.skimmed(path)
         presets = content.pop("presets", None)
         for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
             whole = overlaid(content, laid if isinstance(laid, dict) else {})

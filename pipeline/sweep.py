@@ -39,6 +39,7 @@ def work(args: argparse.Namespace) -> None:
 def _run(args: argparse.Namespace) -> None:
     from pipeline import casebook, datasets, provenance
     from pipeline.sources import source_hash
+    from pipeline.structures import read_design
 
     asked = problem.load(args.problem, args.preset)
     if asked.sweep is None:
@@ -48,9 +49,7 @@ def _run(args: argparse.Namespace) -> None:
             key="sweep",
             remedy="add sweep.grid, sweep.list or sweep.random",
         )
-    design = datasets.read(args.design, "design")
-    if design.sizes["unit"] != asked.lattice.n_units:
-        raise UserError("the design is of another lattice", file=args.design)
+    design = read_design(asked, args.design)
     parents = {"design": args.design}
     words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.sweep"))
     key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())

@@ -43,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
 def work(args: argparse.Namespace) -> None:
     """Simulates the structures of a design under every variant of the problem."""
     from pipeline import datasets, provenance
+    from pipeline.structures import read_design
 
     asked = problem.load(args.problem, args.preset)
     if asked.static and asked.horizon.steps is None:
@@ -52,7 +53,7 @@ def work(args: argparse.Namespace) -> None:
             key="horizon.steps",
             remedy="give horizon.steps, or leave the check out",
         )
-    design = datasets.read(args.design, "design")
+    design = read_design(asked, args.design)
     made = checks(asked, args.problem.parent, design, args.threads)
     origin = provenance.attributes(asked, "verify", parents={"design": args.design})
     datasets.write(made, args.out, "verification", origin)

@@ -7,15 +7,22 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import psutil
 import xarray as xr
 
+from pipeline.datasets import seal
 from pipeline.datasets.migration import MIGRATED, migrated
 from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind
 from pipeline.datasets.validation import faults
 from pipeline.datasets.variables import Variable
-from pipeline.errors import UserError, refusal
+from pipeline.errors import UserError
+from pipeline.whole import whole
 
 _CHUNK = bytes(1 << 20)
+_MOST = 1100
+"""Bytes of data in a byte of a file: deflate makes nothing smaller than by 1032."""
+_UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError)
+"""What xarray and its libraries raise for files that are not as they should be."""
 
 
 class SchemaError(ValueError):
@@ -43,21 +50,13 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
     for fault in faults(described, kind):
         told = "" if fault.value is None else f": {fault.value}"
         raise SchemaError(f"{kind} dataset, {fault.name}: {fault.what}{told}")
-    aside = path.with_name(f".{path.name}.part")  # one name: a killed write leaves no second one
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _to_netcdf(described, aside, kind)
-        _sync(aside)
-        read(aside, kind)
-        aside.replace(path)
-        _sync(path.parent)
-    except (OSError, RuntimeError) as error:  # netCDF4 seldom says why a write failed
-        cause = _probe(aside, dataset.nbytes) or error
-        if not isinstance(cause, OSError):
-            raise
-        raise refusal(path.parent, cause) from error
-    finally:
-        _discard(aside)
+    with whole(path) as aside:
+        try:
+            _to_netcdf(described, aside, kind)
+            seal.put(aside)
+            read(aside, kind)
+        except (OSError, RuntimeError) as error:  # netCDF4 seldom says why a write failed
+            raise _probe(aside, dataset.nbytes) or error from error
 
 
 def read(path: str | Path, kind: Kind) -> xr.Dataset:
@@ -70,32 +69,60 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     path = Path(path)
     remedy = "delete it and run the stage that makes it again"
     try:
-        with xr.open_dataset(
-            path, engine="netcdf4", decode_times=False, decode_timedelta=False
-        ) as opened:
-            dataset = opened.load()
+        sealed = seal.state(path)
+        if sealed == "broken":
+            raise UserError("damaged: it is not what was written", file=path, remedy=remedy)
+        dataset = _loaded(path)
     except FileNotFoundError as error:
         remedy = "run the stage that makes it first"
         raise UserError("no such dataset", file=path, remedy=remedy) from error
     except PermissionError as error:
         raise UserError("no permission to read it", file=path, remedy="check its mode") from error
-    except (OSError, RuntimeError, ValueError) as error:
+    except _UNREADABLE as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
     _check_origin(dataset, path, kind, remedy)
     dataset = migrated(dataset, kind)
     for fault in faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
+    if dataset.attrs.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
+        raise UserError(
+            "its seal is missing: it was cut off, or changed by other software",
+            file=path,
+            key=seal.ATTRIBUTE,
+            remedy=f"{remedy}; or remove this attribute, if the change was meant",
+        )
     return dataset
+
+
+def _loaded(path: Path) -> xr.Dataset:
+    """What a file holds, in memory.
+
+    Raises:
+        UserError: it claims to hold more than it can, or than there is room for.
+    """
+    with xr.open_dataset(
+        path, engine="netcdf4", decode_times=False, decode_timedelta=False
+    ) as opened:
+        most = min(_MOST * path.stat().st_size, psutil.virtual_memory().available)
+        if opened.nbytes > most:
+            raise UserError(
+                f"it would fill {opened.nbytes >> 20} MiB of memory",
+                file=path,
+                remedy="check where it is from; or free some memory",
+            )
+        return opened.load()
 
 
 def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> None:
     found, version = dataset.attrs.get("kind"), dataset.attrs.get("schema_version")
-    if found is None or version is None:
+    if found is None or not isinstance(version, int | np.integer):
         what = "a netCDF file, but none of this workflow's (it has no `kind` and `schema_version`)"
         raise UserError(what, file=path, remedy=f"give a {kind} dataset")
-    if found != kind:
+    if str(found) != kind:
         what = f"a {kind} dataset is wanted"
-        raise UserError(what, file=path, key="kind", value=found, remedy=f"give a {kind} dataset")
+        raise UserError(
+            what, file=path, key="kind", value=str(found), remedy=f"give a {kind} dataset"
+        )
     if version not in (*MIGRATED, SCHEMA_VERSION):
         newer = version > SCHEMA_VERSION
         raise UserError(
@@ -124,6 +151,7 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
         "schema_version": SCHEMA_VERSION,
         **dataset.attrs,
         **provenance,
+        seal.ATTRIBUTE: seal.WORDS,
     }
     return xr.Dataset(
         {name: described[name] for name in names if name not in labels},
@@ -157,14 +185,6 @@ def _encoding(table: Variable) -> dict[str, object]:
     return {"_FillValue": np.nan if table.gaps else None, **packed}
 
 
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
 def _probe(path: Path, size: int) -> OSError | None:
     """The error that plain writing of `size` bytes meets at `path`, if any."""
     try:
@@ -176,10 +196,3 @@ def _probe(path: Path, size: int) -> OSError | None:
     except OSError as error:
         return error
     return None
-
-
-def _discard(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:
-        return  # the error that matters is the one already on its way

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.bounded import content
 from pipeline.problem.plane import Outline
 
 if TYPE_CHECKING:
@@ -20,6 +22,9 @@ LARGEST_BLUR = 0.05
 SPECK = 1e-3
 """Parts of a smaller share of the largest part's area are dust."""
 LARGEST_SIDE = 4000  # pixels
+LARGEST_FILE = 64 << 20  # bytes
+LARGEST_DRAWING = 1_000_000
+"""Elements of a drawing times its copies by `use`, of which none may hold another."""
 SEGMENTS = 24  # chords of a curved piece of a path
 
 
@@ -41,11 +46,11 @@ def read_outlines(path: Path) -> tuple[Outline, ...]:
         ImageError: no such file, unreadable, not binary, or without a shape.
     """
     try:
-        content = path.read_bytes()
+        held = content(path, LARGEST_FILE)
     except OSError as error:
         what = f"the image cannot be read: {error.strerror}"
         raise ImageError(what, "give its path as seen from the problem file") from error
-    outlines = _of_drawing(path) if path.suffix.lower() == ".svg" else _of_pixels(content)
+    outlines = _of_drawing(path) if path.suffix.lower() == ".svg" else _of_pixels(held)
     if not outlines:
         raise ImageError("the image shows no shape", "draw the void dark on a light ground")
     return tuple(
@@ -53,10 +58,10 @@ def read_outlines(path: Path) -> tuple[Outline, ...]:
     )
 
 
-def _of_pixels(content: bytes) -> list[NDArray[Any]]:
+def _of_pixels(held: bytes) -> list[NDArray[Any]]:
     import cv2
 
-    dark = (_grey(content) < (DARK + LIGHT) / 2).astype(np.uint8)
+    dark = (_grey(held) < (DARK + LIGHT) / 2).astype(np.uint8)
     padded = np.pad(dark, 1)
     found, _ = cv2.findContours(padded, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     areas = [cv2.contourArea(contour) for contour in found]
@@ -69,7 +74,7 @@ def _of_pixels(content: bytes) -> list[NDArray[Any]]:
     return [points - 1.0 for points in smooth if len(points) > 2]
 
 
-def _grey(content: bytes) -> NDArray[np.uint8]:
+def _grey(held: bytes) -> NDArray[np.uint8]:
     """Grey levels of a binary image, what is transparent being white.
 
     Raises:
@@ -80,7 +85,10 @@ def _grey(content: bytes) -> NDArray[np.uint8]:
     cv2.utils.logging.setLogLevel(
         cv2.utils.logging.LOG_LEVEL_SILENT
     )  # the error below tells it all
-    pixels = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    try:
+        pixels = cv2.imdecode(np.frombuffer(held, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:  # empty, or too many pixels, among others
+        pixels = None
     if pixels is None or pixels.dtype != np.uint8:
         raise ImageError("not a readable image", "give a PNG or JPG of 8 bits, or an SVG")
     if max(pixels.shape[:2]) > LARGEST_SIDE:
@@ -103,12 +111,35 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
     from svgelements import Path as Curve
 
     try:
+        _check_copies(ElementTree.parse(path).getroot())
         drawing = SVG.parse(str(path), reify=True)
     except (OSError, ValueError, SyntaxError) as error:  # an XML parse error is a SyntaxError
         raise ImageError(f"not a readable SVG: {error}", "save it as plain SVG") from error
     shapes = (Curve(element) for element in drawing.elements() if isinstance(element, Shape))
     pieces = (_chords(Curve(piece)) for shape in shapes for piece in shape.as_subpaths())
     return [points for points in pieces if len(points) > 2]
+
+
+def _check_copies(drawing: ElementTree.Element) -> None:
+    """Refuses copies of copies, of which few lines make more than any memory holds.
+
+    Raises:
+        ValueError: there are some, or too many copies.
+    """
+    elements = list(drawing.iter())
+    copies = [element for element in elements if _is_copy(element)]
+    if len(elements) * (1 + len(copies)) > LARGEST_DRAWING:
+        raise ValueError("too many copies of elements (use)")
+    named = {element.get("id"): element for element in elements}
+    for copy in copies:
+        link = next((word for key, word in copy.items() if key.endswith("href")), "")
+        shown = named.get(link.removeprefix("#"))
+        if shown is not None and any(map(_is_copy, shown.iter())):
+            raise ValueError("copies (use) of copies")
+
+
+def _is_copy(element: ElementTree.Element) -> bool:
+    return element.tag.rpartition("}")[2] == "use"
 
 
 def _chords(piece: SvgPath) -> NDArray[Any]:

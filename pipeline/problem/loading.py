@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from pipeline.bounded import content
 from pipeline.errors import UserError
 from pipeline.problem import families, settings, yamlfile
 from pipeline.problem.checks import findings
@@ -20,6 +21,8 @@ from pipeline.problem.quantities import FOLDER
 from pipeline.problem.section import Section
 from pipeline.problem.sweeping import Sweep
 from pipeline.problem.yamlfile import Document, KeyPath
+
+_LARGEST = 64 << 20  # bytes of a measured motion
 
 Alone = TypeVar("Alone", bound=Section)
 
@@ -243,7 +246,7 @@ def _with_recording(problem: Problem, document: Document) -> Problem:
     if not isinstance(drive, TimeSeries):
         return problem
     try:
-        content = (document.path.parent / drive.file).read_bytes()
+        held = content(document.path.parent / drive.file, _LARGEST)
     except OSError as error:
         raise UserError(
             f"the measured motion cannot be read: {error.strerror}",
@@ -253,7 +256,7 @@ def _with_recording(problem: Problem, document: Document) -> Problem:
             value=drive.file,
             remedy="give its path as seen from the problem file",
         ) from error
-    found = hashlib.sha256(content).hexdigest()
+    found = hashlib.sha256(held).hexdigest()
     if drive.sha256 not in (None, found):
         raise UserError(
             f"{drive.file} is not the file that was meant: its SHA-256 is {found}",

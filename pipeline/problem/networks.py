@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+
+from pipeline.bounded import content
 
 if TYPE_CHECKING:
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -13,6 +16,8 @@ if TYPE_CHECKING:
     from ezdxf.math import Vec3
 
 Point = tuple[float, float]
+
+_LARGEST = 64 << 20  # bytes of a list
 
 COLUMNS = ("kind", "number", "x (mm)", "y (mm)")
 """Header of a CSV; its kinds are `unit` (one row a corner) and `ligament` (one row an end)."""
@@ -59,8 +64,7 @@ def _of_csv(path: Path) -> Content:
     groups = {"unit": units, "ligament": ligaments}
     remedy = f"write the header {','.join(COLUMNS)} and a row for every corner and every end"
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.reader(file))
+        rows = list(csv.reader(io.StringIO(content(path, _LARGEST).decode("utf-8"), newline="")))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise NetworkError(f"the list cannot be read: {error}", remedy) from error
     if not rows or tuple(name.strip() for name in rows[0]) != COLUMNS:
@@ -109,13 +113,12 @@ def _of_dxf(path: Path) -> Content:
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
     from ezdxf.enums import InsertUnits
-    from ezdxf.lldxf.const import DXFError
     from ezdxf.units import conversion_factor
 
     remedy = "save it as DXF with closed polylines for units and lines for ligaments"
     try:
         drawing, audit = recover.readfile(path)
-    except (OSError, DXFError) as error:
+    except Exception as error:  # whatever a parser of another project meets in a damaged file
         raise NetworkError(f"not a readable DXF: {error}", remedy) from error
     if audit.has_errors:
         raise NetworkError(f"the DXF is damaged: {audit.errors[0].message}", remedy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +10,14 @@ from typing import Any
 
 import yaml
 
-from pipeline.errors import UserError
+from pipeline.bounded import content
+from pipeline.errors import UserError, refusal
 
 _LARGEST = 256 * 1024
+_DEEPEST = 100
+"""Levels of nesting that are followed: libyaml overflows its stack at some ten thousand."""
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]")
+"""Characters that no text of a file should have: escapes may write them, terminals obey them."""
 
 KeyPath = tuple[str | int, ...]
 
@@ -33,15 +39,16 @@ class Document:
 
 
 class _Loader(yaml.SafeLoader):
-    """The safe loader, without aliases (which can expand without bound) and duplicate keys."""
+    """The safe loader for plain data only: see `_refuse`; and every key is given once."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.MarkedYAMLError(
-                problem="aliases (*name) are not supported", problem_mark=mark
-            )
+        _refuse(self.peek_event())  # type: ignore[no-untyped-call]
         return super().compose_node(parent, index)
+
+    def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> str:
+        if isinstance(node, yaml.ScalarNode) and _CONTROL.search(node.value):
+            raise _fault("control characters are not supported", node)
+        return super().construct_scalar(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         seen: set[str] = set()
@@ -52,6 +59,25 @@ class _Loader(yaml.SafeLoader):
                 raise _fault(f"the key {key.value!r} is given twice", key)
             seen.add(key.value)
         return super().construct_mapping(node, deep)
+
+
+def _refuse(event: yaml.Event) -> None:
+    """Refuses aliases, which can expand without bound, and tags, which ask for other types.
+
+    Raises:
+        yaml.MarkedYAMLError: the event is one.
+    """
+    if isinstance(event, yaml.AliasEvent):
+        what = "aliases (*name)"
+    elif getattr(event, "tag", None) is not None:
+        what = "tags (!name)"
+    else:
+        return
+    raise _not_supported(f"{what} are not supported", event)
+
+
+def _not_supported(what: str, event: yaml.Event) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=what, problem_mark=event.start_mark)  # type: ignore[arg-type]
 
 
 def _fault(what: str, node: yaml.Node) -> yaml.MarkedYAMLError:
@@ -74,7 +100,7 @@ def read(path: Path) -> Document:
             loader.dispose()
     except yaml.MarkedYAMLError as error:
         raise _syntax_error(path, error) from error
-    except (yaml.YAMLError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise UserError(f"not YAML: {error}", file=path, remedy="write plain YAML text") from error
     except RecursionError as error:
         raise UserError("nested too deeply", file=path, remedy="write it flatter") from error
@@ -84,21 +110,39 @@ def read(path: Path) -> Document:
     return Document(path, data, dict(_lines(node, ())))
 
 
+def skimmed(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file, read fast; an empty one where `read` would tell what is wrong."""
+    try:
+        text = _text(path)
+        _check_events(text)
+        data = yaml.load(text, Loader=yaml.CSafeLoader)
+    except (UserError, yaml.YAMLError, ValueError, OverflowError):
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _check_events(text: str) -> None:
+    """Refuses what `_Loader` refuses, and deep nesting, before a loader in C meets them."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+        _refuse(event)
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise _not_supported("nested too deeply", event)
+
+
 def _text(path: Path) -> str:
     try:
-        size = path.stat().st_size
-        content = path.read_bytes() if size <= _LARGEST else b""
-        text = content.decode("utf-8")
+        return content(path, _LARGEST).decode("utf-8")
     except FileNotFoundError as error:
         raise UserError("no such file", file=path, remedy="check the path") from error
     except IsADirectoryError as error:
         raise UserError("a folder, not a file", file=path, remedy="name the YAML file") from error
     except UnicodeDecodeError as error:
         raise UserError("not a UTF-8 text", file=path, remedy="save it as UTF-8") from error
-    if size > _LARGEST:
-        what = f"too large for a problem file ({size} bytes)"
-        raise UserError(what, file=path, remedy=f"keep it below {_LARGEST} bytes")
-    return text
+    except OSError as error:
+        raise refusal(path, error) from error
 
 
 def _syntax_error(path: Path, error: yaml.MarkedYAMLError) -> UserError:

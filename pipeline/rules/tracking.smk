@@ -94,5 +94,5 @@ rule track_report:
     message:
         "Drawing overlay and quality of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.tracking.build --track {input.track} --video {input.video}"
+        "python -m reports.tracking.build --track {input.track} --video {input.video:q}"
         " --out-dir {params.folder} --log {log}"

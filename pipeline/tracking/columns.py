@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.bounded import content
 from pipeline.errors import UserError, refusal
 from pipeline.tracking.arrays import Floats
+
+_LARGEST = 512 << 20
 
 
 class Cells(NamedTuple):
@@ -30,12 +33,16 @@ def cells(path: Path) -> Cells:
     """All cells of a file, a row a line.
 
     Raises:
-        UserError: no such file.
+        UserError: no such file, too large, or no CSV.
     """
     lines = _lines(path)
     separator = next((sign for sign in ";\t" if any(sign in line for line in lines)), ",")
     rows = csv.reader(lines, delimiter=separator)
-    return Cells([[cell.strip() for cell in row] for row in rows], separator)
+    try:
+        return Cells([[cell.strip() for cell in row] for row in rows], separator)
+    except csv.Error as error:
+        remedy = "give plain columns of numbers"
+        raise UserError(f"not a readable CSV: {error}", file=path, remedy=remedy) from error
 
 
 def read(path: Path, names: Sequence[str]) -> Floats:
@@ -63,7 +70,7 @@ def read(path: Path, names: Sequence[str]) -> Floats:
 
 def _lines(path: Path) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+        return content(path, _LARGEST).decode("utf-8-sig", errors="replace").splitlines()
     except FileNotFoundError as error:
         raise UserError("no such file", file=path, remedy="check the path") from error
     except OSError as error:

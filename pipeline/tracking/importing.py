@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.errors import UserError
 from pipeline.problem import yamlfile
+from pipeline.problem.loading import told
 from pipeline.tracking.arrays import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
+
+
+class _Described(BaseModel):
+    """What is taken from a description; the rest of it is of no concern here."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    name: str
+    kind: str = ""
+    grid: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
+    spacing_mm: Annotated[float, Field(gt=0.0)]
+    ligament_gap_mm: Annotated[float, Field(gt=0.0)]
+    bias_angle_deg: Annotated[float, Field(gt=-45.0, lt=45.0)]
+    approx_px_per_mm: Annotated[float, Field(gt=0.0)] | None = None
+    fps: Annotated[float, Field(gt=0.0)] | None = None
+
+
 VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
 
 
@@ -22,7 +41,8 @@ def description(path: Path) -> dict[str, Any]:
     Raises:
         UserError: not such a description.
     """
-    data = yamlfile.read(path).data
+    document = yamlfile.read(path)
+    data = document.data
     missing = sorted(_WANTED - data.keys())
     if missing:
         raise UserError(
@@ -30,6 +50,10 @@ def description(path: Path) -> dict[str, Any]:
             file=path,
             remedy="give a YAML with the grid of the specimen, or write a recording by hand",
         )
+    try:
+        _Described.model_validate(data)
+    except ValidationError as error:
+        raise told(error, document, data, None) from error
     return data
 
 

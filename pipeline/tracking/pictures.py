@@ -46,7 +46,10 @@ def images(folder: Path) -> Iterator[Picture]:
 
 
 def _read(path: Path) -> Picture | None:
-    values = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    try:
+        values = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    except cv2.error:  # too many pixels, among others
+        return None
     return None if values is None else brightness(np.asarray(values))
 
 

@@ -21,6 +21,14 @@ _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj
 _ROUNDED = 0.5
 """Part of an interval by which steady frames may differ: some containers count milliseconds."""
 
+_ALONE = {
+    "protocol_whitelist": "file",
+    "format_whitelist": "mov,mp4,matroska,webm,avi,asf,mpeg,mpegts,mxf,ogg,flv,nut,gif,h264,hevc",
+}
+"""Kinds of files that hold what they show: playlists name others, and may wait for more."""
+
+_LARGEST = 1 << 27
+"""Pixels of a frame."""
 
 _ALL = 0.95
 """A video with less of the frames than this that its file promises breaks off."""
@@ -86,7 +94,7 @@ def length(path: Path) -> int:
     if path.is_dir():
         return len(pictures(path))
     try:
-        with av.open(str(path)) as container:
+        with _opened(path) as container:
             stream = container.streams.video[0]
             return max(1, round(_promised(container, stream, float(stream.average_rate or 0))))
     except (av.FFmpegError, FileNotFoundError, IndexError):
@@ -123,7 +131,7 @@ def _pictured(path: Path, rate: float) -> Iterator[Frame]:
 
 def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
     try:
-        with av.open(str(path)) as container:
+        with _opened(path) as container:
             yield from _decoded(container, path, start, end)
     except FileNotFoundError as error:
         raise UserError("no such video", file=path, key="video", remedy="check the path") from error
@@ -134,12 +142,23 @@ def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
         ) from error
 
 
+def _opened(path: Path) -> av.container.InputContainer:
+    """The file itself: neither an address that its name may be, nor others that it may name."""
+    if path.exists() and not path.is_file():
+        raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
+    return av.open(f"file:{path}", options=_ALONE)
+
+
 def _decoded(
     container: av.container.InputContainer, path: Path, start: float, end: float
 ) -> Iterator[Frame]:
     if not container.streams.video:
         raise UserError("the file holds no video", file=path, remedy="give a video file")
     stream = container.streams.video[0]
+    if stream.width * stream.height > _LARGEST:
+        size = f"{stream.width} x {stream.height}"
+        remedy = "give a smaller one, or one that is not broken"
+        raise UserError(f"frames of {size} pixels are too large", file=path, remedy=remedy)
     first: float | None = None
     index, time = 0, 0.0
     decoded = iter(container.decode(stream))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from itertools import islice
@@ -54,9 +53,7 @@ def _check_origin(track: xr.Dataset, path: Path, video: Path) -> None:
     """Refuses a video that the track was not made of."""
     if not video.exists():
         raise UserError("no such video", file=video, remedy="check the path")
-    if json.loads(track.attrs["parents"]).get("video") != provenance.file_hash(video):
-        remedy = "give the video that was tracked, or track this one"
-        raise UserError(f"{path} was not made of this video", file=video, remedy=remedy)
+    provenance.check_parent(track, path, "video", video)
 
 
 def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Frame]:

@@ -10,8 +10,10 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -41,12 +43,11 @@ class Paths:
         if not path.exists():
             log.warning("%s is gone: the next evaluation starts from scratch", path)
             return None
-        with np.load(path) as stored:
-            parts = (stored[name] for name in ("states", "tangents", "stable", "jumped"))
-            return [
-                Record(states, tangents, stable, jumped, np.zeros(4, dtype=np.int64))
-                for states, tangents, stable, jumped in zip(*parts, strict=True)
-            ]
+        try:
+            return _records(path)
+        except (OSError, ValueError, LookupError, EOFError, BadZipFile, zlib.error) as error:
+            log.warning("%s is damaged (%s): the next evaluation starts from scratch", path, error)
+            return None
 
     def keep(self, design: Floats, records: Sequence[Record]) -> None:
         """Stores the records of an evaluation that was computed just now."""
@@ -72,6 +73,16 @@ class Paths:
         """Takes note of an evaluation, computed or read back from the journal."""
         if evaluation.accepted and evaluation.failure is None:
             self._accepted = _name(evaluation.x)
+
+
+def _records(path: Path) -> list[Record]:
+    """The records in a file, whose entries have checksums."""
+    with np.load(path) as stored:
+        parts = (stored[name] for name in ("states", "tangents", "stable", "jumped"))
+        return [
+            Record(states, tangents, stable, jumped, np.zeros(4, dtype=np.int64))
+            for states, tangents, stable, jumped in zip(*parts, strict=True)
+        ]
 
 
 def _name(design: Floats) -> str:

@@ -87,7 +87,7 @@ def test_no_end_at_any_moment_changes_the_results(undisturbed: Checkout, fresh: 
     ends: list[tuple[str, Callable[[], bool], Callable[[Run, Checkout], None]]] = [
         ("early in an optimisation", evaluated(2), kill_stage),
         ("later in it", evaluated(5), press_ctrl_c),
-        ("while a design is written", there_is(".design_*.nc.part"), kill_everything),
+        ("while a design is written", there_is(".part_*_design_*.nc"), kill_everything),
         ("while it is simulated", there_is("logs/simulate.log", "logs/sweep_*.log"), kill_make),
         ("while the report is drawn", there_is("logs/report.log"), kill_everything),
     ]
@@ -103,7 +103,7 @@ def test_no_end_at_any_moment_changes_the_results(undisturbed: Checkout, fresh: 
     assert fresh.built() == undisturbed.built()
     for method in METHODS:
         assert journal(fresh, method) == journal(undisturbed, method)
-    assert not list(fresh.results.glob("**/*.part"))
+    assert not list(fresh.results.glob("**/.part_*"))
     assert not fresh.jobs()
 
 

@@ -1,0 +1,22 @@
+"""Standard streams for a process that was started without some of them."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+_STANDARD_ERROR = 2
+
+
+def complete() -> None:
+    """Opens those that are closed, to nowhere, for this process and those that it starts.
+
+    The next file to be opened would take the number of one: what libraries tell the terminal would
+    then go into a dataset.
+    """
+    while (handle := os.open(os.devnull, os.O_RDWR)) <= _STANDARD_ERROR:
+        os.set_inheritable(handle, True)
+    os.close(handle)
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))

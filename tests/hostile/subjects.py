@@ -1,0 +1,303 @@
+"""The kinds of files that the project reads: one of each, and how the stages read it."""
+
+from __future__ import annotations
+
+import shutil
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+import xarray as xr
+
+from pipeline import casebook, datasets, units
+from pipeline.calibration import readings
+from pipeline.calibration.description import Calibration
+from pipeline.casebook import Casebook, Found
+from pipeline.datasets import TABLES, Kind
+from pipeline.environment import ROOT
+from pipeline.fabrication import manifest
+from pipeline.lab.encode import encode
+from pipeline.lab.setup import Codec
+from pipeline.problem import canonical_json, joint, load
+from pipeline.problem.loading import section
+from pipeline.scenes import TIME_SERIES_COLUMNS, scene_of
+from pipeline.tracking import importing, loadcell, points, recording, video
+from tests.hostile import damage, edits
+from tests.hostile.damage import Damage
+from tests.pipeline import static, test_lattices
+from tests.pipeline.samples import sample
+
+Sort = Literal["YAML", "netCDF", "CSV", "image", "video", "other"]
+Told = list[Any]
+"""What was read, as plain numbers and words."""
+
+EXPERIMENTS = ROOT / "experiments"
+CLIP = ROOT / "tests/data/tracking/f_silhouette"
+LOG = "# kept as it came\ntime,force\n" + "\n".join(f"{k / 10},{k % 7 - 3.5}" for k in range(60))
+DIC = "time,x,y,u,v\n" + "\n".join(f"{k // 9},{k % 9},{k % 5},{k / 99},0" for k in range(90))
+TEST = "displacement (mm), force (N)\n" + "\n".join(f"{k / 4}, {k * 1.19}" for k in range(30))
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 90 90">'
+    '<defs><circle id="c" r="9"/></defs><path d="M 10 10 L 80 10 C 80 40 70 70 40 80 Z"/>'
+    '<use href="#c" x="20" y="60"/></svg>'
+)
+POINTS = "points: dic.csv\norigin: [0 mm, 0 mm]\nrotation: 0 deg\ncolumns: {time: t, x: x}\n"
+HOLE = "void: { disc: { radius: 7 mm } }"
+PICTURED = "void: { image: { file: {name}, width: 16 mm } }"
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A kind of file.
+
+    Attributes:
+        name: what it is.
+        sort: of the file.
+        make: writes a good one, with what belongs to it, into a folder; returns its path.
+        read: reads it as the stages do.
+        damages: what may befall it besides what may befall any file.
+        sealed: whether what it holds is the project's own, which no damage may change unseen.
+        whole: whether nothing of it may be missing, either.
+    """
+
+    name: str
+    sort: Sort
+    make: Callable[[Path], Path]
+    read: Callable[[Path], Told]
+    damages: Sequence[Damage] = ()
+    sealed: bool = False
+    whole: bool = True
+
+
+def _text(name: str, text: str, folder: Path) -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _copied(source: Path, folder: Path) -> Path:
+    return Path(shutil.copyfile(source, folder / source.name))
+
+
+def _problem(path: Path) -> Told:
+    asked = load(path)
+    scene = scene_of(asked, path.parent)
+    return [canonical_json(asked), len(scene.motions)]
+
+
+def _figure(folder: Path) -> Path:
+    study = folder / "fig6_heart"
+    for name in ("fig6_heart", "fig6_shamrock"):
+        (folder / name).mkdir()
+        _text("problem.yaml", "title: x", folder / name)
+    return _copied(EXPERIMENTS / "fig6/figure.yaml", study)
+
+
+def _beside(make: Callable[[Path], Path], named: Callable[[str], str], folder: Path) -> Path:
+    """A file that a problem names, and the problem."""
+    path = make(folder)
+    text = static.write(folder, static.HOLE, size=5).read_text(encoding="utf-8")
+    _text("problem.yaml", named(text).replace("{name}", path.name), folder)
+    return path
+
+
+def _by_problem(path: Path) -> Told:
+    return _problem(path.parent / "problem.yaml")
+
+
+def _void(text: str) -> str:
+    assert HOLE in text
+    return text.replace(HOLE, PICTURED)
+
+
+def _listed(text: str) -> str:
+    assert test_lattices.QUADS in text
+    return text.replace(test_lattices.QUADS, "  kind: file\n  file: {name}\n  spacing: 15 mm\n")
+
+
+def _driven(text: str) -> str:
+    start, end = text.index("drive:"), text.index("horizon:")
+    drive = "drive: { kind: time_series, units: right, file: {name} }\n"
+    return text[:start] + drive + text[end:].replace("steps: 4", "samples: 4", 1)
+
+
+def _motion(folder: Path) -> Path:
+    rows = "\n".join(f"{k / 10},{-k / 30},0,0" for k in range(11))
+    return _text("motion.csv", ",".join(TIME_SERIES_COLUMNS) + f"\n{rows}\n", folder)
+
+
+def _lattice(suffix: str, folder: Path) -> Path:
+    path = folder / f"lattice.{suffix}"
+    test_lattices.WRITERS[suffix](path, test_lattices.SQUARES)
+    return path
+
+
+def _picture(name: str, folder: Path) -> Path:
+    image = np.full((60, 60), 255, np.uint8)
+    image[15:45, 10:40] = 0
+    path = folder / name
+    cv2.imwrite(str(path), image)
+    return path
+
+
+def _frames(folder: Path) -> Path:
+    shots = folder / "shots"
+    shots.mkdir()
+    for number in range(4):
+        _picture(f"shots/{number}.png", folder)
+    return shots / "2.png"
+
+
+def _film(name: str, codec: Codec, folder: Path) -> Path:
+    path = folder / name
+    noise = np.random.default_rng(0).integers(0, 255, (8, 96, 128), dtype=np.uint8)
+    encode(path, iter(noise), 30.0, codec, {"title": "noise"})
+    return path
+
+
+def _shown(path: Path) -> Told:
+    held, found = [], video.frames(path, rate=30.0)
+    for frame in found:
+        held.append((frame.index, frame.time, frame.image.shape, zlib.crc32(frame.image.tobytes())))
+        assert frame.image.min() >= 0
+        assert frame.image.max() <= 255
+    return [video.length(path) > 0, held]
+
+
+def _dataset(kind: Kind, folder: Path) -> Path:
+    path = folder / f"{kind}.nc"
+    datasets.write(sample(kind), path, kind, {"problem": "{}", "problem_hash": "0" * 64})
+    return path
+
+
+def _read_dataset(kind: Kind, path: Path) -> Told:
+    return _plain(datasets.read(path, kind))
+
+
+def _plain(data: xr.Dataset) -> Told:
+    return [
+        sorted((str(name), str(value)) for name, value in data.attrs.items()),
+        *([str(name), each.dims, each.values.tolist()] for name, each in data.variables.items()),
+    ]
+
+
+def _cases(folder: Path) -> Path:
+    path = folder / "part_0.csv"
+    with Casebook(path, ["drive.frequency"]) as book:
+        for number in range(40):
+            book.add([(number, [f"{number} Hz"], Found(number / 7, 1.0, -number / 9))])
+    return path
+
+
+def _known(path: Path) -> Told:
+    return sorted(casebook.known(path.parent).items())
+
+
+def _manifest(folder: Path) -> Path:
+    told = (
+        '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "thin_walls_mm": {}, "files": {}}'
+    )
+    return _text(manifest.NAME, told, folder)
+
+
+def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
+    return Subject(name, "YAML", make, read, damage.YAML)
+
+
+def _described(path: Path) -> Told:
+    described = importing.description(path)
+    text = importing.recording_text(described, path, "design.nc")
+    return [text, importing.design(described)["vertices"].values.tolist()]
+
+
+def _sheet(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
+    return Subject(name, "CSV", make, read, damage.CSV)
+
+
+def _image(name: str, make: Callable[[Path], Path]) -> Subject:
+    return Subject(name, "image", partial(_beside, make, _void), _by_problem)
+
+
+def _forces(path: Path) -> Told:
+    log = loadcell.read(path, recording.LoadCell(file=path.name))
+    return [log.clock.tolist(), log.force.tolist()]
+
+
+def _cloud(path: Path) -> Told:
+    return [part.tolist() for part in points.cloud(path, points.Points(points=path.name))]
+
+
+def _readings(path: Path) -> Told:
+    wanted = {"displacement": units.LENGTH, "force": units.FORCE}
+    return list(readings.read(path, wanted).tolist())
+
+
+def _from_study(name: str) -> Callable[[Path], Path]:
+    return partial(_copied, EXPERIMENTS / name)
+
+
+def _dataset_subjects() -> Iterable[Subject]:
+    for kind in TABLES:
+        make, read = partial(_dataset, kind), partial(_read_dataset, kind)
+        yield Subject(f"{kind} dataset", "netCDF", make, read, edits.NETCDF, sealed=True)
+
+
+SUBJECTS: tuple[Subject, ...] = (
+    _yaml("problem, dynamic", _from_study("fig2/problem.yaml"), _problem),
+    _yaml("problem, static", partial(static.write, more=static.HOLE, size=5), _problem),
+    _yaml("problem, kagome", _from_study("kagome/problem.yaml"), _problem),
+    _yaml(
+        "recording",
+        _from_study("fig2/recordings/cloaked.yaml"),
+        lambda p: [recording.load(p).model_dump_json()],
+    ),
+    _yaml(
+        "calibration",
+        _from_study("calibration/hinges.yaml"),
+        lambda p: [section(p, Calibration).model_dump_json()],
+    ),
+    _yaml(
+        "points",
+        partial(_text, "points.yaml", POINTS),
+        lambda p: [points.load(p).model_dump_json()],
+    ),
+    _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
+    _yaml("figure of several studies", _figure, lambda p: [joint.load(p).model_dump_json()]),
+    *_dataset_subjects(),
+    Subject(
+        "lattice in netCDF",
+        "netCDF",
+        partial(_beside, partial(_lattice, "nc"), _listed),
+        _by_problem,
+        edits.NETCDF,
+    ),
+    _sheet("lattice in CSV", partial(_beside, partial(_lattice, "csv"), _listed), _by_problem),
+    _sheet("measured drive", partial(_beside, _motion, _driven), _by_problem),
+    _sheet("load cell", partial(_text, "load.csv", LOG), _forces),
+    _sheet("points", partial(_text, "dic.csv", DIC), _cloud),
+    _sheet("calibration test", partial(_text, "test.csv", TEST), _readings),
+    Subject("journal of a sweep", "CSV", _cases, _known, damage.CSV, sealed=True, whole=False),
+    *(
+        _image(f"{end} of a void", partial(_picture, f"void.{end}"))
+        for end in ("png", "jpg", "bmp", "tiff")
+    ),
+    _image("SVG of a void", partial(_text, "void.svg", SVG)),
+    Subject("picture of a film", "image", _frames, lambda p: _shown(p.parent)),
+    Subject("video, H.264", "video", partial(_copied, CLIP.with_suffix(".mp4")), _shown),
+    Subject("video, lossless", "video", partial(_film, "film.mkv", Codec(name="ffv1")), _shown),
+    Subject("video, small", "video", partial(_film, "film.mp4", Codec()), _shown),
+    Subject(
+        "lattice in DXF", "other", partial(_beside, partial(_lattice, "dxf"), _listed), _by_problem
+    ),
+    Subject(
+        "manifest of a package",
+        "other",
+        _manifest,
+        lambda p: [sorted(map(str, manifest.read(p.parent).items()))],
+    ),
+)

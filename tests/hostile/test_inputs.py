@@ -1,0 +1,13 @@
+"""Damaged files in small; `python -m tests.hostile inputs` tries a thousand."""
+
+from __future__ import annotations
+
+from tests.hostile import inputs
+from tests.hostile.subjects import SUBJECTS
+
+
+def test_no_damaged_file_is_read_in_silence_or_ends_in_a_traceback() -> None:
+    found = inputs.outcomes(3 * len(SUBJECTS), seed=7)
+    assert [each for each in found if each["end"] == "wrong"] == []
+    assert len(found) == 3 * len(SUBJECTS)
+    assert {each["end"] for each in found} == {"refused", "same", "changed"}
