@@ -4,7 +4,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
-PAGES := all fig1 index movies calibrate
+PAGES := all fig1 index movies calibrate benchmark
 PRODUCTS := $(foreach product,fabrication recordings spectrum gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
@@ -34,6 +34,7 @@ help:
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
 	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
 	@echo "make cluster   make this machine a SLURM of one node and run the tests on it"
+	@echo "make benchmark run time against error of every solver, and more: results/benchmark (an hour)"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"

@@ -166,7 +166,9 @@ def _interior_point(asked: Field) -> None:
 
 def _nlopt(algorithm: str, asked: Field) -> None:
     def loss(design: Floats, slope: Floats) -> float:
-        value, slope[:] = asked.plain(design)
+        value, gradient = asked.plain(design)
+        if slope.size:
+            slope[:] = gradient
         return value
 
     def limits(result: Floats, design: Floats, slope: Floats) -> None:

@@ -124,6 +124,7 @@ class Worker:
                 return
             if spent > self._limit:
                 self._process.terminate()
+                self._process.join()
                 raise TooSlowError(f"took longer than {self._limit:g} s")
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from pipeline import cli
 
 LOG = logging.getLogger("pipeline.benchmarks")
+VIDEOS = Path("tests/data/tracking")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -25,6 +26,10 @@ def parser() -> argparse.ArgumentParser:
     made = cli.parser("benchmarks.stage", str(__doc__), study=False)
     made.add_argument("suite", help="which: precision_fig2, growth, ablation, ...")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument(
+        "--videos", type=Path, default=VIDEOS, metavar="FOLDER",
+        help="videos with truth, for the suite tracking (default: %(default)s)",
+    )  # fmt: skip
     made.add_argument("--repeats", type=int, default=Rules().repeats, help="runs of a point")
     made.add_argument(
         "--limit", type=float, default=Rules().limit_s, metavar="S",
@@ -45,7 +50,7 @@ def work(args: argparse.Namespace) -> None:
     from pipeline import datasets, provenance
     from pipeline.errors import UserError
 
-    suite = studies.named(args.suite)
+    suite = studies.named(args.suite, args.videos)
     rules = Rules(args.repeats, args.limit)
     machine = store.machine()
     try:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import xarray as xr
 
-from benchmarks import contest, skips
+from benchmarks import contest, skips, tracked
 from benchmarks.climb import Ladder, Point, Rules, climb
 from benchmarks.ladders import cases, sets
 from benchmarks.measure import Tell, Worker
@@ -41,8 +42,8 @@ class Suite:
     kind: Kind = "benchmark"
 
 
-def named(name: str) -> Suite:
-    """The suite of that name.
+def named(name: str, videos: Path) -> Suite:
+    """The suite of that name; tracking has its own folder of videos.
 
     Raises:
         UserError: there is none.
@@ -50,6 +51,7 @@ def named(name: str) -> Suite:
     suites: dict[str, Callable[[], Suite]] = {
         **{f"{PRECISION}{scene}": partial(_precision, scene) for scene in cases.TITLES},
         **{f"optimisers_{scene}": partial(_contest, scene) for scene in DESIGNED},
+        "tracking": partial(_tracking, videos),
         "ablation": partial(_ablation, "fig2", "fig4"),
         "small_ablation": partial(_ablation, "small_wave", "small_push"),
         "growth": partial(_growth, static.SIDES),
@@ -86,6 +88,15 @@ def _contest(scene: str) -> Suite:
         f"nothing: losses are evaluated afresh; each optimiser gets {told}",
         lambda _, tell: contest.measure(scene, terms, tell),
         "contest",
+    )
+
+
+def _tracking(videos: Path) -> Suite:
+    return Suite(
+        "Tracking: error against frame rate",
+        "the known motion of rendered (SYNTHETIC) videos",
+        lambda _, tell: tracked.measure(videos, tell),
+        "tracking",
     )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import spearmanr
 
-from benchmarks import plain
+from benchmarks import plain, tracked
 from pipeline.tracking import importing
 from pipeline.tracking.arrays import Floats, Mask, Reals
 from pipeline.tracking.follow import Track, follow
@@ -37,10 +37,8 @@ class Truth(NamedTuple):
 def truth(folder: Path, name: str, columns: int) -> Truth:
     """Truth of a video, units in the order i + columns j."""
     stored = np.load(folder / f"{name}_truth.npz")
-    order = np.argsort(stored["unit_ij"][:, 0] + columns * stored["unit_ij"][:, 1])
-    moved = [stored["x"] - stored["x0"], stored["y"] - stored["y0"], stored["theta"]]
-    displacement = np.stack(moved, axis=-1)[:, order]
-    markers = stored["marker_visible"][:, order]
+    displacement = tracked.displacement(stored, columns)
+    markers = stored["marker_visible"][:, tracked.order(stored, columns)]
     visible = np.ones(displacement.shape[:2], dtype=bool)
     source = stored["frame_source"]
     fault = np.diff(source, prepend=source[0] - 1) != 1

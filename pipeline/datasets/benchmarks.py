@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.datasets.variables import ENERGY, Table, Variable, label, names
+from pipeline.datasets.variables import ENERGY, LABELS, Table, Variable, label, names
 
 _RUN = ("point", "run")
 
@@ -50,6 +50,24 @@ CONTEST: Table = {
         ("optimiser",), "1", "loss of the best design, evaluated afresh", gaps=True, also=ENERGY
     ),
     "outcome": Variable(("optimiser",), "1", "measured, or why not", "str"),
+}
+
+_TRACKED = ("video", "tracker", "thinning")
+
+TRACKING: Table = {
+    "video": names("video", "video with known truth"),
+    "tracker": names("tracker", "way to track"),
+    "thinning": label(("thinning",), "1", "every so manyth frame is kept", "int64"),
+    "dof": LABELS["dof"],
+    "frame_rate": Variable(("video", "thinning"), "Hz", "rate of the frames that are kept"),
+    "error": Variable(
+        (*_TRACKED, "dof"),
+        "mm (ux, uy), rad (theta)",
+        "root mean square error over units and frames",
+        gaps=True,
+    ),
+    "lost": Variable(_TRACKED, "1", "share of the poses that were not found"),
+    "cpu_time": Variable(_TRACKED, "s", "processor time of a frame, one core"),
 }
 
 MEASURED = {

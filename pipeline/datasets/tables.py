@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from pipeline.datasets.benchmarks import BENCHMARK, CONTEST, MEASURED
+from pipeline.datasets.benchmarks import BENCHMARK, CONTEST, MEASURED, TRACKING
 from pipeline.datasets.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.designs import DESIGN, DESIGNMETHOD
@@ -34,6 +34,7 @@ Kind = Literal[
     "calibration",
     "benchmark",
     "contest",
+    "tracking",
 ]
 
 TABLES: Mapping[Kind, Table] = {
@@ -52,6 +53,7 @@ TABLES: Mapping[Kind, Table] = {
     "calibration": CALIBRATION,
     "benchmark": BENCHMARK,
     "contest": CONTEST,
+    "tracking": TRACKING,
 }
 """The variables of each kind of dataset, in the order in which they are written."""
 
@@ -71,6 +73,7 @@ ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
     "calibration": WARNED,
     "benchmark": MEASURED,
     "contest": MEASURED,
+    "tracking": MEASURED,
 }
 """What each kind tells in attributes of its own, beside its provenance."""
 
@@ -90,5 +93,6 @@ TITLES: Mapping[Kind, str] = {
     "calibration": "Constants of a specimen, found from measurements, with their errors",
     "benchmark": "Run time, error and work of several methods",
     "contest": "Optimisers on the same design problem, evaluation by evaluation",
+    "tracking": "Accuracy of tracking against frame rate",
 }
 """What each kind holds, in a line; a dataset may have a title of its own."""

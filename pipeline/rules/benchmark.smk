@@ -1,12 +1,13 @@
 # Run time against error, measured anew: suite by suite, so that it resumes. Quiet machines only.
+# Others with --config benchmark='[precision_small_push]', videos with --config videos=FOLDER.
 SUITES = config.get(
     "benchmark",
     [
-        "precision_fig2",
-        "precision_fig4",
-        "precision_fig5",
-        "precision_fig6",
-        "precision_fig7",
+        *expand("precision_{scene}", scene=["fig2", "fig4", "fig5", "fig6", "fig7"]),
+        *expand("optimisers_{scene}", scene=["fig2", "fig4", "fig5"]),
+        "growth",
+        "ablation",
+        "tracking",
     ],
 )
 
@@ -35,8 +36,10 @@ rule measure:
         "results/benchmark/logs/{suite}.log",
     threads: 1
     params:
+        videos=config.get("videos", "tests/data/tracking"),
         source=lambda wildcards: source_hash("benchmarks.stage"),
     message:
         "Measuring {wildcards.suite}"
     shell:
-        "python -m benchmarks.stage {wildcards.suite} --out {output} --log {log}"
+        "python -m benchmarks.stage {wildcards.suite} --videos {params.videos} --out {output}"
+        " --log {log}"

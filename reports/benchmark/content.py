@@ -12,7 +12,7 @@ import xarray as xr
 from pipeline import datasets
 from reports import style, templating
 from reports.benchmark import tables
-from reports.benchmark.sections import OPTIMISERS, Picture, pictures
+from reports.benchmark.sections import OPTIMISERS, TRACKING, Picture, pictures
 from reports.benchmark.tables import Failure
 
 
@@ -52,7 +52,9 @@ def write(paths: Sequence[Path], folder: Path) -> list[Path]:
 
 
 def _read(path: Path) -> xr.Dataset:
-    return datasets.read(path, "contest" if path.stem.startswith(OPTIMISERS) else "benchmark")
+    if path.stem.startswith(OPTIMISERS):
+        return datasets.read(path, "contest")
+    return datasets.read(path, "tracking" if path.stem == TRACKING else "benchmark")
 
 
 def _section(picture: Picture, folder: Path, written: list[Path], known: set[str]) -> Section:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import xarray as xr
 from matplotlib.figure import Figure
 
-from reports.benchmark import ablation, gradients, growth, optimisers, precision
+from reports.benchmark import ablation, gradients, growth, optimisers, precision, tracked
 
-PRECISION, OPTIMISERS = "precision_", "optimisers_"
+PRECISION, OPTIMISERS, TRACKING = "precision_", "optimisers_", "tracking"
 _PRECISION = (
     "Processor time of one run against the error of (a) the motion of the region of interest, (b)"
     " the loss, (c) its gradient by all design variables, each method at ever tighter settings."
@@ -35,6 +35,12 @@ _OPTIMISERS = (
     " processor time, and its KKT residual. Below: the share of problems (each scene, with 30, 10"
     " and 3 % of the possible decrease left) that an optimiser solves within so many times the"
     " evaluations of the fastest."
+)
+
+
+_TRACKING = (
+    "Root mean square error of the displacement (left) and the rotation (right) of the units"
+    " against the rate of the frames that are kept; the videos are rendered (SYNTHETIC)."
 )
 
 
@@ -74,6 +80,7 @@ def pictures(given: Mapping[str, xr.Dataset]) -> Iterator[Picture]:
     for name, caption, build in (
         ("growth", _GROWTH, growth.build),
         ("ablation", _ABLATION, ablation.build),
+        (TRACKING, _TRACKING, tracked.build),
     ):
         for stem in (name, f"small_{name}"):
             if stem in given:

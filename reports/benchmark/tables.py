@@ -24,7 +24,27 @@ def table(name: str, data: xr.Dataset) -> Table:
     """Every point of a benchmark, or every optimiser of a contest."""
     if "optimiser" in data.dims:
         return _contest(name, data)
+    if "video" in data.dims:
+        return _tracking(name, data)
     return _points(name, data)
+
+
+def _tracking(name: str, data: xr.Dataset) -> Table:
+    found = data.to_dataframe().reset_index()
+    errors = found.pivot_table(
+        "error", ["video", "tracker", "frame_rate", "lost", "cpu_time"], "dof"
+    ).reset_index()
+    columns = {
+        "video": errors["video"],
+        "tracker": errors["tracker"],
+        "frame rate, Hz": errors["frame_rate"],
+        "rms of ux, mm": errors["ux"],
+        "rms of uy, mm": errors["uy"],
+        "rms of theta, deg": np.rad2deg(errors["theta"]),
+        "lost, share": errors["lost"],
+        "time of a frame, s": errors["cpu_time"],
+    }
+    return Table(f"{name}.csv", "every video", {k: v.to_numpy() for k, v in columns.items()})
 
 
 def _contest(name: str, data: xr.Dataset) -> Table:
@@ -84,6 +104,8 @@ def _cell(value: object) -> str:
 
 def failures(data: xr.Dataset) -> list[Failure]:
     """The points (or optimisers) that have no figures, with the reason."""
+    if "outcome" not in data:
+        return []
     (dim,) = data["outcome"].dims
     failed = data.isel({dim: np.flatnonzero(data["outcome"].values != "measured")})
     if "optimiser" in data.dims:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from functools import partial
 
 import numpy as np
@@ -32,6 +33,30 @@ def trapezoids(n: int) -> Run:
         return Sample(values, {"evaluations": n})
 
     return run
+
+
+def at_setting(n: float, task: str) -> Run:
+    del task
+    return trapezoids(int(n))
+
+
+def slow_at_setting(setting: float, task: str) -> Run:
+    """Busy for ten seconds unless the setting is zero."""
+    del task
+
+    def run() -> Sample:
+        end = time.process_time() + (10.0 if setting else 0.0)
+        while time.process_time() < end:
+            pass
+        return exact()()
+
+    return run
+
+
+def fails_at_first(n: float, task: str) -> Run:
+    if n == 0.0:
+        raise ArithmeticError("too loose")
+    return at_setting(n, task)
 
 
 def raises_when_run() -> Run:

@@ -41,6 +41,9 @@ SIZES = {
     "quantity": 3,
     "work": 2,
     "optimiser": 2,
+    "video": 2,
+    "tracker": 2,
+    "thinning": 3,
     "state": 2,
     "mode": 4,
     "excitation": 5,
@@ -65,6 +68,7 @@ _ATTRIBUTES: dict[str, dict[str, str]] = {
     "calibration": {"calibration": "{}", "synthetic": "no", "warnings": ""},
     "benchmark": dict.fromkeys(ATTRIBUTES["benchmark"], "as told"),
     "contest": dict.fromkeys(ATTRIBUTES["contest"], "as told"),
+    "tracking": dict.fromkeys(ATTRIBUTES["tracking"], "as told"),
 }
 
 

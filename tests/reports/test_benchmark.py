@@ -94,11 +94,30 @@ def contest() -> xr.Dataset:
     )
 
 
+def tracked() -> xr.Dataset:
+    dims = ("video", "tracker", "thinning")
+    return xr.Dataset(
+        {
+            "frame_rate": (dims[::2], np.array([[60.0, 30.0]])),
+            "error": ((*dims, "dof"), np.full((1, 2, 2, 3), 0.01) * [1.0, 1.0, 0.1]),
+            "lost": (dims, np.zeros((1, 2, 2))),
+            "cpu_time": (dims, np.full((1, 2, 2), 0.1)),
+        },
+        {
+            "video": ["dots"],
+            "tracker": ["own tracker", "plain OpenCV"],
+            "thinning": [1, 2],
+            "dof": ["ux", "uy", "theta"],
+        },
+    )
+
+
 GIVEN: dict[str, tuple[xr.Dataset, Kind]] = {
     "precision_small": (precisions(), "benchmark"),
     "optimisers_small": (contest(), "contest"),
     "growth": (grown(), "benchmark"),
     "ablation": (skipped(), "benchmark"),
+    "tracking": (tracked(), "tracking"),
 }
 
 

@@ -1,0 +1,22 @@
+"""Nothing that is skipped changes a result by more than its tolerance."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks.frame import errors
+from benchmarks.skips import SKIPS, Skip
+
+COMPILED = ("compilation", "fresh factors")
+"""Those that compile every loop anew, a minute each: `snakemake benchmark` measures them."""
+
+
+@pytest.mark.parametrize(
+    "skip", [skip for skip in SKIPS if skip.name not in COMPILED], ids=lambda skip: skip.name
+)
+def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
+    name = "small_wave" if skip.wave else "small_push"
+    done, skipped = (skip.prepare(name, made, "loss")().values for made in (0.0, 1.0))
+    changes = errors(done, skipped)
+    assert changes.keys() == done.keys() == skipped.keys()
+    assert max(changes.values()) <= skip.tolerance
