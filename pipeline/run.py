@@ -52,14 +52,14 @@ def _clear_the_ground() -> None:
             file=ROOT,
             remedy=f"wait for it, or end it with: kill -INT {active[0].pid}",
         )
+    for number in leftovers.cancel(ROOT):
+        print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
     orphans = [process for process in _others() if _mark(process) == str(ROOT)]
     for process in orphans:
         process.terminate()
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
     for process in stubborn:
         process.kill()
-    for number in leftovers.cancel(ROOT):
-        print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
     shutil.rmtree(ROOT / ".snakemake/locks", ignore_errors=True)
 
 

@@ -1,32 +1,44 @@
-"""The workflow on a real SLURM of one node: a submitter killed, a node lost, the same bytes."""
+"""Figure 3 on a real SLURM of one node: a node lost, the submitter killed, the same bytes."""
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
+import psutil
 
 from pipeline.environment import ROOT
 from pipeline.leftovers import PREFIX
-from tests.e2e.checkout import Checkout
+from tests.e2e.checkout import Checkout, wait_until
 
 TARGET = "fig3@quick"
+STUDIES = (TARGET, f"{TARGET}.1", f"{TARGET}.2")
+LASTING = 16  # evaluations, so that an optimisation is still at work when it is to be disturbed
 AS_ROOT = () if os.geteuid() == 0 else ("sudo", "-n")
-PATIENCE = 900.0  # seconds; far more than it takes, for a machine that others use as well
-ON_SLURM = (
-    *("--profile", "profiles/slurm", "--slurm-no-account"),
-    *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
-    *("--latency-wait", "5"),
+PATIENCE = 600.0  # seconds; far more than it takes, for a machine that others use as well
+PAUSE = 0.2  # seconds between two looks at the cluster
+# Snakemake looks after its jobs once in so many seconds, and in ten more each time that none has
+# ended: long enough for a job of these to end, and no longer.
+INTERVAL = 9
+SUBMIT = (
+    *(".venv/bin/python", "-m", "pipeline.run"),
+    *("--profile", "profiles/slurm", "--slurm-no-account", "--latency-wait", "5"),
+    *("--slurm-status-command", "squeue"),
+    *("--slurm-init-seconds-before-status-checks", str(INTERVAL), TARGET),
 )
+ASKED = {
+    "design": ("4000M", "1", "8:00:00"),
+    "simulate": ("4000M", "1", "1:00:00"),
+    "family_report": ("2000M", "1", "30:00"),
+}
+"""Memory, cores and time of the jobs of each rule; the others run where the submitter does."""
 
 
 @dataclass(frozen=True)
@@ -42,91 +54,105 @@ class Job:
     limit: str
     comment: str
 
+    @property
+    def rule(self) -> str:
+        """The rule that it is of."""
+        return re.sub("^rule_|_wildcards_.*$", "", self.comment)
+
 
 def asked(*command: str) -> str:
     return subprocess.run(command, text=True, capture_output=True, check=True).stdout
 
 
-def jobs(folder: Path, state: str = "") -> list[Job]:
-    """The jobs of a folder that wait or run."""
-    listed = asked("squeue", "--noheader", "--format=%i|%T|%j|%Z|%m|%C|%l|%k").splitlines()
-    found = [Job(*line.split("|")) for line in listed]
-    return [job for job in found if job.folder == str(folder) and state in job.state]
+def jobs(checkout: Checkout, *states: str) -> list[Job]:
+    """All jobs of a checkout, or those in some states."""
+    listed = asked("squeue", "--noheader", "--states=all", "--format=%i|%T|%j|%Z|%m|%C|%l|%k")
+    found = [Job(*line.split("|")) for line in listed.splitlines()]
+    mine = [job for job in found if job.folder == str(checkout.root)]
+    return [job for job in mine if not states or job.state in states]
 
 
-def designing(folder: Path) -> list[Job]:
-    return [job for job in jobs(folder, "RUNNING") if job.comment.startswith("rule_design")]
+def numbers(found: list[Job]) -> set[str]:
+    return {job.number for job in found}
 
 
-def wait_for(condition: Callable[[], object], run: subprocess.Popen[str]) -> None:
-    until = time.monotonic() + PATIENCE
-    while not condition():
-        assert run.poll() is None, f"ended before: {run.communicate()[0]}"
-        assert time.monotonic() < until, "it did not come"
-        time.sleep(0.1)
+def journals(checkout: Checkout) -> dict[str, bytes]:
+    """What the optimisations have kept of their evaluations."""
+    paths = checkout.root.glob(f"results/{TARGET}.*/.journal/*/*.journal")
+    return {path.relative_to(checkout.root).as_posix(): path.read_bytes() for path in paths}
 
 
 @contextmanager
-def started(checkout: Checkout) -> Iterator[subprocess.Popen[str]]:
-    """The command of a user; whatever comes, it ends with the block; its jobs do not."""
-    run = subprocess.Popen(
-        [sys.executable, "-m", "pipeline.run", *ON_SLURM, TARGET],
-        cwd=checkout.root,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        start_new_session=True,
-    )
+def begun(checkout: Checkout, *command: str) -> Iterator[subprocess.Popen[str]]:
+    """A command of a user, killed with the end of the block unless it has ended."""
+    run = checkout.begin(*command)
     try:
         yield run
     finally:
         if run.poll() is None:
             os.killpg(run.pid, signal.SIGKILL)
-            run.communicate()
 
 
-@pytest.fixture(scope="module")
-def local(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A checkout in which the figure was built without a cluster."""
-    checkout = Checkout.made(tmp_path_factory.mktemp("local") / "checkout")
+def made(root: Path) -> Checkout:
+    """A checkout in which nothing is built."""
+    checkout = Checkout.made(root)
+    checkout.edit("evaluations: 6\n", f"evaluations: {LASTING}\n", "fig3")
     checkout.take_kernels(ROOT)
-    ended = checkout.make(TARGET)
-    assert ended.returncode == 0, ended.stdout + ended.stderr
     return checkout
 
 
 def lose_the_node(checkout: Checkout) -> None:
     """The node goes with all that runs on it, and is brought back."""
-    node = socket.gethostname().partition(".")[0]
-    asked(*AS_ROOT, "scontrol", "update", f"nodename={node}", "state=down", "reason=test")
-    for process in checkout.stages("pipeline.design"):
-        process.kill()
-    asked(*AS_ROOT, "scontrol", "update", f"nodename={node}", "state=resume")
+    node = f"nodename={socket.gethostname().partition('.')[0]}"
+    asked(*AS_ROOT, "scontrol", "update", node, "state=down", "reason=test")
+    for process in checkout.jobs():
+        if on_a_node(process):
+            process.kill()
+    asked(*AS_ROOT, "scontrol", "update", node, "state=resume")
 
 
-def test_whatever_is_lost_the_results_are_those_of_one_machine(
-    local: Checkout, tmp_path: Path
-) -> None:
-    checkout = local.copied(tmp_path / "checkout")
+def on_a_node(process: psutil.Process) -> bool:
+    try:
+        return "SLURM_JOB_ID" in process.environ()
+    except psutil.Error:  # it has just ended
+        return False
+
+
+def test_whatever_is_lost_the_results_are_those_of_one_machine(tmp_path: Path) -> None:
+    alone = made(tmp_path / "alone")
+    checkout = alone.copied(tmp_path / "checkout")
     checkout.take_kernels(ROOT)
+    with begun(alone, ".venv/bin/snakemake", TARGET) as building:
+        lost, left = disturb(checkout)
+        with begun(checkout, *SUBMIT) as run:
+            told = run.communicate(timeout=PATIENCE)[0]
+        assert run.returncode == 0, told
+        assert set(re.findall(r"cancelled job (\d+) of a killed run", told)) == left
+        told = building.communicate()[0]
+        assert building.returncode == 0, told
 
-    with started(checkout) as run:
-        wait_for(lambda: designing(checkout.root), run)
-        for job in designing(checkout.root):
-            assert (job.memory, job.cores, job.limit) == ("4000M", "1", "8:00:00")
-            assert job.name.startswith(PREFIX)
-    left = {job.number for job in jobs(checkout.root)}
-    assert left, "the jobs live on without their submitter"
+    found = jobs(checkout)
+    assert numbers(jobs(checkout, "NODE_FAIL")) == lost
+    assert numbers(jobs(checkout, "CANCELLED")) == left
+    assert {job.state for job in found} == {"NODE_FAIL", "CANCELLED", "COMPLETED"}
+    assert {job.rule: (job.memory, job.cores, job.limit) for job in found} == ASKED
+    assert all(job.name.startswith(PREFIX) for job in found)
+    for study in STUDIES:
+        assert alone.built(study)
+        assert checkout.built(study) == alone.built(study)
+    assert journals(checkout) == journals(alone), "evaluations were lost or written twice"
 
-    with started(checkout) as run:
-        wait_for(lambda: {job.number for job in designing(checkout.root)} - left, run)
-        assert not left & {job.number for job in jobs(checkout.root)}
+
+def disturb(checkout: Checkout) -> tuple[set[str], set[str]]:
+    """Loses the node under the jobs of a run, then the submitter once it has given them again.
+
+    Returns:
+        The jobs that were lost with the node, and those that the submitter left.
+    """
+    with begun(checkout, *SUBMIT) as run:
+        wait_until(lambda: len(journals(checkout)) == 2, run, PAUSE)
+        lost = numbers(jobs(checkout, "RUNNING"))
         lose_the_node(checkout)
-        told = run.communicate(timeout=PATIENCE)[0]
-    assert run.returncode == 0, told
-    assert all(f"cancelled job {number} of a killed run" in told for number in left)
-    assert "node failure" in told
-    assert not jobs(checkout.root)
-    for study in (TARGET, f"{TARGET}.1", f"{TARGET}.2"):
-        assert checkout.built(study) == local.built(study)
-        assert local.built(study)
+        wait_until(lambda: numbers(jobs(checkout, "RUNNING")) - lost, run, PAUSE)
+    assert "node failure" in run.communicate()[0]
+    return lost, numbers(jobs(checkout, "PENDING", "RUNNING"))

@@ -90,10 +90,11 @@ class Checkout:
     def results(self) -> Path:
         return self.root / f"results/{STUDY}"
 
-    def edit(self, old: str, new: str) -> None:
-        text = self.problem.read_text()
+    def edit(self, old: str, new: str, study: str = STUDY) -> None:
+        problem = self.root / f"experiments/{study}/problem.yaml"
+        text = problem.read_text()
         assert old in text
-        self.problem.write_text(text.replace(old, new, 1))
+        problem.write_text(text.replace(old, new, 1))
 
     def make(self, target: str = STUDY, first: str = "") -> Ended:
         return self._run(["make", *_NO_SETUP, target], first)
@@ -115,9 +116,13 @@ class Checkout:
         return self._run([".venv/bin/python", "-c", text])
 
     def start(self, target: str = STUDY) -> subprocess.Popen[str]:
-        """`make` in a process group of its own; the output is a pipe."""
+        """`make`, as `begin` begins a command."""
+        return self.begin("make", *_NO_SETUP, target)
+
+    def begin(self, *command: str) -> subprocess.Popen[str]:
+        """A command in a process group of its own; the output is a pipe."""
         return subprocess.Popen(
-            ["make", *_NO_SETUP, target],
+            command,
             cwd=self.root,
             env=self._environment(),
             text=True,
@@ -191,13 +196,15 @@ def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, 
     return merged
 
 
-def wait_until(condition: Callable[[], bool], run: subprocess.Popen[str]) -> None:
-    """Looks a thousand times a second, as long as the run lasts."""
+def wait_until(
+    condition: Callable[[], object], run: subprocess.Popen[str], pause: float = 0.001
+) -> None:
+    """Looks again after every pause (s), as long as the run lasts."""
     end = time.monotonic() + 240
     while not condition():
         assert run.poll() is None, f"ended before the moment came: {run.communicate()[0]}"
         assert time.monotonic() < end, "the moment did not come"
-        time.sleep(0.001)
+        time.sleep(pause)
 
 
 def assert_one_message(ended: Ended, *parts: str) -> None:
