@@ -5,7 +5,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
 PAGES := all fig1 index movies calibrate benchmark
-PRODUCTS := $(foreach product,fabrication recordings spectrum gains,$(addsuffix _$(product),$(STUDIES)))
+PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
@@ -24,6 +24,7 @@ help:
 	@echo "make fig2_fabrication   drawings, meshes and papers of what is built: results/fig2/fabrication"
 	@echo "make fig2_recordings    videos of the specimens, tracked: results/fig2/recordings"
 	@echo "make fig7_spectrum      modes, transmission and waves of a study that asks for them"
+	@echo "make fig2_sweep         losses over the parameters of a study's sweep, whichever they are"
 	@echo "make fig2_gains         what designs gain that hold against more than the study asks for"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make calibrate constants of the specimens from tests of small ones: results/calibration"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,8 @@ def results(
         problem = _posed(asked, setting)
         if lattice_of(problem).n_units != vertices.sizes["unit"]:
             raise UnposedError("the design is of a lattice with another number of units")
-        scene = scene_of(problem, folder)
+        # No design space is asked for: its symmetry costs more than it could save.
+        scene = replace(scene_of(problem, folder), symmetry="none")
     except ValidationError as error:
         raise UnposedError(reason(error)[0]) from error
     except UserError as error:

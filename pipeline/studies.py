@@ -19,7 +19,7 @@ from pipeline.problem import Problem, joint, load, preset_names, yamlfile
 from pipeline.problem.families import count, numbered
 from pipeline.problem.loading import overlaid
 
-PRODUCTS = ("_fabrication", "_spectrum", "_gains", RECORDINGS)
+PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", RECORDINGS)
 """Ends of the targets of a study beside its report."""
 ALL = "all"  # the target that builds every figure of the paper
 

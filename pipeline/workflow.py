@@ -60,7 +60,7 @@ def members(wildcards: Wildcards) -> list[str]:
 
 
 def product_pages(built: str, product: str) -> list[str]:
-    """The pages of a product (fabrication, spectrum) of a study, or of all studies of a figure."""
+    """The pages of a product (`fabrication`, say) of a study, or of all studies of a figure."""
     names = together().get(built) or [Study.parse(built)]
     return [f"results/{study}/{product}/index.html" for study in names]
 

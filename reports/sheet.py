@@ -38,7 +38,9 @@ class Sheet:
         figure: makes it.
         tables: written as CSV beside the page.
         sources: attributes of the dataset.
+        datasets: addresses of what is shown, as seen from the page.
         shown: the table on the page, if there is one.
+        draft: why this is but a draft, if it is one.
     """
 
     name: str
@@ -49,7 +51,9 @@ class Sheet:
     figure: Callable[[], Figure]
     tables: Sequence[Table]
     sources: Mapping[str, object]
+    datasets: Sequence[str]
     shown: Shown | None = None
+    draft: Sequence[str] = ()
 
 
 def publish(sheet: Sheet, folder: Path) -> list[Path]:
@@ -79,4 +83,4 @@ def _write(sheet: Sheet, folder: Path) -> list[Path]:
     return [*drawn, *(folder / table.name for table in sheet.tables), page]
 
 
-_TOLD = ("title", "subject", "lead", "caption", "tables", "shown")
+_TOLD = ("title", "subject", "lead", "caption", "tables", "datasets", "shown", "draft")

@@ -149,7 +149,7 @@ def load(
     read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
     for name, data in read.items():
         posed = contacts.geometric(chosen) if name == "geometric_response" else chosen
-        _check_problem(posed, STAGES[name], data, files[name])
+        check_problem(posed, STAGES[name], data, files[name])
     compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
     return Study(
         name=path.resolve().parent.name,
@@ -184,11 +184,16 @@ def built(path: Path, preset: str | None, results: Path, recordings: Sequence[st
 
 def _comparison(chosen: Problem, path: Path) -> xr.Dataset:
     data = datasets.read(path, "comparison")
-    _check_problem(chosen, "compare", data, path)
+    check_problem(chosen, "compare", data, path)
     return data
 
 
-def _check_problem(posed: Problem, stage: Stage, data: xr.Dataset, path: Path) -> None:
+def check_problem(posed: Problem, stage: Stage, data: xr.Dataset, path: Path) -> None:
+    """Whether a dataset was made from this problem.
+
+    Raises:
+        UserError: it was not.
+    """
     wanted = problem.section_hash(posed, stage)
     if (found := data.attrs.get("problem_hash")) != wanted:
         raise UserError(

@@ -81,7 +81,7 @@ TITLES: Mapping[Kind, str] = {
     "design": "Cloak as designed, with the history of its optimisations",
     "design_method": "Cloak as designed by one method, with the history of the optimisation",
     "response": "Motions, forces and energies of the structures, simulated",
-    "sweep": "Loss over directions and frequencies of the drive",
+    "sweep": "Losses of the structures over parameters of the problem",
     "scatter": "Responses of imperfect copies of a design",
     "verification": "Results with finer steps and with the other law of contact",
     "spectrum": "Small vibrations of the structures, and waves in their unit cell",

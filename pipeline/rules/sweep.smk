@@ -42,3 +42,27 @@ rule gather_sweep:
         "Joining the parts of the sweep of {wildcards.name}{wildcards.preset}"
     shell:
         "python -m pipeline.sweep gather --parts {input} --out {output} --log {log}"
+
+
+rule sweep_page:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        sweep="results/{name}{preset}/sweep.nc",
+    output:
+        multiext("results/{name}{preset}/sweep/sweep", ".pdf", ".svg", ".png"),
+        "results/{name}{preset}/sweep/cases.csv",
+        "results/{name}{preset}/sweep/facts.csv",
+        page="results/{name}{preset}/sweep/index.html",
+    log:
+        "results/{name}{preset}/logs/sweep_page.log",
+    threads: 1
+    params:
+        study=options,
+        folder=subpath(output.page, parent=True),
+        problem=section("report"),
+        source=source_hash("reports.sweep.build"),
+    message:
+        "Drawing the sweep of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m reports.sweep.build {params.study} --sweep {input.sweep}"
+        " --out-dir {params.folder} --log {log}"

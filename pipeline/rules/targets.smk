@@ -21,6 +21,12 @@ for target, built in targets().items():
 
     rule:
         name:
+            f"{target}_sweep"
+        input:
+            product_pages(built, "sweep"),
+
+    rule:
+        name:
             f"{target}_recordings"
         input:
             recording_pages(built),

@@ -49,6 +49,7 @@ def _work(args: argparse.Namespace) -> None:
         figure=lambda: figure.build(data),
         tables=[Table("gains.csv", "losses of every preset", columns)],
         sources=data.attrs,
+        datasets=["../gains.nc"],
         shown=_shown(data),
     )
     sheet.publish(made, args.out_dir)

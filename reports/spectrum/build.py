@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import cli
-from pipeline.errors import UserError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,20 +29,12 @@ _CAPTION = (
 
 def _work(args: argparse.Namespace) -> None:
     from pipeline import datasets, problem
-    from reports import sheet
+    from reports import sheet, study
     from reports.spectrum import figure
 
     asked = problem.load(args.problem, args.preset)
     data = datasets.read(args.spectrum, "spectrum")
-    wanted, found = problem.section_hash(asked, "spectrum"), data.attrs["problem_hash"]
-    if found != wanted:
-        raise UserError(
-            "the dataset was made from another problem (or another preset)",
-            file=args.spectrum,
-            key="problem_hash",
-            value=found,
-            remedy="run pipeline.spectrum again with this problem",
-        )
+    study.check_problem(asked, "spectrum", data, args.spectrum)
     made = sheet.Sheet(
         name="spectrum",
         title=asked.title or args.problem.resolve().parent.name,
@@ -54,6 +45,7 @@ def _work(args: argparse.Namespace) -> None:
         figure=lambda: figure.build(data, asked),
         tables=[_transmission(data), _modes(data), _bands(data)],
         sources=data.attrs,
+        datasets=["../spectrum.nc"],
     )
     sheet.publish(made, args.out_dir)
 

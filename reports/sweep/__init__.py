@@ -1,0 +1,1 @@
+"""A sweep over any parameters: figure, tables and page."""
