@@ -110,7 +110,8 @@ def _between(
         except (ArithmeticError, NoConvergence) as failed:
             cuts, part = cuts + 1, part / 2
             if cuts > MAX_CUTS:
-                raise ArithmeticError(f"gave up after {cuts} cut increments: {failed}") from failed
+                why = "no convergence" if isinstance(failed, NoConvergence) else failed
+                raise ArithmeticError(f"gave up after {cuts} cut increments: {why}") from failed
             continue
         reached, part = reached + part, GROWTH * part
     return state

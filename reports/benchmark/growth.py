@@ -28,10 +28,11 @@ def build(data: xr.Dataset) -> Figure:
     _lines(right, measured, measured["memory"].values / _MIB, fitted=False)
     left.set(ylabel="processor time, s", yscale="log")
     right.set(ylabel="peak memory, MiB", ylim=(0, None))
+    left.legend(loc="upper left")
+    right.legend(loc="lower right")
     for axes in (left, right):
         axes.set(xlabel="units", xscale="log")
         axes.grid(color=style.PALE, linewidth=0.4)
-        axes.legend(loc="upper left")
     return figure
 
 

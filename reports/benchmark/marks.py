@@ -26,6 +26,7 @@ MARKS = {
     "ESDIRK3, fronts": Mark(style.CLOAKED, "o", filled=False),
     "explicit leapfrog": Mark(_EXPLICIT, "s"),
     "explicit Blanes-Moan": Mark(_EXPLICIT, "D"),
+    "Newton, by size": Mark(style.METHOD_COLOURS["mma"], "s"),
     "Newton, band": Mark(style.CLOAKED, "o"),
     "Newton, fronts": Mark(style.CLOAKED, "o", filled=False),
     "central differences": Mark(style.CLOAKED, "P"),

@@ -24,7 +24,7 @@ COLOURS = {
     "nlopt AUGLAG": style.GREY,
 }
 _AXES = (
-    ("evaluations", "best_loss", "best feasible loss, share of the first"),
+    ("evaluations", "best_loss", "best loss, of the first"),
     ("processor time, s", "best_loss", ""),
     ("evaluations", "kkt_residual", "KKT residual, mm"),
 )

@@ -32,7 +32,7 @@ SMALLER = {
     "sweep": {"grid": {"drive.directions": {"points": 3}, "drive.frequency": {"points": 2}}},
     "presets": {},
 }
-ROOMS = ("experiments", "pipeline", "profiles", "reports", "sim")
+ROOMS = ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim")
 FILES = ("Snakefile", "Makefile", "CITATION.cff", "requirements.lock", ".gitignore")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}

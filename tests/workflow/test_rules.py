@@ -58,6 +58,10 @@ def test_every_figure_of_the_paper_and_its_index(sandbox: Sandbox) -> None:
     assert sandbox.planned("index") == {"index": 1}
 
 
+def test_a_job_for_each_benchmark_and_its_page(sandbox: Sandbox) -> None:
+    assert sandbox.planned("benchmark") == {"measure": 11, "benchmark": 1}
+
+
 def test_a_job_for_each_of_several_designs(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig3@quick")
     assert planned["design"] == planned["simulate"] == 2
