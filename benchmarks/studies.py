@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from benchmarks import contest, skips, tracked
+from benchmarks import contest, many, skips, tracked
 from benchmarks.climb import Ladder, Point, Rules, climb
 from benchmarks.ladders import cases, sets
 from benchmarks.measure import Tell, Worker
@@ -56,6 +56,8 @@ def named(name: str, videos: Path) -> Suite:
         "small_ablation": partial(_ablation, "small_wave", "small_push"),
         "growth": partial(_growth, static.SIDES),
         "small_growth": partial(_growth, static.SIDES[:2]),
+        "cases": partial(_cases, many.COUNTS, None),
+        "small_cases": partial(_cases, many.COUNTS[:2], "quick"),
     }
     if name not in suites:
         raise UserError(
@@ -113,6 +115,14 @@ def _growth(sides: tuple[int, ...]) -> Suite:
         "Growth with the lattice: an equilibrium at 10 % compression from rest",
         "two loads on the way, each to a hundredth of the usual residual",
         partial(_grown, sides),
+    )
+
+
+def _cases(counts: tuple[int, ...], preset: str | None) -> Suite:
+    return Suite(
+        "Growth with the number of cases: a sweep of Figure 2's scene, two structures in each",
+        "the first case alone",
+        partial(many.measure, counts, preset),
     )
 
 

@@ -6,6 +6,7 @@ SUITES = config.get(
         *expand("precision_{scene}", scene=["fig2", "fig4", "fig5", "fig6", "fig7"]),
         *expand("optimisers_{scene}", scene=["fig2", "fig4", "fig5"]),
         "growth",
+        "cases",
         "ablation",
         "tracking",
     ],

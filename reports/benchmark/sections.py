@@ -26,6 +26,10 @@ _GROWTH = (
     " lattices of 900 units and more. (b) Peak memory of the process, of which Python, JAX and the"
     " compiler take most."
 )
+_CASES = (
+    "(a) Time of a sweep, of which each case is a problem of its own, read, checked and simulated;"
+    " (b) peak memory of its process. The exponents are fitted to 10 cases and more."
+)
 _ABLATION = (
     "What a plan can skip, done (grey) and skipped (purple); how many times longer it takes to do"
     " it, and the largest change of the result that it makes."
@@ -79,6 +83,7 @@ def pictures(given: Mapping[str, xr.Dataset]) -> Iterator[Picture]:
         yield Picture("optimisers", "Optimisers", _OPTIMISERS, draw, shown)
     for name, caption, build in (
         ("growth", _GROWTH, growth.build),
+        ("cases", _CASES, growth.build),
         ("ablation", _ABLATION, ablation.build),
         (TRACKING, _TRACKING, tracked.build),
     ):

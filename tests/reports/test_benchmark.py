@@ -69,6 +69,15 @@ def grown() -> xr.Dataset:
     )
 
 
+def swept() -> xr.Dataset:
+    counts = (1, 10, 100)
+    made = points(
+        [("sweep", f"{n} cases", "loss", 225, 0.1 * n, 1e-12, "measured") for n in counts]
+    )
+    numbers = ("point", "work"), np.array(counts, dtype=float)[:, None]
+    return made.assign_coords(work=["cases"]).assign(count=numbers)
+
+
 def skipped() -> xr.Dataset:
     return points(
         [
@@ -116,6 +125,7 @@ GIVEN: dict[str, tuple[xr.Dataset, Kind]] = {
     "precision_small": (precisions(), "benchmark"),
     "optimisers_small": (contest(), "contest"),
     "growth": (grown(), "benchmark"),
+    "cases": (swept(), "benchmark"),
     "ablation": (skipped(), "benchmark"),
     "tracking": (tracked(), "tracking"),
 }
@@ -162,8 +172,8 @@ def test_diagrams_show_medians_against_errors() -> None:
 
 def test_exponents_are_fitted_to_the_larger_sizes() -> None:
     units = np.array([225, 900, 3600])
-    assert growth.exponent(units, 1e-6 * units**1.5) == pytest.approx(1.5)
-    assert np.isnan(growth.exponent(units[:2], np.ones(2)))
+    assert growth.exponent(units, 1e-6 * units**1.5, 900) == pytest.approx(1.5)
+    assert np.isnan(growth.exponent(units[:2], np.ones(2), 900))
 
 
 def test_profiles_count_evaluations_to_a_share_of_the_decrease() -> None:
