@@ -15,8 +15,9 @@ from sim.meeting import refuse_strangers
 from sim.model import Topology, Values
 from sim.system import as_values, empty_bars, system_of
 
-ROUNDING = 4e-14
-"""Of the end of a ligament, mm: what its axial stiffness makes of it is no force to balance."""
+ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
+"""Of the end of a ligament at rest, mm, and per mm that the drive moves it by: what its axial
+stiffness makes of these is no force to balance."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,10 @@ class StaticSolver:
         counts = np.zeros(4, dtype=np.int64)
         bends, trusted = self._known(states)
         system = system_of(top, values)
-        floor = max(self.absolute, ROUNDING * float(values.law[:, 0].max()))
+        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
+            initial=0
+        )
+        floor = max(self.absolute, rounding * float(values.law[:, 0].max()))
         refuse_start(top, values, system.contacts, np.zeros(top.n_dofs))
         reached, fraction = follow(
             loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,

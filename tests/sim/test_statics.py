@@ -254,3 +254,12 @@ def test_band_and_fronts_lead_to_the_same_states() -> None:
         )
         found.append(StaticSolver(top, loads, relative=1e-13).forward(rig.values, rig.drive)[0])
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=1e-12 * np.abs(found[0]).max())
+
+
+def test_a_structure_moved_far_is_in_balance_as_far_as_rounding_allows() -> None:
+    """Rounding grows with the displacements: a chain carried 50 m is not less in balance."""
+    far = TimeSeries(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [5e4, 3e4, 0.3]]))
+    rig = Rig(quads(5, 1, 15.0, 2.25, 0.0), NONE, np.array([4]), far)
+    moved = path(rig, np.array([0.5, 1.0]))[-1].reshape(-1, 3)
+    np.testing.assert_allclose(moved[:, 2], 0.3, atol=1e-7)
+    np.testing.assert_allclose(moved[4], [5e4, 3e4, 0.3])

@@ -1,0 +1,253 @@
+"""Independent checks of answers: balance, stability, barriers, overlaps, energy, smaller steps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from benchmarks.stress.definition import Structure, balance, stiffness
+from benchmarks.stress.frame import Check
+from benchmarks.stress.posed import Posed
+from sim import explicit, implicit, statics
+from sim.arrays import Floats, Ints
+from sim.clearance import clearance, displaced
+from sim.dynamics import Solver, solve_case
+from sim.errors import SimulationError
+from sim.geometry import void_angles
+
+FAR_FROM_BALANCE = 1e-6
+"""Largest distance of an equilibrium from the one that the definition has, relative to the largest
+displacement, mm/mm."""
+MOST_TOLERANCES = 50.0
+"""A stage's own criterion is an estimate from how fast its iteration contracts."""
+MOST_STAGES = 24
+"""Stages of an implicit run whose balance is checked, evenly spread."""
+
+
+class Answer(NamedTuple):
+    """What a solver returned: displacement and velocity (n_asked, n_dofs), and its record."""
+
+    displacement: Floats
+    velocity: Floats
+    record: statics.Record | implicit.Record | explicit.Record
+
+
+def solved(case: Posed, solver: Solver) -> Answer:
+    """The answer to one case, by ``sim.dynamics.solve_case``."""
+    return Answer(*solve_case(solver, case.values, case.drive))
+
+
+def equilibria(case: Posed, loads: Floats, halving: bool = False) -> list[Check]:
+    """Solves for equilibria and checks them, on request also against a path of smaller steps.
+
+    Raises:
+        SimulationError: there is none, or the record says that one is not stable.
+    """
+    solver = case.solver(loads)
+    answer = solved(case, solver)
+    checks = [
+        *admissible(case, answer.displacement),
+        *balanced(case, answer),
+        reached(case, answer.displacement, loads),
+    ]
+    if halving:
+        finer = solved(case, solver.refined(answer.record))
+        checks.append(Check("change with smaller steps", apart(case, answer, finer), 1e-6))
+    return checks
+
+
+def balanced(case: Posed, answer: Answer) -> list[Check]:
+    """Distance of equilibria from those of the definition, and whether these are minima."""
+    record = answer.record
+    assert isinstance(record, statics.Record)
+    if not record.stable.all():
+        raise SimulationError(
+            f"the record says that load {int(record.stable.argmin())} has no stable equilibrium;"
+            " try another design or more load steps"
+        )
+    free = case.topology.free_dofs
+    distance, negative = 0.0, 0
+    for state in answer.displacement:
+        away, below = _newton(case.structure, state, free)
+        distance = max(distance, _size(case, away) / max(1.0, _size(case, state)))
+        negative = max(negative, below)
+    return [
+        Check("distance from balance, mm/mm", distance, FAR_FROM_BALANCE),
+        Check("falling directions of an equilibrium", negative, 0),
+    ]
+
+
+def _newton(of: Structure, state: Floats, free: Ints) -> tuple[Floats, int]:
+    """Newton's step (n_dofs,) to balance, and the number of negative pivots of the stiffness."""
+    step = np.zeros_like(state)
+    if len(free) == 0:
+        return step, 0
+    matrix = stiffness(of, state)[np.ix_(free, free)]
+    factor = _factor(sp.csc_array(matrix))
+    step[free] = factor.solve(balance(of, state).force[free])
+    return step, negative_pivots(factor)
+
+
+def _factor(matrix: sp.csc_array) -> spla.SuperLU:
+    """A factor whose pivots stay on the diagonal: their signs are the matrix's inertia."""
+    try:
+        return spla.splu(
+            matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError as singular:
+        raise SingularError(str(singular)) from singular
+
+
+class SingularError(Exception):
+    """The stiffness that the definition has in a state is singular."""
+
+
+def negative_pivots(factor: spla.SuperLU) -> int:
+    """Number of negative eigenvalues of a symmetric matrix, from its factor."""
+    if not np.array_equal(factor.perm_r, factor.perm_c):
+        raise SingularError("a pivot left the diagonal")
+    return int((factor.U.diagonal() < 0).sum())
+
+
+def reached(case: Posed, states: Floats, times: Floats) -> Check:
+    """How far the driven units are from where they should be, mm or rad."""
+    wanted = np.asarray(case.drive.motion(times), dtype=float)
+    wanted = wanted[:, None] if wanted.ndim == 2 else wanted
+    moved = states.reshape(len(states), -1, 3)[:, case.drive.units]
+    return Check("driven units off their motion", float(np.abs(moved - wanted).max()), 1e-9)
+
+
+def admissible(case: Posed, states: Floats) -> list[Check]:
+    """Finite numbers, no void beyond its barrier, no unit through another: by geometry."""
+    motion = states.reshape(len(states), -1, 3)
+    checks = [Check("numbers that are not finite", int((~np.isfinite(states)).sum()), 0)]
+    if not checks[0].kept:
+        return checks
+    lattice, scene = case.scene.lattice, case.scene
+    if scene.contact_distance is not None:
+        overlaps = clearance(lattice, case.vertices, motion).overlaps
+        return [*checks, Check("overlapping pairs of units", int(overlaps.max()), 0)]
+    if lattice.n_ligaments == 0:
+        return checks
+    turned = np.array([case.values.void + _turns(case, state) for state in motion])
+    seen = np.array([np.asarray(_void_angles(case, state)) for state in motion])
+    off = np.abs((turned - seen + np.pi) % (2 * np.pi) - np.pi).max()
+    beyond = np.rad2deg(scene.barrier - turned.min())
+    return [
+        *checks,
+        Check("void angles off their geometry, rad", float(off), 1e-8),
+        Check("voids beyond the barrier by, deg", float(beyond), 0.0),
+    ]
+
+
+def _turns(case: Posed, state: Floats) -> Floats:
+    a, b = case.scene.lattice.ligament_units.T
+    turn = state[a, 2] - state[b, 2]
+    return np.stack([turn, -turn], axis=1)
+
+
+def _void_angles(case: Posed, state: Floats) -> Floats:
+    lattice = case.scene.lattice
+    return np.asarray(void_angles(lattice, displaced(lattice, case.vertices, state[None])[0]))
+
+
+def motions(case: Posed, asked: Floats, error: float, solver: Solver | None = None) -> list[Check]:
+    """Integrates a motion and checks it, also against one of half the steps.
+
+    Args:
+        case: the case.
+        asked: times of the output, s.
+        error: that half the steps may find, root mean square relative to that of the motion.
+        solver: by default the plan's.
+
+    Raises:
+        SimulationError: it cannot be integrated.
+    """
+    used = solver or case.solver(asked)
+    answer = solved(case, used)
+    checks = [*admissible(case, answer.displacement), reached(case, answer.displacement, asked)]
+    if isinstance(answer.record, implicit.Record):
+        assert isinstance(used, implicit.ImplicitSolver)
+        checks += stages(case, used, answer.record)
+    finer = solved(case, used.refined(answer.record))
+    return [
+        *checks,
+        Check("change with half the steps", typically_apart(case, answer, finer), error, True),
+    ]
+
+
+def stages(case: Posed, solver: implicit.ImplicitSolver, record: implicit.Record) -> list[Check]:
+    """Distance of implicit stages from those of the definition, over the tolerance."""
+    tableau, times = solver.tableau, record.times
+    n_steps, n_stages = len(times) - 1, len(tableau.nodes)
+    every = [(n, s) for n in range(n_steps) for s in range(1, n_stages)]
+    chosen = every[:: max(1, len(every) // MOST_STAGES)]
+    free, mass = case.topology.free_dofs, case.values.mass.ravel()
+    damping, worst, negative = case.values.damping.ravel(), 0.0, 0
+    for n, s in chosen:
+        h = times[n + 1] - times[n]
+        k = h * tableau.stages[s, s]
+        state = record.u[n, s]
+        inertia = mass * record.a[n, s] + damping * record.v[n, s]
+        right = (balance(case.structure, state).force - inertia)[free]
+        matrix = stiffness(case.structure, state)[np.ix_(free, free)]
+        more = sp.diags_array(((mass / k + damping) / k)[free], format="csc")
+        factor = _factor(sp.csc_array(matrix + more))
+        step = np.zeros_like(state)
+        step[free] = factor.solve(right)
+        worst = max(worst, _size(case, step) / max(solver.tolerance * h, 1e-12))
+        negative = max(negative, negative_pivots(factor))
+    return [
+        Check("stages off balance, tolerances", worst, MOST_TOLERANCES),
+        Check("falling directions of a stage", negative, 0),
+    ]
+
+
+def energies(case: Posed, answer: Answer) -> Floats:
+    """Kinetic and elastic energy (n_asked,), N mm."""
+    rates = answer.velocity.copy()
+    rates[:, case.topology.held] = 0.0
+    kinetic = 0.5 * rates**2 @ case.values.mass.ravel()
+    return kinetic + [balance(case.structure, state).energy for state in answer.displacement]
+
+
+def work(case: Posed, answer: Answer, times: Floats) -> tuple[Floats, Floats]:
+    """Work of the drive and energy lost to damping (n_asked,) up to each time, N mm.
+
+    By the trapezoidal rule, so the times must resolve the motion.
+    """
+    held = case.topology.held
+    pull = -np.array([balance(case.structure, state).force for state in answer.displacement])
+    power = (pull[:, held] * answer.velocity[:, held]).sum(axis=1)
+    rates = answer.velocity.copy()
+    rates[:, held] = 0.0
+    return _integral(power, times), _integral(rates**2 @ case.values.damping.ravel(), times)
+
+
+def _integral(values: Floats, times: Floats) -> Floats:
+    parts = (values[1:] + values[:-1]) / 2 * np.diff(times)
+    return np.concatenate([[0.0], np.cumsum(parts)])
+
+
+def apart(case: Posed, one: Answer, other: Answer) -> float:
+    """Largest difference of two answers over the largest displacement."""
+    size = max(_size(case, one.displacement), 1e-9)
+    return _size(case, one.displacement - other.displacement) / size
+
+
+def typically_apart(case: Posed, one: Answer, other: Answer) -> float:
+    """Root mean square difference of two answers over that of the first."""
+    scale = case.topology.scale
+    off, size = (
+        float(np.sqrt(np.mean((states * scale) ** 2)))
+        for states in (one.displacement - other.displacement, one.displacement)
+    )
+    return off / max(size, 1e-9)
+
+
+def _size(case: Posed, states: Floats) -> float:
+    """Largest displacement, rotations times the rotation scale, mm."""
+    return float(np.abs(states * case.topology.scale).max(initial=0.0))

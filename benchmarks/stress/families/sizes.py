@@ -1,0 +1,53 @@
+"""Lattices from 3 x 3 to 120 x 120 units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from benchmarks.stress.checks import equilibria, motions
+from benchmarks.stress.frame import Case, Check, Family
+from benchmarks.stress.posed import DISTANCE, Posed, pressed, shaken, squares
+from sim.explicit import ExplicitSolver
+from sim.implicit import ImplicitSolver
+from sim.loads import Harmonic
+
+SIDES = (3, 4, 5, 8, 15, 30, 60, 120)
+TOUCHING = 30
+"""Largest lattice that is also pressed with contact on distances."""
+
+
+def family() -> Family:
+    """The family."""
+    return Family(
+        "sizes",
+        f"squares of {SIDES[0]} to {SIDES[-1]} units a side, and strips: pressed by 10 %, shaken by"
+        " either integrator",
+        "balance by the definition, void angles and overlaps by geometry, half the steps",
+        _cases,
+    )
+
+
+def _cases(small: bool) -> Iterator[Case]:
+    shapes = [(side, side) for side in SIDES] + [(60, 2), (3, 40), (2, 2)]
+    for columns, rows in [(3, 3), (8, 8)] if small else shapes:
+        lattice, name = squares(columns, rows), f"{columns} x {rows}"
+        loads = np.array([1.0])
+        yield Case(f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads))
+        if max(columns, rows) <= TOUCHING:
+            touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+            yield Case(f"{name}, contact on distances", partial(equilibria, touching, loads))
+        if min(columns, rows) > 2:
+            case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
+            for integrator in ("implicit", "explicit"):
+                yield Case(f"{name}, shaken, {integrator}", partial(_shaken, case, integrator))
+
+
+def _shaken(case: Posed, integrator: str) -> Sequence[Check]:
+    duration, asked = case.scene.duration, np.linspace(0.0, case.scene.duration, 6)
+    if integrator == "explicit":
+        return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))
+    times = np.linspace(0.0, duration, 41)
+    return motions(case, asked, 0.05, ImplicitSolver(case.topology, times, asked))

@@ -1,0 +1,52 @@
+"""Designs whose units are as slender as the constraints let them be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from benchmarks.stress.checks import equilibria, motions
+from benchmarks.stress.drawn import Draws
+from benchmarks.stress.frame import Case, Check, Family
+from benchmarks.stress.posed import Posed, pressed, shaken, squares
+from sim.loads import Harmonic
+
+LARGEST = 7.0
+KEEP = 0.97
+SIDE = 7
+AT_BOUNDS = 0.3
+"""Smallest margin of a design that counts as being at the bounds, mm."""
+
+
+def family() -> Family:
+    """The family."""
+    return Family(
+        "slender",
+        f"designs of {SIDE} x {SIDE} units cut back from shifts of {LARGEST:g} mm until they just"
+        " keep to edges of 3 mm, corners of 30 deg, gaps of 0.2 mm: pressed by 10 %, shaken",
+        "as the random designs; and the design's own smallest margin",
+        _cases,
+    )
+
+
+def _cases(small: bool) -> Iterator[Case]:
+    lattice = squares(SIDE)
+    draws = Draws(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
+    plate = pressed(lattice, 0.1)
+    slow = shaken(lattice, Harmonic(4.5, 2.0, 0.8), duration=0.25, frequency=2.0)
+    fast = shaken(lattice, Harmonic(2.0, 60.0, 0.8), duration=0.02, frequency=60.0)
+    for seed in range(1 if small else 40):
+        for case, name in ((plate, "pressed"), (slow, "slowly shaken"), (fast, "shaken")):
+            yield Case(f"design {seed}, {name}", partial(_attempt, draws, seed, case))
+
+
+def _attempt(draws: Draws, seed: int, case: Posed) -> Sequence[Check]:
+    vertices = draws(seed)
+    margin = Check("smallest margin, mm", draws.at_bounds(vertices), AT_BOUNDS)
+    made = replace(case, vertices=vertices)
+    if case.scene.static:
+        return [margin, *equilibria(made, np.array([0.5, 1.0]))]
+    return [margin, *motions(made, np.linspace(0.0, case.scene.duration, 26), 0.05)]

@@ -1,0 +1,133 @@
+"""Scenes of the stress cases: lattices of the paper's constants under whatever is asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from benchmarks.stress.definition import Structure
+from sim.arrays import Floats, Ints
+from sim.dynamics import Drive, Solver
+from sim.lattice import Lattice, quads
+from sim.loads import LinearRamp, Motion, held_dofs
+from sim.model import Material, Topology, Values, damping_of_ratio
+from sim.plan import concrete_parameters, make_plan
+from sim.scene import Scene
+
+SPACING, LIGAMENT, BIAS = 15.0, 2.25, 20.0
+BARRIER, CUTOFF = (float(angle) for angle in np.deg2rad([-15.0, -10.0]))
+DENSITY, AXIAL, SHEAR, BENDING, CONTACT = 6.18e-9, 120.0, 1.19, 1.5, 1.5
+MATERIAL = Material(
+    DENSITY,
+    AXIAL,
+    SHEAR,
+    BENDING,
+    CONTACT,
+    *damping_of_ratio(0.0186, DENSITY, SPACING, SHEAR, BENDING),
+)
+DISTANCE = LIGAMENT / 12
+"""Activation distance of contact between units, mm."""
+NONE = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Posed:
+    """A structure under one drive.
+
+    Attributes:
+        scene: with a single load case.
+        vertices: (n_vertices, 2) of the structure, mm.
+    """
+
+    scene: Scene
+    vertices: Floats
+
+    @property
+    def topology(self) -> Topology:
+        """Of the scene."""
+        return self.scene.topology
+
+    @property
+    def drive(self) -> Drive:
+        """Of its load case."""
+        return self.scene.drives[0]
+
+    @cached_property
+    def values(self) -> Values:
+        """Parameters of the structure."""
+        return concrete_parameters(self.scene, self.vertices)
+
+    @property
+    def structure(self) -> Structure:
+        """As the definition takes it."""
+        scene = self.scene
+        limits = (scene.barrier, scene.cutoff, scene.contact_distance)
+        return Structure(scene.lattice, self.vertices, self.values, *limits)
+
+    def solver(self, asked: Floats) -> Solver:
+        """What the plan chooses for output at these times."""
+        return make_plan(self.scene, self.vertices, asked, every_case=True).solver
+
+    def with_material(self, **constants: Any) -> Posed:  # noqa: ANN401  (numbers or arrays)
+        """The same of other constants."""
+        material = self.scene.material._replace(**constants)
+        return replace(self, scene=replace(self.scene, material=material))
+
+
+def squares(columns: int, rows: int | None = None, bias: float = BIAS) -> Lattice:
+    """The paper's lattice, its squares turned by ``bias`` (deg)."""
+    return quads(columns, rows or columns, SPACING, LIGAMENT, np.deg2rad(bias))
+
+
+def posed(
+    lattice: Lattice,
+    clamped: Sequence[int] | Ints,
+    driven: Sequence[int] | Ints,
+    motion: Motion,
+    **more: Any,  # noqa: ANN401
+) -> Posed:
+    """Units clamped and driven, in time unless the scene is said to be static.
+
+    Args:
+        lattice: at rest.
+        clamped: units that rest.
+        driven: units that follow the motion.
+        motion: of these.
+        **more: further fields of the scene; by default it lasts 1 s and the drive has no frequency.
+    """
+    every = np.arange(lattice.n_units)
+    fields: dict[str, Any] = {
+        "material": MATERIAL,
+        "barrier": BARRIER,
+        "cutoff": CUTOFF,
+        "clamped": held_dofs(np.asarray(clamped, dtype=np.int64), NONE),
+        "driven": np.asarray(driven, dtype=np.int64),
+        "motions": (motion,),
+        "weights": np.ones(1),
+        "duration": 1.0,
+        "frequency": None,
+        "static": False,
+        "cloak": every,
+        "region": every,
+    }
+    return Posed(Scene(lattice=lattice, **(fields | more)), lattice.vertices)
+
+
+def pressed(lattice: Lattice, share: float, **more: Any) -> Posed:  # noqa: ANN401
+    """Between plates, the left one clamped, the right one pushed in by a share of the width."""
+    left = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].min())
+    right = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].max())
+    depth = share * (1 + np.ptp(lattice.index[:, 0])) * lattice.spacing
+    return posed(lattice, left, right, LinearRamp(-depth, 1.0), static=True, **more)
+
+
+def shaken(lattice: Lattice, motion: Motion, **more: Any) -> Posed:  # noqa: ANN401
+    """Clamped at its four corners, the middle unit driven."""
+    columns, rows = np.ptp(lattice.index, axis=0) + 1
+    corners = np.array([0, columns - 1, columns * (rows - 1), columns * rows - 1])
+    middle = columns * (rows // 2) + columns // 2
+    return posed(lattice, corners, np.array([middle]), motion, **more)
