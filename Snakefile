@@ -13,7 +13,13 @@ from pipeline.studies import FRAMED, families, figures, joints, movies, targets
 from pipeline.workflow import any_of, check_problems, check_room, chunks, comparisons_of
 from pipeline.workflow import copies, datasets_of, designs, hashes_of, member_hashes
 from pipeline.workflow import members, options, packages, prepare_jobs, product_pages
-from pipeline.workflow import robust_designs, section, shown, shown_options
+from pipeline.workflow import (
+    robust_designs,
+    section,
+    shown,
+    shown_options,
+    start_design,
+)
 
 min_version("9.20")
 

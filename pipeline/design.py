@@ -38,6 +38,8 @@ def parser() -> argparse.ArgumentParser:
     )
     made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    told = "the design to start from, where the problem has optimiser.start: study"
+    made.add_argument("--start", type=Path, metavar="NC", help=told)
     made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
     return made
 
@@ -46,10 +48,12 @@ def work(args: argparse.Namespace) -> None:
     """Reads the problem, optimises, writes the design.
 
     Raises:
-        UserError: a fault of the problem, no feasible start, or a start that cannot be simulated.
+        UserError: a fault of the problem, no feasible start, or a start that cannot be simulated
+            or is none of this problem's.
     """
     from pipeline import datasets, provenance
     from pipeline.robust import design_scene
+    from pipeline.starting import start_of
     from sim.plan import make_plan
 
     asked = problem.load(args.problem, args.preset)
@@ -64,10 +68,14 @@ def work(args: argparse.Namespace) -> None:
     _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent)
+    start = start_of(asked, scene, args.start, args.problem)
+    result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent, start)
     LOG.info("stopped: %s", result.reason)
     made = design_dataset(asked, scene, result)
-    origin = provenance.attributes(asked, "design", method=args.method, plan=plan.record())
+    parents = {} if args.start is None else {"start": args.start}
+    origin = provenance.attributes(
+        asked, "design", method=args.method, parents=parents, plan=plan.record()
+    )
     datasets.write(made, args.out, "design_method", origin)
 
 

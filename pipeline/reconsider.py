@@ -17,10 +17,7 @@ from pipeline.problem.optimiser import Method, Methods
 from pipeline.select import join
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from pipeline.problem import Problem
-    from pipeline.structures import Floats
 
 LOG = logging.getLogger(__name__)
 
@@ -51,6 +48,7 @@ def work(args: argparse.Namespace) -> None:
     """
     from pipeline import datasets, provenance
     from pipeline.robust import design_scene
+    from pipeline.starting import shipped_vector
     from pipeline.structures import read_design
     from sim.plan import make_plan
 
@@ -79,13 +77,6 @@ def again(asked: Problem, evaluations: int) -> Problem:
     methods = Methods(sqp=Method(evaluations=evaluations))
     optimiser = asked.optimiser.model_copy(update={"methods": methods})
     return contacts.geometric(asked).model_copy(update={"optimiser": optimiser})
-
-
-def shipped_vector(design: xr.Dataset) -> Floats:
-    """The design vector (n_variables,) of a design."""
-    history = design.sel({"method": design.attrs["shipped_method"]})
-    best = int(history["best_evaluation"])
-    return np.asarray(history["design_vector"].isel(evaluation=best).values)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

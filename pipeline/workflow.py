@@ -134,6 +134,12 @@ def designs(wildcards: Wildcards) -> list[str]:
     ]
 
 
+def start_design(wildcards: Wildcards) -> list[str]:
+    """The design that an optimisation starts from, where it is not the initial lattice."""
+    wanted = problem_of(study_of(wildcards)).optimiser.start == "study"
+    return [f"results/{wildcards.name}/design.nc"] if wanted else []
+
+
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
     """The study's own design ("plain") and those of its presets that ask for more."""
     own = problem_of(Study(wildcards.name))

@@ -51,6 +51,9 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
         raise told(error, document, data, preset) from error
     if problem.sweep is not None:
         _check_sweep(problem.sweep, document, data, preset)
+    if preset is None and problem.optimiser.start == "study":
+        what, remedy = "a study cannot start from its own design", "say so in a preset of it"
+        raise _user_error(document, preset, data, ("optimiser", "start"), what, remedy)
     for finding in findings(problem):
         raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
     return _with_recording(problem, document)

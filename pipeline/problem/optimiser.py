@@ -46,6 +46,7 @@ class Optimiser(Section):
 
     Attributes:
         methods: one or both.
+        start: from the initial lattice; or, in a preset, from the design of the study itself.
         geometric: the budget with which a design by the angle law of contact is optimised again
             with contact on distance, where its loss depends on the law.
         symmetry: that the design is to have.
@@ -57,6 +58,7 @@ class Optimiser(Section):
     """
 
     methods: Methods
+    start: Literal["initial", "study"] = "initial"
     geometric: Method = Method(evaluations=60)
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
     trust_radius: Length = 0.25

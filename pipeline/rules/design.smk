@@ -1,7 +1,8 @@
 # Two methods, one thread each: they run side by side on two cores.
 rule design:
     input:
-        ancient("experiments/{name}/problem.yaml"),
+        problem=ancient("experiments/{name}/problem.yaml"),
+        start=start_design,
     output:
         "results/{name}{preset}/design_{method}.nc",
     log:
@@ -12,12 +13,13 @@ rule design:
         runtime=480,
     params:
         study=options,
+        start=lambda wildcards, input: [f"--start {path}" for path in input.start],
         problem=section("design"),
         source=source_hash("pipeline.design"),
     message:
         "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
     shell:
-        "python -m pipeline.design {params.study} --method {wildcards.method}"
+        "python -m pipeline.design {params.study} --method {wildcards.method} {params.start}"
         " --out {output} --log {log}"
 
 

@@ -15,11 +15,19 @@ from pipeline import failures, run
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.problem import load
+from pipeline.problem.loading import overlaid
 from pipeline.tracking import recognition
 from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
 
 FAQ = blocks("docs/faq.md")
+
+
+def yaml_of(page: str) -> list[Block]:
+    """The examples of a page."""
+    return [block for block in blocks(page) if block.language == "yaml"]
+
+
 MISTAKES = [
     (block, told)
     for block, told in pairwise(FAQ)
@@ -75,10 +83,21 @@ def test_the_paper_is_cited_as_in_the_citation_file() -> None:
             assert value in cited, line
 
 
-@pytest.mark.parametrize("block", blocks("docs/sweeps.md"), ids=lambda block: block.place)
+@pytest.mark.parametrize("block", yaml_of("docs/sweeps.md"), ids=lambda block: block.place)
 def test_a_sweep_is_valid(block: Block, tmp_path: Path) -> None:
     problem = tmp_path / "problem.yaml"
     (section,) = yaml.safe_load(block.text).items()
     whole = yaml.safe_load((ROOT / block.place).read_text())
     problem.write_text(yaml.safe_dump(whole | dict([section])))
     assert getattr(load(problem), section[0]) is not None
+
+
+@pytest.mark.parametrize("block", yaml_of("docs/robust.md"), ids=lambda block: block.text[30:60])
+def test_what_a_design_is_to_hold_against_is_valid(block: Block, tmp_path: Path) -> None:
+    """Laid over the file, as a preset is; a preset by itself is loaded as one."""
+    problem = tmp_path / "problem.yaml"
+    given = yaml.safe_load(block.text)
+    preset = next(iter(given.get("presets", {})), None)
+    whole = yaml.safe_load((ROOT / block.place).read_text())
+    problem.write_text(yaml.safe_dump(overlaid(whole, given)))
+    assert load(problem, preset) != load(ROOT / block.place)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
-from pipeline import datasets, design, gains
+from pipeline import datasets, design, gains, select
 from pipeline.errors import UserError
 from pipeline.problem import load
+from pipeline.problem.loading import overlaid
 from pipeline.robust import design_scene
 from reports.gains import build
 from sim.loads import Harmonic
@@ -106,3 +109,37 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     times = np.linspace(0.0, 0.4, 401)
     largest = max(np.abs(drive.motion(times)).max() for drive in scene.drives)
     assert largest == pytest.approx(4.5)
+
+
+def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path) -> None:
+    content = yaml.safe_load(fig2.read_text())
+    presets, again = content["presets"], {"optimiser": {"start": "study"}}
+    presets["again"] = overlaid(presets["quick"], again)
+    path = tmp_path / "problem.yaml"
+    path.write_text(yaml.safe_dump(content))
+    words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset"]
+    own, chosen, out = (tmp_path / name for name in ("sqp.nc", "design.nc", "again.nc"))
+    assert design.main([*words, "quick", "--out", str(own)]) == 0
+    picked = ["--problem", str(path), "--preset", "quick", "--quiet", "--designs", str(own)]
+    assert select.main([*picked, "--out", str(chosen)]) == 0
+    assert design.main([*words, "again", "--start", str(chosen), "--out", str(out)]) == 0
+    before, after = (datasets.read(name, "design_method") for name in (own, out))
+    assert float(after["loss"][0]) == pytest.approx(float(before["best_loss"]), rel=1e-6)
+    assert json.loads(after.attrs["parents"])["start"]
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_start_is_given_where_one_is_asked_for(
+    fig2: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: bool
+) -> None:
+    words = ["--problem", str(fig2), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
+    more = ["--start", str(tmp_path / "design.nc")] if given else ["--preset", "worst"]
+    assert design.main([*words, *more]) == 2
+    assert "optimiser.start" in capsys.readouterr().err
+
+
+def test_a_study_does_not_start_from_itself(fig2: Path, tmp_path: Path) -> None:
+    path = tmp_path / "problem.yaml"
+    path.write_text(fig2.read_text().replace("  seed: 0\n", "  seed: 0\n  start: study\n", 1))
+    with pytest.raises(UserError, match="cannot start from its own design"):
+        load(path)
