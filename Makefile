@@ -16,7 +16,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -39,6 +39,7 @@ help:
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
 	@echo "make stress    try to break the numbers: results/stress/index.html; fails if any is wrong"
+	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs kills places)"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
 	@echo "make setup     only make .venv from requirements.lock; with WHEELS=folder, from that folder alone"
 	@echo "make wheels WHEELS=folder   download what make setup needs into the folder"
@@ -121,6 +122,9 @@ bench-tracking: setup
 stress: setup
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \
 	    $(BIN)/python -m reports.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
+
+survive: setup
+	$(BIN)/python -m tests.hostile $(PARTS)
 
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }

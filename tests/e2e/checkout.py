@@ -103,9 +103,12 @@ class Checkout:
         return self._run([".venv/bin/snakemake", *(words or (STUDY,))])
 
     def stage(self, module: str, *words: str, first: str = "") -> Ended:
-        problem = f"experiments/{STUDY}/problem.yaml"
-        command = [".venv/bin/python", "-m", module, "--problem", problem, *words]
-        return self._run(command, first)
+        return self.module(
+            module, "--problem", f"experiments/{STUDY}/problem.yaml", *words, first=first
+        )
+
+    def module(self, module: str, *words: str, first: str = "") -> Ended:
+        return self._run([".venv/bin/python", "-m", module, *words], first)
 
     def shell(self, commands: str) -> Ended:
         """Commands as a user types them, but for `make` setting up the environment."""

@@ -1,0 +1,1 @@
+"""The page on what was tried to lose or to spoil results, and what survived."""

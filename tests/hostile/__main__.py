@@ -1,0 +1,132 @@
+"""Tries to lose or to spoil something: ``python -m tests.hostile [inputs] [kills] [places]``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pipeline.environment import ROOT
+from pipeline.provenance import git_commit
+from pipeline.whole import whole
+from reports.survival import build
+from tests.e2e.checkout import Checkout
+from tests.hostile import inputs, kills, places
+
+Part = dict[str, Any]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Tries what is asked for, and writes the counts and the page; 1 if something was lost."""
+    asked = _parser().parse_args(arguments)
+    parts: dict[str, Callable[[argparse.Namespace], Part]] = {
+        "inputs": _inputs,
+        "kills": _kills,
+        "places": _places,
+    }
+    lost = 0
+    for name in asked.parts or parts:
+        made = {**parts[name](asked), "seed": asked.seed, "commit": git_commit()}
+        with whole(asked.out / f"{name}.json") as aside:
+            text = json.dumps(made, indent=1, ensure_ascii=False)
+            aside.write_text(f"{text}\n", encoding="utf-8")
+        lost += len(made["faults"])
+        _tell(
+            f"{name}: {sum(row['tried'] for row in made['rows'])} tried, {len(made['faults'])} lost"
+        )
+    build.build(asked.out)
+    return int(lost > 0)
+
+
+def _inputs(asked: argparse.Namespace) -> Part:
+    found = inputs.outcomes(asked.inputs, asked.seed)
+    wrong = [each for each in found if each["end"] == "wrong"]
+    rows = [
+        {**row, "survived": row["tried"] - row["wrong"]} for row in inputs.counts(found, "subject")
+    ]
+    faults = [f"{one['number']}: {one['subject']}, {one['damage']}: {one['note']}" for one in wrong]
+    return {"rows": rows, "faults": faults}
+
+
+@contextmanager
+def _built() -> Iterator[tuple[Checkout, float]]:
+    """A checkout with a small study, built; and how long that took, in s."""
+    with tempfile.TemporaryDirectory() as folder:
+        checkout = kills.filmed(Checkout.made(Path(folder, "checkout")))
+        checkout.take_kernels(ROOT)
+        kills.finished(checkout)  # compiles
+        again = checkout.copied(Path(folder, "grüße, again"))
+        again.take_kernels(checkout.root)
+        start = time.monotonic()
+        kills.finished(again)
+        yield again, time.monotonic() - start
+
+
+def _kills(asked: argparse.Namespace) -> Part:
+    found: list[kills.Kill] = []
+
+    def tell(kill: kills.Kill) -> None:
+        found.append(kill)
+        _tell(str(kill))
+
+    with _built() as (checkout, span):
+        other = checkout.copied(checkout.root.with_name("killed"))
+        other.take_kernels(checkout.root)
+        wanted = kills.built(checkout)
+        faults = kills.killed(other, wanted, asked.kills, asked.seed, span, tell)
+    rows = [
+        {
+            "what": stage,
+            "tried": len(ends := [kill for kill in found if kill.at_work == stage]),
+            "while writing": sum(bool(kill.writing) for kill in ends),
+            "survived": 0 if faults else len(ends),
+        }
+        for stage in dict.fromkeys(kill.at_work for kill in found)
+    ]
+    return {"rows": rows, "faults": faults, "kills": [vars(kill) for kill in found]}
+
+
+def _places(asked: argparse.Namespace) -> Part:
+    del asked
+    found: list[places.Tried] = []
+    with _built() as (checkout, _):
+        for attempt in places.ALL:
+            for one in attempt(checkout):
+                found.append(one)
+                _tell(str(one))
+    rows = [
+        {
+            "what": place,
+            "tried": len(ends := [one for one in found if one.place == place]),
+            "survived": sum(not one.fault for one in ends),
+        }
+        for place in dict.fromkeys(one.place for one in found)
+    ]
+    faults = [f"{one.place}, {one.what}: {one.fault}" for one in found if one.fault]
+    return {"rows": rows, "faults": faults}
+
+
+def _tell(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m tests.hostile", description=__doc__)
+    parser.add_argument("parts", nargs="*", metavar="part", help="inputs, kills, places; all")
+    parser.add_argument("--inputs", type=int, default=1000, help="damaged files (%(default)s)")
+    parser.add_argument("--kills", type=int, default=50, help="killed runs (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of what is random (%(default)s)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("results/survival"), help="folder (%(default)s)"
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

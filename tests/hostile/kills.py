@@ -1,0 +1,155 @@
+"""A small study from end to end, killed at random moments: what is there at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from random import Random
+
+import yaml
+
+from pipeline.problem.loading import overlaid
+from tests.e2e.checkout import Checkout
+
+RECORDING = {
+    "title": "A small specimen",
+    "structure": "cloaked",
+    "specimen": "bare",
+    "pixel_size": "0.4 mm",
+    "virtual": {
+        "rate": "30 Hz",
+        "camera": {"image": [256, 256], "pixel_size": "0.4 mm"},
+        "codec": {"name": "h264", "crf": 14},
+    },
+}
+SMALLEST = {
+    "optimiser": {"methods": {"sqp": {"evaluations": 4}, "mma": None}},
+    "prediction": {"samples": 2},
+    "sweep": {"grid": {"drive.directions": {"points": 2}, "drive.frequency": {"points": 2}}},
+}
+NOT_RESULTS = ("logs", ".journal")
+
+
+@dataclass(frozen=True)
+class Kill:
+    """One end of a run.
+
+    Attributes:
+        after: seconds since its start.
+        writing: files that were being written.
+        at_work: the newest log: the stage that was at work.
+    """
+
+    after: float
+    writing: tuple[str, ...]
+    at_work: str
+
+
+def filmed(checkout: Checkout) -> Checkout:
+    """The checkout with a study as small as can be, and a recording of it."""
+    asked = yaml.safe_load(checkout.problem.read_text(encoding="utf-8"))
+    asked = overlaid(asked, SMALLEST)
+    checkout.problem.write_text(yaml.safe_dump(asked, sort_keys=False), encoding="utf-8")
+    folder = checkout.problem.parent / "recordings"
+    folder.mkdir(exist_ok=True)
+    (folder / "cloaked.yaml").write_text(yaml.safe_dump(RECORDING), encoding="utf-8")
+    return checkout
+
+
+def built(checkout: Checkout) -> dict[str, bytes]:
+    """All results, by name."""
+    found = (path for path in sorted(checkout.results.rglob("*")) if path.is_file())
+    named = {path.relative_to(checkout.results): path for path in found}
+    return {
+        str(name): path.read_bytes()
+        for name, path in named.items()
+        if name.parts[0] not in NOT_RESULTS
+    }
+
+
+def finished(checkout: Checkout) -> None:
+    """Builds the study to its end."""
+    ended = checkout.make()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+
+
+def killed(
+    checkout: Checkout,
+    wanted: dict[str, bytes],
+    count: int,
+    seed: int,
+    span: float,
+    tell: Callable[[Kill], None],
+) -> list[str]:
+    """Kills so many runs at random, each going on where the last was; what differs in the end.
+
+    Half of the kills wait for a file that is being written. A run that ends before its kill must
+    have built what is wanted; the next one begins anew.
+
+    Args:
+        checkout: where they run.
+        wanted: the results of an undisturbed run.
+        count: of kills.
+        seed: of the moments.
+        span: the longest time that a kill waits, s.
+        tell: is given each kill.
+    """
+    random, wrong, left = Random(seed), [], count
+    while left:
+        kill = _one(checkout, random, span)
+        if kill is None:
+            wrong += _differences(checkout, wanted)
+            shutil.rmtree(checkout.results)
+        else:
+            left -= 1
+            tell(kill)
+    finished(checkout)
+    return wrong + _differences(checkout, wanted)
+
+
+def _one(checkout: Checkout, random: Random, span: float) -> Kill | None:
+    """A run that is killed, with all that it started; None if it ended by itself."""
+    writing, moment = random.random() < 0.5, random.uniform(0.5, span)
+    start = time.monotonic()
+    run = checkout.start()
+    while run.poll() is None:
+        after = time.monotonic() - start
+        parts = _parts(checkout)
+        if (after > moment and not writing) or (parts and after > moment / 4 and writing):
+            os.killpg(run.pid, signal.SIGKILL)
+            run.communicate()
+            return Kill(round(after, 3), parts, _at_work(checkout))
+        time.sleep(0.001)
+    _check_end(run)
+    return None
+
+
+def _check_end(run: subprocess.Popen[str]) -> None:
+    told = run.communicate()[0]
+    assert run.returncode == 0, told
+
+
+def _parts(checkout: Checkout) -> tuple[str, ...]:
+    found = checkout.results.rglob(".*part*")
+    return tuple(sorted(path.name for path in found))
+
+
+def _at_work(checkout: Checkout) -> str:
+    logs = list((checkout.results / "logs").glob("*.log"))
+    return max(logs, key=_date).stem if logs else "nothing yet"
+
+
+def _date(path: Path) -> float:
+    return path.stat().st_mtime
+
+
+def _differences(checkout: Checkout, wanted: dict[str, bytes]) -> list[str]:
+    found = built(checkout)
+    names = sorted(found.keys() | wanted.keys())
+    return [name for name in names if found.get(name) != wanted.get(name)]

@@ -1,0 +1,210 @@
+"""Places where nobody should work: full disks, odd paths, wrong clocks, no terminal, no fonts."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.e2e.checkout import STUDY, Checkout
+from tests.e2e.test_mistakes import LITTLE_ROOM, ORDINARY_RIGHTS
+from tests.hostile.kills import built, finished
+
+YEAR = 365 * 86400
+ROOM_KIB = 24
+TARGET = Path("results") / STUDY
+SILENT = (
+    "exec 0<&- 1>&- 2>&-; unset TERM; exec make --old-file=.venv/requirements.lock --old-file=setup"
+)
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One attempt.
+
+    Attributes:
+        place: what was wrong with it.
+        what: what was attempted there.
+        fault: what went wrong; empty where it was survived.
+    """
+
+    place: str
+    what: str
+    fault: str = ""
+
+
+def stages(out: Path) -> dict[str, list[str]]:
+    """The command lines of the stages that write, their inputs being built, to a folder."""
+    study = ["--problem", f"experiments/{STUDY}/problem.yaml"]
+    design, response = (f"{TARGET}/{name}.nc" for name in ("design", "response"))
+    film, track = f"{TARGET}/recordings/cloaked", f"{TARGET}/recordings/cloaked/track.nc"
+    shown = ["--design", design, "--response", response]
+    return {
+        "select": [*study, "--designs", f"{TARGET}/design_sqp.nc", "--out", f"{out}/design.nc"],
+        "simulate": [*study, "--design", design, "--out", f"{out}/response.nc"],
+        "virtual_lab": [
+            *("render", f"experiments/{STUDY}/recordings/cloaked.yaml", *shown),
+            *("--out", f"{out}/film.mp4"),
+        ],
+        "track": [f"{film}.yaml", "--design", design, "--out", f"{out}/track.nc", "--no-report"],
+        "compare": [
+            *(*study, *shown, "--recording", f"{film}.yaml", "--track", track),
+            *("--out", f"{out}/comparison.nc"),
+        ],
+        "report": [
+            *(*study, *shown, "--sweep", f"{TARGET}/sweep.nc", "--comparisons"),
+            *(f"{TARGET}/recordings/cloaked/comparison.nc", "--out-dir", f"{out}/report"),
+        ],
+    }
+
+
+def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> str:
+    """The fault of a stage that must fail in words, or an empty text."""
+    module = "reports.build" if name == "report" else f"pipeline.{name}"
+    ended = checkout.module(module, *words, first=first)
+    told = ended.stdout + ended.stderr
+    if ended.returncode == 0:
+        return "it says that it has succeeded"
+    if "Traceback" in told or told.count("error: ") != 1 or "remedy:" not in told:
+        return told
+    return ""
+
+
+def _left(folder: Path, before: Mapping[Path, bytes]) -> str:
+    """What is other than it was in a folder, or an empty text."""
+    now = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return "" if now == before else f"left behind: {sorted(map(str, now))}"
+
+
+def refused(checkout: Checkout, place: str, folder: Path, first: str) -> Iterator[Tried]:
+    """Every stage, where it cannot write what it should; what was there stays."""
+    for name, words in stages(folder).items():
+        before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+        fault = _run(checkout, name, words, first) or _left(folder, before)
+        yield Tried(place, name, fault)
+
+
+def small_files(checkout: Checkout) -> Iterator[Tried]:
+    """Files may not grow: libraries meet it in the middle of a write, as on a full disk."""
+    with tempfile.TemporaryDirectory() as folder:
+        room = LITTLE_ROOM.replace("16 << 10, 16 << 10", "2 << 10, 2 << 10")
+        yield from refused(checkout, "limit of file sizes", Path(folder), room)
+
+
+@contextmanager
+def _small_disk() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory() as folder:
+        size = f"size={ROOM_KIB}k"
+        subprocess.run(["mount", "-t", "tmpfs", "-o", size, "tmpfs", folder], check=True)
+        try:
+            yield Path(folder)
+        finally:
+            subprocess.run(["umount", folder], check=True)
+
+
+def full_disk(checkout: Checkout) -> Iterator[Tried]:
+    """A file system of some KiB."""
+    with _small_disk() as folder:
+        (folder / "ballast").write_bytes(bytes((ROOM_KIB - 8) << 10))
+        yield from refused(checkout, "full disk", folder, "")
+
+
+def read_only(checkout: Checkout) -> Iterator[Tried]:
+    """A folder that may not be written to."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name, "closed")
+        folder.mkdir(mode=0o555)
+        yield from refused(checkout, "read-only folder", folder, ORDINARY_RIGHTS)
+
+
+def two_at_once(checkout: Checkout) -> Iterator[Tried]:
+    """Two processes that write the same file."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = stages(Path(folder))["simulate"]
+        command = [".venv/bin/python", "-m", "pipeline.simulate", *words]
+        runs = [
+            subprocess.Popen(command, cwd=checkout.root, stderr=subprocess.DEVNULL) for _ in "12"
+        ]
+        codes = [run.wait() for run in runs]
+        same = (
+            Path(folder, "response.nc").read_bytes()
+            == (checkout.results / "response.nc").read_bytes()
+        )
+        fault = "" if same and 0 in codes else f"exit codes {codes}, same bytes: {same}"
+        yield Tried("two runs at once", "simulate", fault)
+
+
+def wrong_clock(checkout: Checkout) -> Iterator[Tried]:
+    """The clock was set: files are of the future, or of a distant past."""
+    wanted = built(checkout)
+    for place, date in (("clock set back", time.time() + YEAR), ("clock set on", YEAR)):
+        for path in (*checkout.results.rglob("*"), *(checkout.root / "experiments").rglob("*")):
+            os.utime(path, (date, date))
+        yield Tried(place, "make", _made(checkout, wanted))
+        again = checkout.snakemake()
+        told = again.stdout + again.stderr
+        yield Tried(place, "make again", "" if "Nothing to be done" in told else told)
+
+
+def _made(checkout: Checkout, wanted: Mapping[str, bytes]) -> str:
+    """What goes wrong when the study is built, if anything."""
+    try:
+        finished(checkout)
+    except AssertionError as error:
+        return str(error)
+    return "" if built(checkout) == wanted else "other bytes"
+
+
+def no_terminal(checkout: Checkout) -> Iterator[Tried]:
+    """Standard streams are closed, there is no TERM."""
+    wanted = built(checkout)
+    shutil.rmtree(checkout.results / "recordings")
+    command = ["bash", "-c", f"{SILENT} {STUDY}"]
+    subprocess.run(command, cwd=checkout.root, check=False)
+    fault = "" if built(checkout) == wanted else "not built"
+    yield Tried("no terminal", "make", fault)
+
+
+def no_fonts(checkout: Checkout) -> Iterator[Tried]:
+    """No home, no fonts of the system, no cache of them."""
+    with tempfile.TemporaryDirectory() as folder:
+        nowhere = {"HOME": "/nonexistent", "FONTCONFIG_FILE": "/nonexistent"}
+        nowhere |= {"XDG_CACHE_HOME": f"{folder}/cache", "MPLCONFIGDIR": f"{folder}/matplotlib"}
+        command = [".venv/bin/python", "-m", "reports.build", *stages(Path(folder))["report"]]
+        environment = {**os.environ, **nowhere}
+        ended = subprocess.run(
+            command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False
+        )
+        made = {path.name: path.read_bytes() for path in Path(folder, "report").iterdir()}
+        report = checkout.results / "report"
+        same = made == {path.name: path.read_bytes() for path in report.iterdir()}
+        yield Tried("missing fonts", "report", "" if same else ended.stderr or "other bytes")
+
+
+def odd_paths(checkout: Checkout) -> Iterator[Tried]:
+    """Spaces, quotes, other scripts, words of a shell, and the longest paths."""
+    wanted = built(checkout)
+    with tempfile.TemporaryDirectory() as folder:
+        names = {
+            "non-ASCII and spaces": "größe 漢字 with spaces",
+            "quotes and a shell's words": """it's "$(touch pwned)"; `touch pwned` & $HOME""",
+            "very long": "/".join(["a" * 200] * 12),
+        }
+        for place, name in names.items():
+            other = checkout.copied(Path(folder) / name)
+            other.take_kernels(checkout.root)
+            fault = _made(other, wanted)
+            pwned = list(Path(folder).rglob("pwned"))
+            yield Tried(f"path: {place}", "make", fault or ("a command was run" if pwned else ""))
+
+
+ALL: tuple[Callable[[Checkout], Iterator[Tried]], ...] = (
+    *(small_files, full_disk, read_only, two_at_once, no_fonts, no_terminal, wrong_clock),
+    odd_paths,
+)

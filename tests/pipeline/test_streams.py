@@ -1,0 +1,35 @@
+"""A process without standard streams writes no messages into its datasets."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+CLOSED = """
+import os, sys
+for number in (0, 1, 2):
+    os.close(number)
+os.execv(sys.argv[1], [sys.argv[1], "-c", sys.argv[2], sys.argv[3]])
+"""
+STAGE = """
+import os, sys
+from pathlib import Path
+from pipeline import cli
+def work(args):
+    with open(args.out, "w") as file:
+        os.write(2, b"a library complains")
+        print("so does Python", file=sys.stderr)
+        cli.logging.getLogger("pipeline").warning("and the stage")
+        file.write(f"whole {file.fileno() > 2}")
+made = cli.parser("stage", "", study=False)
+made.add_argument("out")
+sys.exit(cli.run(work, made, sys.argv[1:]))
+"""
+
+
+def test_messages_of_a_process_without_streams_go_nowhere(tmp_path: Path) -> None:
+    out = tmp_path / "out.txt"
+    command = [sys.executable, "-c", CLOSED, sys.executable, STAGE, str(out)]
+    subprocess.run(command, check=True)
+    assert out.read_text(encoding="utf-8") == "whole True"
