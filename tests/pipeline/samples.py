@@ -50,6 +50,7 @@ SIZES = {
     "compression": 2,
     "wave": 7,
     "band": 12,
+    "preset": 3,
 }
 
 

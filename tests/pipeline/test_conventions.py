@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets, provenance
-from pipeline.datasets import SCHEMA_VERSION, TABLES, Kind, Variable
+from pipeline.datasets import SCHEMA_VERSION, TABLES, Kind, Variable, seal
 from tests.pipeline.samples import sample
 
 KINDS: tuple[Kind, ...] = tuple(TABLES)
@@ -73,6 +73,7 @@ def test_a_file_of_the_first_version_is_read(kind: Kind, tmp_path: Path) -> None
     with netCDF4.Dataset(path, "a") as raw:
         raw.schema_version = 1
         raw.delncattr("title")
+        raw.delncattr(seal.ATTRIBUTE)
         for name, variable in raw.variables.items():
             table = TABLES[kind][name]
             pixels = "pixels" in table.long_name and table.units == "1"
