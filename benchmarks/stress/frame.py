@@ -42,6 +42,11 @@ class Check(NamedTuple):
         """Whether the number is within its limit."""
         return self.value <= self.limit
 
+    @property
+    def share(self) -> float:
+        """The number over its limit; where that is zero, the number."""
+        return self.value / self.limit if self.limit else self.value
+
 
 @dataclass(frozen=True)
 class Case:
@@ -111,7 +116,7 @@ class Tally:
         for outcome in self.outcomes:
             for check in outcome.checks if outcome.verdict == "solved" else ():
                 known = found.get(check.name)
-                if known is None or check.value * known.limit > known.value * check.limit:
+                if known is None or check.share > known.share:
                     found[check.name] = check
         return list(found.values())
 

@@ -67,6 +67,13 @@ def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
     assert tally.worst == found(0.5)
 
 
+def test_the_worst_of_all_answers_is_shown() -> None:
+    beyond = [[Check("beyond, deg", value, 0.0)] for value in (-2.0, -0.5, -1.0)]
+    cases = [Case("toy", lambda made=made: made) for made in beyond]  # type: ignore[misc]
+    tally = Tally(Family("toy", "", "", lambda _: ()), tuple(map(attempted, cases)))
+    assert tally.worst == beyond[1]
+
+
 def values_of(made: list[Check]) -> dict[str, Check]:
     return {check.name: check for check in made}
 
