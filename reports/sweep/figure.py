@@ -22,7 +22,7 @@ from reports.sweep.cases import Axis, Floats
 _LEFT, _PITCH, _WIDTH, _HEIGHT = 13.0, 59.0, 44.0, 38.0
 _TOP, _ROW = 9.0, 50.0
 _MAP_WIDTH, _BAR = 36.0, 2.2
-_MANY = 2000  # points, above which they are drawn as pixels: a page has to open
+_MANY = 500  # points, above which they are drawn as pixels: a page has to open
 _BINS, _FEWEST = 10, 200  # of medians; below so many cases there are none
 
 
@@ -98,8 +98,18 @@ def _against(axes: Axes, axis: Axis, measure: Measure, *, joined: bool) -> None:
             _median(axes, axis.places, values, colour)
     if measure.level is not None:
         axes.axhline(measure.level, color=style.GREY, lw=0.6, ls=(0, (4, 2)), zorder=1)
+    if _is_wide(measure):
+        axes.set_yscale("log")
     _name(axes, axis, "x")
     axes.set_ylabel(measure.label)
+
+
+def _is_wide(measure: Measure) -> bool:
+    """Whether a measure is positive and spans more than a factor of ten."""
+    level = [] if measure.level is None else [measure.level]
+    values = np.concatenate([*measure.values.values(), level])
+    values = values[np.isfinite(values)]
+    return len(values) > 0 and bool(0.0 < 10 * values.min() < values.max())
 
 
 def _median(axes: Axes, places: Floats, values: Floats, colour: str) -> None:
