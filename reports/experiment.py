@@ -72,7 +72,11 @@ def _alignment(recording: Recorded) -> Iterator[Fact]:
     yield number(f"{name}_scale", "Scale", scale, digits=5, note=note)
     if int(data["band_samples"]):
         values = data["band_coverage"].values
-        note = f"mean of u_x, u_y and θ; band of {int(data['band_samples'])} simulations"
+        usual = 100 * float(np.nanmean(data["band_coverage_usual"].values))
+        note = (
+            f"mean of u_x, u_y and θ; band of {int(data['band_samples'])} simulations, of which"
+            f" 95 % have {usual:.3g} % or more of their own motion within"
+        )
         label = "Measurements within the band"
         yield share(f"{name}_coverage", label, float(np.nanmean(values)), note=note)
     force = float(data["force_rmse"].sel(side="simulated", estimate="value"))

@@ -151,3 +151,21 @@ def coverage(sides: Sides, band: Floats) -> Floats:
     inside = (sides.measured >= low) & (sides.measured <= high) & known
     count = known.sum(axis=(0, 1))
     return np.where(count > 0, inside.sum(axis=(0, 1)) / np.maximum(count, 1), np.nan)
+
+
+def usual_coverage(copies: Floats, band: Floats, level: float) -> Floats:
+    """Share (dofs,) of its motion in the band that a copy has, or more, with a probability.
+
+    One specimen is one draw: where it is far off in a constant, all its units leave the band
+    together.
+
+    Args:
+        copies: (samples, frames, units, dofs) that the band was drawn from.
+        band: (3, frames, units, dofs).
+        level: the probability.
+    """
+    if len(copies) == 0:
+        return np.full(copies.shape[-1], np.nan)
+    known = np.isfinite(copies).sum(axis=(1, 2))
+    inside = ((copies >= band[0]) & (copies <= band[2])).sum(axis=(1, 2))
+    return np.asarray(np.quantile(inside / np.maximum(known, 1), 1 - level, axis=0))

@@ -104,9 +104,8 @@ def _motions(made: Compared) -> Variables:
         "force_low": forces[0],
         "force_high": forces[2],
     }
-    compared = sides._replace(
-        measured=np.where(measurement.compared[:, None], sides.measured, np.nan)
-    )
+    inside = measurement.compared
+    compared = sides._replace(measured=np.where(inside[:, None], sides.measured, np.nan))
     return {
         **{name: (_MOTION, values) for name, values in motions.items()},
         **{name: (("time",), values) for name, values in courses.items()},
@@ -114,6 +113,10 @@ def _motions(made: Compared) -> Variables:
         "use": (("unit",), measurement.use),
         "nominal_drive": (("time", "xy"), made.nominal.drive),
         "band_coverage": (("dof",), curves.coverage(compared, band)),
+        "band_coverage_usual": (
+            ("dof",),
+            curves.usual_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
+        ),
         "band_samples": ((), len(sides.copies)),
     }
 

@@ -125,6 +125,13 @@ _METRICS: Table = {
     "band_coverage": Variable(
         ("dof",), "1", "share of measurements within the band widened by their noise", gaps=True
     ),
+    "band_coverage_usual": Variable(
+        ("dof",),
+        "1",
+        "share of a simulation within the band that it was drawn from, or more, as often as the"
+        " band's level says",
+        gaps=True,
+    ),
     "band_samples": Variable((), "1", "simulations that the band is drawn from", "int64"),
 }
 

@@ -33,7 +33,7 @@ def _work(args: argparse.Namespace) -> None:
     labels = {"title": args.out.stem, "comment": _note(studies)}
     with cli.progress(len(studies), "movie") as bar:
         frames = _frames(args.out.stem, studies, bar)
-        encode(args.out, frames, RATE, Codec(crf=20), labels)
+        encode(args.out, frames, RATE, Codec(crf=26), labels)
 
 
 def _frames(name: str, studies: Sequence[Study], bar: cli.progress) -> Iterator[Image]:

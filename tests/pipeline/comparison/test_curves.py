@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.comparison.curves import Sides, curve, peak_to_peak, peaks
+from pipeline.comparison.curves import Sides, curve, peak_to_peak, peaks, usual_coverage
 from pipeline.comparison.quantities import Quantity, nearing, rotation, size
 
 FRAMES, UNITS, NOISE = 60, 40, 0.02
@@ -72,3 +72,12 @@ def test_units_that_stand_for_no_others_are_not_drawn() -> None:
     np.testing.assert_allclose(wide, 2 * 1.96 * NOISE * np.sqrt(2 / 5), rtol=0.1)
     drawn = curve(sides(WAVES), Quantity(rotation, rows), np.random.default_rng(0))
     assert (drawn[0, :, 2] - drawn[0, :, 1]).mean() > 0.1
+
+
+def test_copies_that_are_off_as_a_whole_leave_the_band_as_a_whole() -> None:
+    seen = sides(WAVES)
+    together = usual_coverage(seen.copies, seen.within(seen.copies), 0.99)
+    assert (together < 0.01).all()
+    apart = np.random.default_rng(1).standard_normal(seen.copies.shape)
+    found = usual_coverage(apart, seen.within(apart), seen.level)
+    np.testing.assert_allclose(found, 0.95, atol=0.03)
