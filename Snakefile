@@ -6,7 +6,7 @@ import sys
 
 from snakemake.utils import min_version
 
-from pipeline.calibrated import calibrations, description, measurements
+from pipeline.calibrated import calibrations, description, measurements, problems_of
 from pipeline.filmed import compared, comparisons, filmed, recording_pages, tracked
 from pipeline.sources import source_hash
 from pipeline.studies import FRAMED, families, figures, joints, movies, targets

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.calibration.description import Calibration
+from pipeline.calibration.description import Calibration, TrackedMotion
 from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.problem.loading import section
@@ -24,14 +24,23 @@ def calibrations(root: Path = ROOT) -> list[str]:
 
 
 def measurements(wildcards: Wildcards) -> dict[str, str]:
-    """The files that a fit depends on: its YAML, and the measured files; or the computed ones."""
+    """The files that a fit depends on: its YAML, measured files and problems; or computed ones."""
     source = f"{_FOLDER}/{wildcards.calibration}.yaml"
     asked = _described(source)
     if asked is not None and asked.virtual is not None:
-        return {"folder": f"results/calibration/{wildcards.calibration}/data"}
+        folder = f"results/calibration/{wildcards.calibration}/data"
+        return {"folder": folder, **problems_of(wildcards)}
     sets = asked.data if asked is not None else ()
     named = {each.name: f"{_FOLDER}/{each.file}" for each in sets if each.file is not None}
-    return {"description": source, **named}
+    return {"description": source, **named, **problems_of(wildcards)}
+
+
+def problems_of(wildcards: Wildcards) -> dict[str, str]:
+    """The problems of the studies that tracks are of, each by the name of its set."""
+    asked = _described(f"{_FOLDER}/{wildcards.calibration}.yaml")
+    sets = asked.data if asked is not None else ()
+    tracks = [each for each in sets if isinstance(each, TrackedMotion)]
+    return {f"problem_{each.name}": f"{_FOLDER}/{each.problem}" for each in tracks}
 
 
 def description(wildcards: Wildcards) -> str:

@@ -13,6 +13,7 @@ of its root is a change of the drive by one standard deviation, independent of a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -44,12 +45,14 @@ class Change(NamedTuple):
     value: Floats
     slope: Floats
 
-    def of(self, motion: redrive.Course) -> redrive.Course:
-        """The motion with this change."""
-        value, slope = (np.array(part) for part in (motion.value, motion.slope))
-        value[:, self.place, self.dof] += self.value
-        slope[:, self.place, self.dof] += self.slope
-        return motion._replace(value=value, slope=slope)
+
+def changed(motion: redrive.Course, changes: Sequence[Change], size: Floats) -> redrive.Course:
+    """The motion with changes of a size each, in standard deviations."""
+    value, slope = (np.array(part) for part in (motion.value, motion.slope))
+    for each, times in zip(changes, size, strict=True):
+        value[:, each.place, each.dof] += times * each.value
+        slope[:, each.place, each.dof] += times * each.slope
+    return motion._replace(value=value, slope=slope)
 
 
 class Followed(NamedTuple):
@@ -68,7 +71,7 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True)
 class _Seen:
-    """Courses of the held units after the first frame, which is the reference of all others.
+    """Courses of the held units. At the first frame they rest: it tells the constants.
 
     Attributes:
         time: (n,) s.
@@ -153,13 +156,13 @@ def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
 def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> _Seen:
     chosen = track.sel(unit=scene.lattice.id[held.unit])
     measured, sigma = (
-        chosen[name].transpose("time", "unit", "dof").values[1:].astype(float)
+        chosen[name].transpose("time", "unit", "dof").values.astype(float)
         for name in ("displacement", "sigma")
     )
     there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
     reach = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
     reach += np.nanmax(sigma, axis=(0, 1))
-    time = track["time"].values[1:] - track["time"].values[0]
+    time = track["time"].values - track["time"].values[0]
     return _Seen(time, measured, sigma, there, bias, reach)
 
 
@@ -182,7 +185,7 @@ def _course(seen: _Seen, intervals: int, place: int, dof: int) -> tuple[Floats, 
     rows, given = seen.equations(intervals, place, dof)
     orthogonal, factor = np.linalg.qr(rows)
     root = np.linalg.inv(factor)
-    unknown = np.column_stack([root @ (orthogonal.T @ given), root])
+    unknown = np.column_stack([root @ (orthogonal.T @ given), root[:, 1:]])
     unknown[0] = 0.0  # the constant is no motion, and the first coefficient is zero
     knots = seen.knots(intervals)
     spline = BSpline(knots, unknown, _DEGREE)

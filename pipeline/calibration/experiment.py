@@ -42,6 +42,7 @@ class Measured:
         axes: (n, r) orthonormal directions of whitened values in which a common cause, such as
             the noise of the drive, scatters them besides.
         spread: (r,) standard deviation along them by that cause alone.
+        mixture: (m, r) what of the m independent causes each is made of.
         remarks: what a reader should know of the set, a sentence each.
     """
 
@@ -55,6 +56,7 @@ class Measured:
     bias: Floats = field(default_factory=lambda: np.zeros(0))
     axes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     spread: Floats = field(default_factory=lambda: np.zeros(0))
+    mixture: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     remarks: tuple[str, ...] = ()
 
     def whitened(self, deviation: Floats) -> Floats:
@@ -75,12 +77,18 @@ class Measured:
         The covariance of whitened values is then 1 + C C': along the axes of C they are divided by
         what it is there.
         """
-        alone = replace(self, axes=np.zeros((0, 0)), spread=np.zeros(0))
-        white = alone.whitened(causes)
+        white = self._less_mean((causes.T / self.sigma).T)
         square, turn = np.linalg.eigh(white.T @ white)
         seen = square > _UNSEEN * max(float(square[-1]), 1.0)
         spread = np.sqrt(square[seen])
-        return replace(self, axes=white @ turn[:, seen] / spread, spread=spread)
+        return replace(
+            self, axes=white @ turn[:, seen] / spread, spread=spread, mixture=turn[:, seen]
+        )
+
+    def causes(self, deviation: Floats) -> Floats:
+        """The expected causes (m,) of deviations (n,) from the values, in standard deviations."""
+        along = self.axes.T @ self._less_mean(deviation / self.sigma)
+        return np.asarray(self.mixture @ (along * self.spread / (1 + self.spread**2)))
 
     def _less_common(self, white: Floats) -> Floats:
         if not len(self.spread):

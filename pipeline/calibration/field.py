@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -12,7 +12,7 @@ from jax import Array
 
 from pipeline.calibration.constants import Constants
 from pipeline.calibration.description import Name, TrackedMotion
-from pipeline.calibration.drive import Change, followed
+from pipeline.calibration.drive import Change, changed, followed
 from pipeline.calibration.experiment import ELASTIC, Measured
 from pipeline.calibration.loadcell import Load, load_of
 from pipeline.calibration.simulated import AnySolver, KnownDrive, Seen, Simulation
@@ -52,12 +52,16 @@ class Field:
         simulation: of the specimen under the measured motion of the held units.
         sees: the constants that the motion depends on.
         changes: of that motion by one standard deviation of its noise, in independent ways.
+        drive: the motion with those changes that the free units speak for, if it is known.
+        part: (n,) of the motion that these changes make.
     """
 
     measured: Measured
     simulation: Simulation
     sees: tuple[Name, ...]
     changes: tuple[Change, ...]
+    drive: KnownDrive | None = None
+    part: Floats = field(default_factory=lambda: np.zeros(()))
 
     @property
     def own_start(self) -> Floats:
@@ -72,16 +76,34 @@ class Field:
     def predict(self, constants: Constants, own: Floats) -> Floats:
         """See ``experiment.Experiment``."""
         del own
-        return self.simulation.predict(constants)
+        return self.simulation.predict(constants, self.drive) - self.part
+
+    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        return self.simulation.pulled_back(constants, bar, self.drive)
 
     def with_drive_noise(self, constants: Constants) -> Field:
-        """The same, knowing what the noise of the measured drive does to the prediction."""
-        simulation, motion = self.simulation, self.simulation.drive.motion
-        assert isinstance(motion, redrive.Course)
-        middle = simulation.predict(constants)
-        moved = (simulation.predict(constants, each.of(motion)) for each in self.changes)
-        causes = np.stack([each - middle for each in moved], axis=1)
-        return replace(self, measured=self.measured.with_common(causes))
+        """The same, knowing what the noise of the measured drive does to the prediction.
+
+        That is linearised about the drive that the free units speak for as well, by the noise that
+        is known so far: one of a noisy drive would belong to another motion (Gauss and Newton's
+        method for constants and drive together, the drive eliminated).
+        """
+        simulation, filtered = self.simulation, self.simulation.drive.motion
+        assert isinstance(filtered, redrive.Course)
+        size = np.zeros(len(self.changes))
+        if len(self.measured.spread):
+            size = self.measured.causes(self.measured.values - self.predict(constants, np.zeros(0)))
+        units, motion = simulation.drive.units, changed(filtered, self.changes, size)
+        drive = KnownDrive(units, motion)
+        middle = simulation.predict(constants, drive)
+        moved = (changed(motion, [each], np.ones(1)) for each in self.changes)
+        causes = np.stack(
+            [simulation.predict(constants, KnownDrive(units, each)) - middle for each in moved],
+            axis=1,
+        )
+        measured = self.measured.with_common(causes)
+        return replace(self, measured=measured, drive=drive, part=causes @ size)
 
     def finer(self) -> Field:
         """The same with half the steps in time; of equilibria there are none."""

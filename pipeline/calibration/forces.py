@@ -68,6 +68,10 @@ class ForceTest:
         """See ``experiment.Experiment``."""
         return self.simulation.predict(constants) + own.sum()
 
+    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        return self.simulation.pulled_back(constants, bar)
+
 
 def experiment(
     asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats

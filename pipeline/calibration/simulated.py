@@ -115,19 +115,20 @@ class Simulation:
     def _compiled(self) -> Seen:
         return jax.jit(self.seen)
 
-    def predict(self, constants: Constants, motion: Motion | None = None) -> Floats:
-        """(n,) what is measured of a specimen; with a `motion`, under that in place of the drive's.
+    def predict(self, constants: Constants, drive: KnownDrive | None = None) -> Floats:
+        """(n,) what is measured of a specimen, under another drive if one is given.
 
         Raises:
             SimulationError: a step failed.
         """
         made = self.parameters(constants.numbers)
         values = Values(*(np.asarray(part) for part in made))
-        drive = self.drive if motion is None else KnownDrive(self.drive.units, motion)
-        found, _, _ = dynamics.forward(self._solver(constants), values, (drive,))
+        found, _, _ = dynamics.forward(self._solver(constants), values, (drive or self.drive,))
         return np.asarray(self._compiled(found[0], made))
 
-    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+    def pulled_back(
+        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+    ) -> Floats:
         """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint.
 
         Raises:
@@ -136,7 +137,7 @@ class Simulation:
         solver, numbers = self._solver(constants), jnp.asarray(constants.numbers)
         made = self.parameters(numbers)
         values = Values(*(np.asarray(part) for part in made))
-        motion, velocity, records = dynamics.forward(solver, values, (self.drive,))
+        motion, velocity, records = dynamics.forward(solver, values, (drive or self.drive,))
         by_motion, direct = self._seen_back(motion[0], made, bar)
         still = np.zeros_like(velocity)
         pulled = dynamics.backward(solver, records, np.asarray(by_motion)[None], still)

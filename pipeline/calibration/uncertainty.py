@@ -68,7 +68,7 @@ def gradient(fit: Fit) -> Floats:
             total += column
             continue
         bar = each.measured.transposed(fit.residual[mine]) / fit.level[k]
-        by_numbers = each.simulation.pulled_back(constants, bar)
+        by_numbers = each.pulled_back(constants, bar)
         total += np.where(by_columns, column, by_numbers @ slopes)
     return total
 

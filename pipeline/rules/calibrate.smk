@@ -6,7 +6,8 @@ rule calibrate:
 
 rule synthesise:
     input:
-        "experiments/calibration/{calibration}.yaml",
+        unpack(problems_of),
+        description="experiments/calibration/{calibration}.yaml",
     output:
         directory("results/calibration/{calibration}/data"),
     log:
@@ -17,7 +18,7 @@ rule synthesise:
     message:
         "Computing measurements for {wildcards.calibration} (synthetic)"
     shell:
-        "python -m pipeline.calibrate synthesise {input} --out-dir {output} --log {log}"
+        "python -m pipeline.calibrate synthesise {input.description} --out-dir {output} --log {log}"
 
 
 rule calibration:

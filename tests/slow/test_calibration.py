@@ -134,7 +134,7 @@ def _track_case(
         return [seen(syntrack.track_of(each, folder, true, random))]
 
     one = seen(syntrack.track_of(each, folder, true, np.random.default_rng(0)))
-    return Case(asked, true, draw, [one.with_drive_noise(true)])
+    return Case(asked, true, draw, [one.with_drive_noise(true).with_drive_noise(true)])
 
 
 class Trials(NamedTuple):
