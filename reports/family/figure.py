@@ -56,14 +56,13 @@ def _curve(axes: Axes, family: Family) -> None:
         peaks = [float(design.boundary.sel(structure=name)) for design in family.designs]
         colour = style.STRUCTURE_COLOURS[name]
         axes.plot(sizes, peaks, line, color=colour, marker="o", ms=3.2, lw=1.1)
-        above = name == "altered"
         axes.annotate(
             name.capitalize(),
             (sizes[-1], peaks[-1]),
-            xytext=(0, 4 if above else -5),
+            xytext=(0, 6),
             textcoords="offset points",
             ha="right",
-            va="bottom" if above else "top",
+            va="bottom",
             color=colour,
             fontsize=style.TEXT,
         )

@@ -56,5 +56,6 @@ def _losses(axes: Axes, data: xr.Dataset) -> None:
 def _price(axes: Axes, data: xr.Dataset) -> None:
     place = _rows(axes, data)
     axes.set_yticklabels([])
+    axes.set_xscale("linear")
     axes.plot(data["price"], place, "o", color=style.CLOAKED, markersize=4.0)
     axes.axvline(float(data["loss_drive"]), color=style.GREY, linewidth=0.8)

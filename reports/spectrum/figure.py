@@ -17,6 +17,8 @@ MODES = 4
 """Modes of each structure that are drawn, the lowest ones."""
 SHOWN = 0.45
 """Largest motion of a drawn mode, in spacings."""
+_DECADES = 10.0
+"""Spread of the transmission from which on its axis is logarithmic."""
 _BANDS = (style.INTACT, style.METHOD_COLOURS["mma"], style.ALTERED, style.CLOAKED)
 _SIDE, _PITCH, _LEFT, _TOP = 36.0, 41.5, 10.0, 9.0
 _ROW = _SIDE + 4.5
@@ -75,7 +77,7 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
         curves = data["transmission"].sel(structure=name)
         for state, dashes in zip(data["state"].values, ("-", (0, (3.0, 1.5))), strict=False):
             mean = np.sqrt((curves.sel(state=state) ** 2).mean("case"))
-            axes.semilogy(
+            axes.plot(
                 excited, mean, color=style.STRUCTURE_COLOURS[name], linestyle=dashes,
                 label=name if len(data["state"]) == 1 else f"{name}, {state}", linewidth=0.8,
             )  # fmt: skip
@@ -90,9 +92,12 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
         ylabel="rms |u| / amplitude of the drive",
         xlim=(excited[0], excited[-1]),
     )
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    low, high = axes.get_ylim()
+    if low <= 0 or high / low > _DECADES:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=1.0)
 
 
@@ -113,4 +118,6 @@ def _bands(axes: Axes, data: xr.Dataset) -> None:
     axes.set_xticks(range(4), ["Γ", "X", "M", "Γ"])
     axes.grid(axis="x", color=style.PALE, linewidth=0.5)
     axes.set(ylabel="frequency (kHz)", xlim=(0, 3), ylim=(min(0.0, axes.get_ylim()[0]), None))
-    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    axes.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(-0.12, 1.0), ncols=2, columnspacing=1.0
+    )
