@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 _CAPTION = (
     "(a) Loss under all loads and imperfect copies that a preset asks for: of the altered"
     " structure, of the study's own design, and of the preset's. The copies are others than those"
-    " that the design was made with. (b) What the preset's design pays under the study's own"
-    " drive; the line is the study's own design."
+    " that the design was made with. (b) How the loss changes from the study's own design to the"
+    " preset's, under what the preset asks for, and under the study's own drive: the price."
 )
 _COLUMNS = (
     "preset", "asks for", "loads", "copies", "loss of the study's own design",
