@@ -80,7 +80,7 @@ def values_of(made: list[Check]) -> dict[str, Check]:
 
 @pytest.fixture(scope="module", params=[None, DISTANCE], ids=["angles", "distances"])
 def plate(request: pytest.FixtureRequest) -> Posed:
-    return pressed(squares(3), 0.2, contact_distance=request.param)
+    return pressed(squares(3), 0.15, contact_distance=request.param)
 
 
 def test_the_definition_has_the_derivatives_of_its_energy(plate: Posed) -> None:
@@ -106,8 +106,12 @@ def test_equilibria_off_balance_and_units_in_one_another_are_found(plate: Posed)
     away = values_of(checks.balanced(plate, answer._replace(displacement=moved)))
     assert not away["distance from balance, mm/mm"].kept
     middle = 3 * 4 + 2
-    moved[0, middle] += 2.0
-    assert not all(check.kept for check in checks.admissible(plate, moved))
+    kept = []
+    for turn in (2.0, -2.0):  # one of which closes the narrower voids around the unit
+        turned = answer.displacement.copy()
+        turned[0, middle] += turn
+        kept += [check.kept for check in checks.admissible(plate, turned)]
+    assert not all(kept)
     moved[0, middle] = np.nan
     assert not all(check.kept for check in checks.admissible(plate, moved))
 
@@ -130,7 +134,7 @@ def test_stages_off_balance_are_found() -> None:
     record = checks.solved(case, solver).record
     assert isinstance(record, Record)
     assert all(check.kept for check in checks.stages(case, solver, record))
-    record.a[3] *= 1.01
+    record.a[3] *= 1.1
     assert not all(check.kept for check in checks.stages(case, solver, record))
 
 
