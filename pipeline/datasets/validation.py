@@ -43,10 +43,14 @@ def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator
         yield Fault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
     elif found.dtype.kind not in _KINDS[table.dtype]:
         yield Fault(f"its type is not {table.dtype}", name, str(found.dtype))
-    elif (units := _units(found, table)) not in (table.units, *table.also):
+    elif not _known_units(units := _units(found, table), table):
         yield Fault(f"its unit is not {table.units!r}", name, units)
     else:
         yield from _value_faults(found.values, name, table)
+
+
+def _known_units(told: object, table: Variable) -> bool:
+    return isinstance(told, str) and told in (table.units, *table.also)  # a list may be told
 
 
 def _units(found: xr.Variable, table: Variable) -> object:

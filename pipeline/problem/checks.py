@@ -219,9 +219,9 @@ def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
 def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
     lattice = problem.lattice
     if loose := loose_units(lattice, frozenset(removed)):
-        what = (
-            f"the void splits the lattice: unit {lattice.name(loose[0])} is cut off from the rest"
-        )
+        origin = f" in {lattice.file}" if isinstance(lattice, ListedNetwork) else ""
+        unit = lattice.name(loose[0])
+        what = f"the void splits the lattice{origin}: unit {unit} is cut off from the rest"
         remedy = "change its shape, or give `loose: remove` to take such units out as well"
         yield Finding(what, ("void",), remedy)
 

@@ -17,10 +17,14 @@ FOLDER = "folder"
 """Key of the validation context under which the folder of the problem file is."""
 
 
+_LONGEST = 300  # letters of what a file's reader complains of, which may cite what is no text
+
+
 def fault(what: str, remedy: str, key: str | None = None) -> PydanticCustomError:
     """A validation error that knows its remedy, and the key below the validated section."""
-    template = "{what}"
-    return PydanticCustomError("problem", template, {"what": what, "remedy": remedy, "key": key})
+    legible = "".join(letter if letter.isprintable() else "?" for letter in what[:_LONGEST])
+    told = {"what": legible, "remedy": remedy, "key": key}
+    return PydanticCustomError("problem", "{what}", told)
 
 
 def _reader(dimension: units.Dimension, minimum: float | None, exclusive: bool) -> BeforeValidator:

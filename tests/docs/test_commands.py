@@ -98,6 +98,9 @@ def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(argparse.ArgumentParser, "parse_args", only_read)
     module, *options = command.words[2:]
+    if module == "pytest":  # its tests are not for here
+        assert all((ROOT / word).is_file() for word in options if not word.startswith("-"))
+        return
     monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(sys, "argv", [module, *options])
     with pytest.raises((ReadError, SystemExit)) as ended:

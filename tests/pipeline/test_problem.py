@@ -26,7 +26,8 @@ from pipeline.problem import (
 from pipeline.problem.lattices import Quads
 from pipeline.problem.loading import overlaid
 
-NAMES = ("edge3", "free", "text", "broadband", "worst", "amplitudes", "tolerant", "quick")
+ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
+NAMES = ("edge3", "free", "text", *ROBUST, "quick")
 PRESETS = (None, *NAMES)
 
 

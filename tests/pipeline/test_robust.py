@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,7 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
 def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path) -> None:
     content = yaml.safe_load(fig2.read_text())
     presets, again = content["presets"], {"optimiser": {"start": "study"}}
-    presets["again"] = overlaid(presets["quick"], again)
+    presets["again"] = overlaid(deepcopy(presets["quick"]), again)
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(content))
     words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset"]

@@ -166,5 +166,5 @@ def test_another_video_is_refused(
     (tmp_path / "v.mkv").write_bytes(b"another")
     words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
     assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 2
-    assert "was not made of this video" in capsys.readouterr().err
+    assert "that of another video" in capsys.readouterr().err
     assert not (tmp_path / "report").exists()
