@@ -13,3 +13,9 @@ def joined(parser: argparse.ArgumentParser) -> None:
         ("--out-dir", "the report's folder"),
     ):
         parser.add_argument(name, type=Path, required=True, metavar="FOLDER", help=told)
+
+
+def drawn(parser: argparse.ArgumentParser, dataset: str) -> None:
+    """The dataset that a page is drawn from, as `--DATASET`, and the folder for its files."""
+    parser.add_argument(f"--{dataset}", type=Path, required=True, metavar="NC", help="the dataset")
+    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for all files")

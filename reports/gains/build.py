@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import cli
+from reports.arguments import drawn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,8 +70,7 @@ def _row(data: xr.Dataset) -> tuple[str, ...]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw the gains; returns the exit code."""
     parser = cli.parser("reports.gains.build", str(__doc__))
-    parser.add_argument("--gains", type=Path, required=True, metavar="NC", help="the dataset")
-    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for all files")
+    drawn(parser, "gains")
     return cli.run(_work, parser, argv)
 
 

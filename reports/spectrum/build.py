@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import cli
+from reports.arguments import drawn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,8 +74,7 @@ def _table(name: str, text: str, values: xr.DataArray) -> Table:
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw the spectrum; returns the exit code."""
     parser = cli.parser("reports.spectrum.build", str(__doc__))
-    parser.add_argument("--spectrum", type=Path, required=True, metavar="NC", help="the dataset")
-    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for all files")
+    drawn(parser, "spectrum")
     return cli.run(_work, parser, argv)
 
 

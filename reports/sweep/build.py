@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from pipeline import cli
 from pipeline.errors import UserError
+from reports.arguments import drawn
 
 _MAPS = (
     "(a) Loss of the cloaked structure, (b) over that of the altered one, (c) smallest void angle"
@@ -59,8 +59,7 @@ def _work(args: argparse.Namespace) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw the sweep; returns the exit code."""
     parser = cli.parser("reports.sweep.build", str(__doc__))
-    parser.add_argument("--sweep", type=Path, required=True, metavar="NC", help="the dataset")
-    parser.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="for all files")
+    drawn(parser, "sweep")
     return cli.run(_work, parser, argv)
 
 
