@@ -25,6 +25,8 @@ KEEP_FROM_LIMIT = 0.95
 FINER = 0.1
 """Finer steps at a barrier, in shares of the stability limit."""
 RUNG = 1.25
+MOST_MEMORY = 2 << 30
+"""Bytes that the drive's values at all kicks may take: some hundred million kicks of a unit."""
 MOVING = 1.5
 """Highest eigenfrequency in motion over that at rest, as expected before the first run."""
 NONE = np.zeros(0, dtype=np.int64)
@@ -82,6 +84,7 @@ class ExplicitSolver:
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
         top = self.topology
+        grid.refuse_outside(self.asked, self.duration)
         system = system_of(top, values, NONE)
         refuse_massless(values)
         refuse_start(top, values, system.contacts, drive.start(top, 0.0))
@@ -154,6 +157,13 @@ class ExplicitSolver:
 
     def _steps(self, values: Values, drive: Drive, n_steps: int) -> Steps:
         h, n_kicks = self.duration / n_steps, len(self.splitting.kicks)
+        needed = np.dtype(float).itemsize * n_steps * n_kicks * len(self.topology.held)
+        if needed > MOST_MEMORY:
+            raise SimulationError(
+                f"the explicit run needs {n_steps} steps of {h:.3g} s to be stable, and"
+                f" {needed / 1e9:.3g} GB for its drive alone; try softer ligaments, heavier units,"
+                " a shorter time or accuracy: default"
+            )
         held = drive.values(self.topology.held, self._kick_times(n_steps))
         return Steps(
             n_steps,

@@ -41,6 +41,17 @@ def steps_of(times: Floats, asked: Floats) -> Ints:
     return np.unique(np.clip(found, 0, len(times) - 2))
 
 
+def refuse_outside(asked: Floats, end: float) -> None:
+    """Refuses times of output that do not ascend, or that lie outside of the run.
+
+    Raises:
+        ValueError: they do so by more than rounding.
+    """
+    slack = 1e-9 * end
+    if len(asked) and (asked[0] < -slack or asked[-1] > end + slack or (np.diff(asked) < 0).any()):
+        raise ValueError(f"output times must ascend from 0 to {end:g} s, the end of the run")
+
+
 def stage_times(times: Floats, nodes: Floats) -> Floats:
     """Times (1 + n_steps (n_stages - 1),) of the start and of every implicit stage."""
     stages = times[:-1, None] + np.diff(times)[:, None] * nodes[None, 1:]

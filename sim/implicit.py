@@ -20,6 +20,8 @@ from sim.system import as_values, empty_bars, system_of
 from sim.tableau import ESDIRK3, Tableau
 
 MAX_SPLITS = 100
+PATIENCE = 20
+"""Cuts of single steps, after which all steps to come are cut in two: the grid is too coarse."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,8 @@ class Record:
 class ImplicitSolver:
     """Integrates one case with an L-stable implicit method on a frozen grid (``dynamics.Solver``).
 
-    A step that fails is cut in two, for this solve alone, until it passes; so is one within which
-    the output, interpolated, has units in one another.
+    A step that fails is cut in two, for this solve alone, until it passes, and now and then all
+    steps after it; so is one within which the output, interpolated, has units in one another.
 
     Attributes:
         topology: the structure.
@@ -84,6 +86,7 @@ class ImplicitSolver:
 
     def forward(self, values: Values, drive: Drive) -> tuple[Floats, Floats, Record]:
         """See ``dynamics.Solver``."""
+        grid.refuse_outside(self.asked, float(self.times[-1]))
         record = self._march(values, drive, self.touching(values), self.times)
         if self._untouched_voids_close(values, record):
             record = self._march(values, drive, np.arange(len(values.void)), self.times)
@@ -115,7 +118,7 @@ class ImplicitSolver:
         refuse_massless(values)
         refuse_start(top, values, system.contacts, drive.start(top, float(times[0])))
         counts = np.zeros(3, dtype=np.int64)
-        for _ in range(MAX_SPLITS):
+        for attempt in range(1, MAX_SPLITS + 1):
             shape = (len(times), len(tableau.nodes), top.n_dofs)
             u, v, a = np.zeros(shape), np.zeros(shape), np.zeros(shape)
             held = drive.values(top.held, grid.stage_times(times, tableau.nodes))
@@ -125,7 +128,8 @@ class ImplicitSolver:
             refuse_strangers(system.contacts)
             if status == CONVERGED:
                 return Record(times, u, v, a, touching, counts, top)
-            times = grid.split_steps(times, np.array([step]))
+            last = len(times) - 1 if attempt % PATIENCE == 0 else step + 1
+            times = grid.split_steps(times, np.arange(step, last))
         raise SimulationError(
             f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
             f" {worst // 3} (the tangent is indefinite or a contact jams); try a smaller drive or"

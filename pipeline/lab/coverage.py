@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Ints, compiled
+from pipeline.tracking.arrays import Floats, Ints, compiled, inlined
 
 
 class Rings(NamedTuple):
@@ -51,7 +51,7 @@ def _accumulate(points: Floats, start: Ints, shade: Floats, change: Floats) -> N
             _edge(points[k], points[following], shade[ring], change)
 
 
-@compiled
+@inlined
 def _edge(a: Floats, b: Floats, shade: float, change: Floats) -> None:
     """Adds an edge, row by row; what is to its right is covered if it runs downwards."""
     if a[1] == b[1]:
@@ -70,7 +70,7 @@ def _edge(a: Floats, b: Floats, shade: float, change: Floats) -> None:
             before = covered
 
 
-@compiled
+@inlined
 def _mean_excess(value: float, left: float, right: float) -> float:
     """Mean of max(value - x, 0) for x from left to right."""
     if value <= left:

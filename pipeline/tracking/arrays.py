@@ -21,8 +21,22 @@ Picture = Image | Singles
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+_HOW: dict[str, Any] = {
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": {"reassoc", "contract", "arcp", "nsz"},
+}
+
+
 def compiled(function: F) -> F:
-    """Compiles a loop once and caches it on disk; sums may be reordered, NaN stays NaN."""
-    fast = {"reassoc", "contract", "arcp", "nsz"}
-    made = njit(cache=True, nogil=True, error_model="numpy", fastmath=fast)(function)
-    return cast(F, made)
+    """Compiles a loop once and caches it on disk; sums may be reordered, NaN stays NaN.
+
+    What it calls must be `inlined`: sums of a loop of its own would be ordered in one way when the
+    caller has just been compiled, and in another when it comes from the cache.
+    """
+    return cast(F, njit(cache=True, **_HOW)(function))
+
+
+def inlined(function: F) -> F:
+    """Makes a loop a part of the `compiled` ones that call it."""
+    return cast(F, njit(inline="always", **_HOW)(function))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Singles, compiled
+from pipeline.tracking.arrays import Floats, Singles, inlined
 from pipeline.tracking.cells import Kinds
 
 UNKNOWNS = 7  # ux, uy, theta; gain, offset, slope in x, slope in y
@@ -92,7 +92,7 @@ def room(blocks: int) -> Room:
     )
 
 
-@compiled
+@inlined
 def _place(scene: Scene, look: Look, state: Floats, top: int, left: int, room: Room) -> None:
     """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
     plane, x, y = scene.plane, room.x, room.y
@@ -108,7 +108,7 @@ def _place(scene: Scene, look: Look, state: Floats, top: int, left: int, room: R
             y[k] = cos * vy - sin * vx
 
 
-@compiled
+@inlined
 def _sample(scene: Scene, look: Look, top: int, left: int, room: Room) -> int:
     """Reads the template where pixels are to be compared; returns their number.
 
@@ -154,7 +154,7 @@ def _sample(scene: Scene, look: Look, top: int, left: int, room: Room) -> int:
     return whole
 
 
-@compiled
+@inlined
 def _derive(look: Look, state: Floats, pixels: int, room: Room) -> None:
     """Turns slopes and value of the template into derivatives and residual of the frame."""
     rows, residual = room.rows, room.residual
@@ -176,7 +176,7 @@ def _derive(look: Look, state: Floats, pixels: int, room: Room) -> None:
         residual[k] -= model
 
 
-@compiled
+@inlined
 def _weigh(room: Room, tight: float, pixels: int) -> None:
     """Robust weights of Geman and McClure, and the sums."""
     rows, residual, weight = room.rows, room.residual, room.weight
@@ -201,7 +201,7 @@ def _weigh(room: Room, tight: float, pixels: int) -> None:
     room.sums[4] += squares
 
 
-@compiled
+@inlined
 def _add(room: Room, scores: Floats, pixels: int) -> None:
     """Adds a block to the matrix and fills its scores."""
     rows, residual, weight, matrix = room.rows, room.residual, room.weight, room.matrix
@@ -219,13 +219,13 @@ def _add(room: Room, scores: Floats, pixels: int) -> None:
             matrix[i, j] += product
 
 
-@compiled
+@inlined
 def _within(scene: Scene, look: Look, state: Floats, top: int, left: int) -> bool:
     middle = scene.plane[top + SIZE // 2, left + SIZE // 2]
     return math.hypot(middle[0] - look.x - state[0], middle[1] - look.y - state[1]) < look.reach
 
 
-@compiled
+@inlined
 def gather(
     scene: Scene, look: Look, state: Floats, box: Floats, every: int, tight: float, room: Room
 ) -> int:

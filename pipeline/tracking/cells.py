@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.tracking.arrays import Floats, Singles, compiled
+from pipeline.tracking.arrays import Floats, Singles, compiled, inlined
 
 EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
 _STEEP = 0.04
@@ -78,7 +78,7 @@ def classify(
                 span[line, 1] = max(last, span[line, 1])
 
 
-@compiled
+@inlined
 def unfold(brightness: Singles, weight: Singles, span: Places, nodes: Singles) -> None:
     """Fills nodes (rows, columns, 4) in the spans: brightness, its slopes in x and y, and weight.
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from pipeline.tracking.arrays import Floats, compiled
+from pipeline.tracking.arrays import Floats, inlined
 
 
-@compiled
+@inlined
 def _factor(matrix: Floats, factor: Floats) -> bool:
     """Cholesky factor from the lower triangle; False if it is singular."""
     for i in range(len(matrix)):
@@ -24,7 +24,7 @@ def _factor(matrix: Floats, factor: Floats) -> bool:
     return True
 
 
-@compiled
+@inlined
 def invert(matrix: Floats, factor: Floats, inverse: Floats) -> bool:
     """Fills the inverse of a symmetric positive definite matrix; False if it is singular.
 

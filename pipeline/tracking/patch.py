@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.tracking.arrays import Floats, Mask, Singles, compiled
+from pipeline.tracking.arrays import Floats, Mask, Singles, compiled, inlined
 from pipeline.tracking.blocks import SIZE, UNKNOWNS, Look, Room, Scene, gather
 from pipeline.tracking.cells import Cells, unfold
 from pipeline.tracking.dense import invert
@@ -115,7 +115,7 @@ class Fits(NamedTuple):
     information: Floats
 
 
-@compiled
+@inlined
 def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> None:
     """Rows and columns around a pixel, within the image, on the grid of blocks."""
     box[0] = max(0, math.floor((middle[1] - radius) / SIZE) * SIZE)
@@ -124,7 +124,7 @@ def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> 
     box[3] = min(shape[1], math.ceil(middle[0] + radius) + 1)
 
 
-@compiled
+@inlined
 def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
     """The Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
     step[:] = 0.0
@@ -136,7 +136,7 @@ def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
             step[i] += inverse[i, j] * total
 
 
-@compiled
+@inlined
 def _hold_pose(matrix: Floats) -> None:
     """Takes the pose out of the normal equations."""
     for i in range(POSE):
@@ -145,7 +145,7 @@ def _hold_pose(matrix: Floats) -> None:
         matrix[i, i] = 1.0
 
 
-@compiled
+@inlined
 def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -> float:
     """The scale of the robust weights: wide until the unit has found its place."""
     if aim.tight > 0.0:
@@ -156,13 +156,13 @@ def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -
     return min(scale, max(_SCALE * math.sqrt(room.sums[4] / room.sums[3]), least))
 
 
-@compiled
+@inlined
 def _stride(sums: Floats) -> float:
     """By how much a step of fixed robust weights is too short, for they change with it."""
     return min(sums[1] / max(sums[2], 1e-9), _STRIDE)
 
 
-@compiled
+@inlined
 def _descend(
     scene: Scene, look: Look, aim: Aim, box: Floats, state: Floats, inverse: Floats, room: Room
 ) -> tuple[float, int]:
@@ -193,7 +193,7 @@ def _descend(
     return moved, count
 
 
-@compiled
+@inlined
 def _summarise(
     state: Floats, inverse: Floats, room: Room, count: int, full: float, moved: float, out: Floats
 ) -> None:

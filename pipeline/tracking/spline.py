@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import spline_filter
 
-from pipeline.tracking.arrays import Floats, Singles, compiled
+from pipeline.tracking.arrays import Floats, Singles, compiled, inlined
 
 TAPS = 4
 
@@ -15,7 +15,7 @@ def coefficients(values: Floats) -> Singles:
     return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
 
 
-@compiled
+@inlined
 def weights(offset: float, value: Floats, slope: Floats) -> None:
     """Fills the four basis values and slopes at ``offset`` in [0, 1) behind the second knot."""
     rest = 1.0 - offset

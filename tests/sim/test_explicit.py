@@ -131,6 +131,13 @@ def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> N
     assert failure.value.step is not None
 
 
+def test_a_run_that_would_fill_the_memory_is_refused_before_it_begins() -> None:
+    rig = shaken(1.0)
+    stiff = rig.values._replace(law=rig.values.law * 1e14)
+    with pytest.raises(SimulationError, match=r"explicit run needs \d+ steps .* try softer"):
+        solver_for(rig, 200).forward(stiff, rig.drive)
+
+
 @pytest.mark.parametrize("broken", ["drive", "law", "void", "mass", "damping"])
 def test_nan_never_leaves(broken: str) -> None:
     rig = shaken(1.0)

@@ -48,6 +48,13 @@ def test_dense_output_reproduces_cubics() -> None:
     np.testing.assert_allclose(slope @ states, cubic.deriv()(asked), atol=1e-12)
 
 
+@pytest.mark.parametrize("asked", [[0.0, 1.1], [-0.1, 1.0], [0.5, 0.4]])
+def test_output_outside_of_the_run_or_out_of_order_is_refused(asked: list[float]) -> None:
+    grid.refuse_outside(np.array([0.0, 0.5, 0.5, 1.0 + 1e-12]), 1.0)
+    with pytest.raises(ValueError, match="must ascend from 0 to 1 s"):
+        grid.refuse_outside(np.array(asked), 1.0)
+
+
 def test_simpson_weights_are_exact_for_cubics() -> None:
     times = np.linspace(0.0, 2.0, 11)
     assert grid.simpson_weights(11, 2.0) @ times**3 == pytest.approx(4.0)

@@ -78,6 +78,18 @@ def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
     assert np.linalg.norm(u - close) < 0.5 * np.linalg.norm(close)
 
 
+def test_stiff_ligaments_shorten_all_steps_to_come() -> None:
+    rig = shaken(0.5)
+    law = rig.values.law.copy()
+    law[..., 0] *= 1e3
+    stiff = rig.values._replace(law=law)
+    u, _, record = solver_for(rig).forward(stiff, rig.drive)
+    assert len(record.times) > 61
+    fine = replace(solver_for(rig, 960), asked=np.linspace(0.0, 0.012, 61))
+    wanted = fine.forward(stiff, rig.drive)[0]
+    np.testing.assert_allclose(u, wanted, atol=5e-2 * np.abs(wanted).max())
+
+
 def test_a_slow_drive_follows_the_equilibria() -> None:
     rig = Rig(rotating_squares(), 5 * np.arange(5), 5 * np.arange(5) + 4, LinearRamp(-4.0, 10.0))
     times = np.linspace(0.0, 10.0, 41)

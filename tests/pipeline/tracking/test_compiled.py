@@ -1,0 +1,36 @@
+"""Loops whose sums may be reordered come in one piece: from the cache as just compiled."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Iterator
+from types import ModuleType
+
+import pytest
+from numba.core.registry import CPUDispatcher
+
+MODULES = ("blocks", "cells", "dense", "patch", "spline")
+NAMES = [*(f"pipeline.tracking.{name}" for name in MODULES), "pipeline.lab.coverage"]
+
+
+def loops(module: ModuleType) -> Iterator[CPUDispatcher]:
+    return (each for _, each in inspect.getmembers(module) if isinstance(each, CPUDispatcher))
+
+
+def called(loop: CPUDispatcher) -> Iterator[CPUDispatcher]:
+    function = loop.py_func
+    found = (function.__globals__.get(name) for name in function.__code__.co_names)
+    return (each for each in found if isinstance(each, CPUDispatcher))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_compiled_loop_calls_inlined_ones_only(name: str) -> None:
+    for loop in loops(importlib.import_module(name)):
+        for other in called(loop):
+            assert other.targetoptions.get("inline") == "always", (loop, other)
+
+
+def test_there_are_such_calls() -> None:
+    patch = importlib.import_module("pipeline.tracking.patch")
+    assert len(list(called(patch.fit))) > 2
