@@ -145,7 +145,7 @@ def strained(cell: Cell, gradient: Floats, free: Floats) -> Strained:
         free: (2, 2) which of its components take the value that relieves their stress instead.
 
     Raises:
-        SimulationError: the equilibrium could not be followed so far.
+        SimulationError: no stable equilibrium could be followed so far.
     """
     loose = np.flatnonzero(np.ravel(free) > 0)
     state = np.zeros(3 * cell.n_units + len(loose))
@@ -157,15 +157,16 @@ def strained(cell: Cell, gradient: Floats, free: Floats) -> Strained:
         asked = jnp.asarray(np.ravel(gradient) * step / STEPS)
         for _ in range(MAX_NEWTON):
             slope, tangent = (np.asarray(part) for part in derivatives(state, asked))
-            if np.abs(slope[moving]).max() < force:
+            tangent = tangent[np.ix_(moving, moving)]
+            if settled := bool(np.abs(slope[moving]).max() < force):
                 break
             change = np.zeros_like(state)
-            change[moving] = la.solve(tangent[np.ix_(moving, moving)], -slope[moving])
+            change[moving] = la.solve(tangent, -slope[moving])
             state = _admissible(energy, state, change, asked)
-        else:
+        if not settled or la.eigvalsh(tangent, subset_by_index=[0, 0])[0] < 0:
             raise SimulationError(
-                f"the unit cell has no equilibrium beyond {(step - 1) / STEPS:.0%} of the strain;"
-                " try a smaller one",
+                f"the unit cell has no {'stable ' if settled else ''}equilibrium beyond"
+                f" {(step - 1) / STEPS:.0%} of the strain; try a smaller one",
                 step=step,
             )
     found = np.array(np.ravel(gradient), dtype=float)
