@@ -17,8 +17,6 @@ _CODE = re.compile(r"`([^`]+)`")
 _TARGET = r"((?:make|(?:\.venv/bin/)?snakemake)(?: -n)? [a-z][\w@-]*)"
 WALKED = ("docs/tutorial.md", "docs/video.md", "docs/printer.md", "docs/faq.md")
 """The pages whose commands are all run, in this order, in one checkout."""
-SLOW = ("docs/printer.md",)
-"""Those of them that take minutes even of a draft."""
 _VARIABLE = re.compile(r"[A-Z]+=\S*")
 
 

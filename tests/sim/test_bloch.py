@@ -66,7 +66,7 @@ def test_strain_changes_the_bands_and_keeps_them_real(cell: Cell) -> None:
 
 def test_a_strain_beyond_the_contacts_is_refused(cell: Cell) -> None:
     for beyond in (-0.3, -0.6):
-        with pytest.raises(SimulationError, match="no (stable )?equilibrium beyond"):
+        with pytest.raises(SimulationError, match=r"no (stable )?equilibrium beyond"):
             strained(cell, np.diag([beyond, beyond]), NO_LOOSE)
     with pytest.raises(SimulationError, match="change its length"):
         strained(cell, np.diag([0.3, 0.0]), np.diag([0.0, 1.0]))
