@@ -81,6 +81,11 @@ def _guarded(work: Work, args: argparse.Namespace) -> int:
         LOG.error("error: %s", refusal(error.filename or ".", error))
         _keep_traceback(args.log)
         return 1
+    except MemoryError:
+        remedy = "ask for fewer samples, cases or units, or take a machine with more of it"
+        LOG.error("error: %s", UserError("the memory is full", remedy=remedy))
+        _keep_traceback(args.log)
+        return 1
     except Exception as error:
         if args.log is None:
             LOG.exception("error: a bug: %s: %s", type(error).__name__, error)

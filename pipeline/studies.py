@@ -152,6 +152,30 @@ def _without_product(word: str) -> str:
     return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
 
 
+def check_names(study: Study, root: Path = ROOT) -> None:
+    """Refuses names that targets and files cannot have: of the study, its preset, its recordings.
+
+    Raises:
+        UserError: one has more than letters, digits and underscores.
+    """
+    folder = root / "experiments" / study.name
+    preset = study.preset.partition(".")[0]
+    recordings = sorted((folder / "recordings").glob("*.yaml"))
+    named = [
+        ("a study", study.name, folder),
+        *([("a preset", preset, folder / "problem.yaml")] if preset else []),
+        *(("a recording", path.stem, path) for path in recordings),
+    ]
+    for what, name, path in named:
+        if not re.fullmatch(r"\w+", name):
+            raise UserError(
+                f"the name of {what} may have letters, digits and underscores only",
+                file=path.relative_to(root),
+                value=name,
+                remedy=f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}",
+            )
+
+
 @cache
 def problem_of(study: Study) -> Problem:
     """The problem of a study.

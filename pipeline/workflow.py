@@ -25,7 +25,7 @@ from pipeline.problem import (
     section_hash,
 )
 from pipeline.problem.settings import group_count
-from pipeline.studies import Study, asked_for, problem_of, studies, together
+from pipeline.studies import Study, asked_for, check_names, problem_of, studies, together
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -94,6 +94,7 @@ def check_problems(words: Collection[str]) -> None:
     """
     try:
         for study in asked_for(words) or studies()[:1]:
+            check_names(study)
             problem_of(study)
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -79,5 +79,7 @@ RotaryDamping = Annotated[
 ]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Ratio = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, strict=True)]
-Samples = Annotated[int, Field(ge=2, strict=True)]
+MOST = 1_000_000
+"""Of anything counted: beyond it there is a slip of the hand, or a machine without memory."""
+Count = Annotated[int, Field(ge=1, le=MOST, strict=True)]
+Samples = Annotated[int, Field(ge=2, le=MOST, strict=True)]

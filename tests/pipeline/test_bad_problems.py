@@ -231,6 +231,7 @@ ROWS = "  rows: 15\n"
             "2 Hz",
         ),
         ("samples: 200", "samples: 1", "too small", "horizon.samples", "at least 2"),
+        ("samples: 200", "samples: 1000000000", "too large", "horizon.samples", "at most 1000000"),
         ("convex: true", "convex: maybe", "neither true nor false", "constraints.convex", "true"),
         ("title: Shielding", "title: 3 #", "not a text", "title", "quotes"),
     ],

@@ -38,6 +38,7 @@ def run(error: BaseException | None, *options: str) -> int:
         (OSError(errno.EROFS, "ro", "/results"), 1, "error: the file system is read-only\n"),
         (FileNotFoundError(errno.ENOENT, "No such file", "/a"), 1, "error: No such file\n"),
         (OSError("odd"), 1, "error: odd\n"),
+        (MemoryError(), 1, "error: the memory is full\n"),
         (KeyboardInterrupt(), 130, "interrupted: run the same command again to finish\n"),
         (ZeroDivisionError("by 0"), 1, "error: a bug: ZeroDivisionError: by 0"),
     ],
@@ -59,7 +60,7 @@ def test_every_end_has_its_code_and_words(
     assert "working on problem.yaml" in kept
     assert "details" in kept
     assert told in kept
-    bug = error is not None and isinstance(error, OSError | ZeroDivisionError)
+    bug = error is not None and isinstance(error, OSError | MemoryError | ZeroDivisionError)
     assert ("Traceback" in kept) == bug
 
 

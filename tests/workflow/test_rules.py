@@ -2,6 +2,7 @@
 
 import errno
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -153,6 +154,23 @@ def test_faulty_problem_is_one_message_even_if_results_exist(built: Sandbox) -> 
         assert "experiments/fig2/problem.yaml, line" in ended.stderr
         assert "material.axial_stiffness" in ended.stderr
         assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("name", ["my-cloak", "a; touch pwned", "$(touch pwned)"])
+def test_names_that_targets_cannot_have_are_refused(sandbox: Sandbox, name: str) -> None:
+    experiments = sandbox.root / "experiments"
+    shutil.copytree(experiments / "fig2", experiments / name)
+    ended = sandbox.run("--dry-run", name)
+    assert ended.returncode == 1
+    assert "the name of a study may have letters, digits and underscores only" in ended.stderr
+    shutil.move(experiments / name, experiments / "sound")
+    recordings = experiments / "sound/recordings"
+    shutil.copy(recordings / "cloaked.yaml", recordings / f"{name}.yaml")
+    ended = sandbox.run("--dry-run", "sound")
+    assert ended.returncode == 1
+    assert f"sound/recordings/{name}.yaml" in ended.stderr
+    assert "remedy: name it " in ended.stderr
+    assert not list(sandbox.root.rglob("pwned"))
 
 
 def test_unknown_preset_is_one_message(sandbox: Sandbox) -> None:
