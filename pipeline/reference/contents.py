@@ -28,6 +28,9 @@ have the same dimensions and coordinates.
 * Attributes tell where a file comes from: `problem` (as far as the stage depends on it) and its
   hash, `parents` (SHA-256 of what was read), `packages`, `git_commit`, `plan`. There are no dates:
   the same sources make the same bytes.
+* `seal` is the SHA-256 of all other bytes of the file. What the workflow reads is checked against
+  it: a file that was changed, cut or scrambled since it was written is refused. It tells damage,
+  not malice; other programs need not know of it, and what they write has none.
 * `schema_version` is {SCHEMA_VERSION}; older files are read as if they were of this version, or
   refused with what to do.
 

@@ -21,6 +21,12 @@ WIDTH = 560
 """Of a thumbnail in pixels."""
 LARGEST_MOVIES = 12_000_000
 """Bytes of all movies that the page holds itself."""
+PROOFS = {
+    "benchmark": "run time against error",
+    "stress": "attempts to break the numbers",
+    "survival": "attempts to lose results",
+}
+"""Pages beside those of the studies, by folder."""
 
 
 class Movie(NamedTuple):
@@ -50,7 +56,7 @@ def page(results: Path) -> str:
         "tables": tables(built),
         "source": claims.listed().source,
         "movies": movies(results),
-        "benchmark": found.others(results, "benchmark", "*.*"),
+        "proofs": proofs(results),
         "datasets": [each for study in built for each in study.datasets],
         "made": _made(),
         "citations": citation.citations(),
@@ -82,6 +88,18 @@ def movies(results: Path) -> list[Movie]:
     return [
         Movie(link, _base64(files[link.address]) if link.address in held else "") for link in links
     ]
+
+
+def proofs(results: Path) -> list[Link]:
+    """Pages on what the numbers rest on, and the files of benchmarks."""
+    pages = [
+        Link(page.address, text)
+        for folder, text in PROOFS.items()
+        for page in found.others(results, folder, "index.html")
+    ]
+    named = {page.address for page in pages}
+    data = found.others(results, "benchmark", "*.*")
+    return [*pages, *(link for link in data if link.address not in named)]
 
 
 def thumbnail(picture: Path) -> str:

@@ -27,6 +27,8 @@ def results(study: Study, report: Path, tmp_path_factory: pytest.TempPathFactory
     (folder / "fig2/fabrication/index.html").write_text("<p>what is built</p>")
     (folder / "benchmark").mkdir()
     (folder / "benchmark/fig2.csv").write_text("seconds\n1\n")
+    (folder / "stress").mkdir()
+    (folder / "stress/index.html").write_text("<p>nothing wrong</p>")
     return folder
 
 
@@ -42,7 +44,7 @@ def test_it_works_from_disk_and_leads_to_what_is_there(html: str, results: Path)
     for href in links.hrefs.values():
         assert href[1:] in links.ids if href.startswith("#") else (results / href).is_file(), href
     wanted = {"fig2/report/index.html", "fig2/design.nc", "fig2/fabrication/index.html"}
-    assert wanted | {"benchmark/fig2.csv"} <= set(links.hrefs.values())
+    assert wanted | {"benchmark/fig2.csv", "stress/index.html"} <= set(links.hrefs.values())
 
 
 def test_figures_come_first_and_drafts_are_marked(results: Path, html: str) -> None:
