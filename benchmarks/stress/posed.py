@@ -9,26 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.constants import BARRIER, BIAS, CUTOFF, LIGAMENT, MATERIAL, SPACING
 from benchmarks.stress.definition import Structure
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, Solver
 from sim.lattice import Lattice, quads
 from sim.loads import LinearRamp, Motion, held_dofs
-from sim.model import Material, Topology, Values, damping_of_ratio
+from sim.model import Topology, Values
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Scene
 
-SPACING, LIGAMENT, BIAS = 15.0, 2.25, 20.0
-BARRIER, CUTOFF = (float(angle) for angle in np.deg2rad([-15.0, -10.0]))
-DENSITY, AXIAL, SHEAR, BENDING, CONTACT = 6.18e-9, 120.0, 1.19, 1.5, 1.5
-MATERIAL = Material(
-    DENSITY,
-    AXIAL,
-    SHEAR,
-    BENDING,
-    CONTACT,
-    *damping_of_ratio(0.0186, DENSITY, SPACING, SHEAR, BENDING),
-)
 DISTANCE = LIGAMENT / 12
 """Activation distance of contact between units, mm."""
 NONE = np.zeros(0, dtype=np.int64)

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim.arrays import Floats, Ints
 from sim.design import DesignSpace, design_space
 from sim.dynamics import Drive, Solver, simulate
@@ -19,20 +20,9 @@ from sim.geometry import shape
 from sim.lattice import Lattice, quads
 from sim.loads import Motion, held_dofs
 from sim.matrix import Matrix
-from sim.model import Material, Parameters, Topology, damping_of_ratio, parameters, topology
+from sim.model import Material, Parameters, Topology, parameters, topology
 from sim.network import Network
 
-BARRIER, CUTOFF = float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0))
-DENSITY, AXIAL, SHEAR, BENDING, CONTACT = 6.18e-9, 120.0, 1.19, 1.5, 1.5
-MATERIAL = Material(
-    DENSITY,
-    AXIAL,
-    SHEAR,
-    BENDING,
-    CONTACT,
-    *damping_of_ratio(0.0186, DENSITY, 15.0, SHEAR, BENDING),
-)
-"""The paper's constants."""
 NONE = np.array([], dtype=np.int64)
 
 
@@ -180,10 +170,10 @@ class Rig:
             one = numbers.density * MATERIAL.density
             material = Material(
                 one,
-                AXIAL * axial,
-                SHEAR * shear,
-                BENDING * bending,
-                CONTACT * numbers.contact,
+                MATERIAL.axial * axial,
+                MATERIAL.shear * shear,
+                MATERIAL.bending * bending,
+                MATERIAL.contact * numbers.contact,
                 MATERIAL.damping_translation * numbers.damping[:, 0],
                 MATERIAL.damping_rotation * numbers.damping[:, 1],
             )

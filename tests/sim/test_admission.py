@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER
 from sim.admission import inadmissible
 from sim.dynamics import Solver, solve_case
 from sim.errors import SimulationError
@@ -14,7 +15,7 @@ from sim.explicit import ExplicitSolver
 from sim.implicit import ImplicitSolver
 from sim.loads import Harmonic, LinearRamp, TimeSeries
 from sim.statics import StaticSolver
-from tests.sim.structures import BARRIER, Rig, rotating_squares
+from tests.sim.structures import Rig, rotating_squares
 
 LEFT = 3 * np.arange(3)
 TIMES = np.linspace(0.0, 2e-3, 5)

@@ -4,13 +4,14 @@ import jax
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim.arrays import Floats
 from sim.bloch import Cell, bands, brillouin_path, cell_of, strained
 from sim.errors import SimulationError
 from sim.geometry import shape
 from sim.lattice import Lattice, kagome
 from sim.model import Values, parameters, topology
-from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, NONE, rotating_squares
+from tests.sim.structures import NONE, rotating_squares
 
 NO_LOOSE = np.zeros((2, 2))
 

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jax import Array
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim import contact_kernels
 from sim.arrays import Floats, Numbers
 from sim.clear_step import FAR, clear_step
@@ -33,12 +34,12 @@ from sim.model import Values, parameters, topology
 from sim.network import Sensitivity
 from sim.outlines import Contacts
 from sim.system import System, system_of
-from tests.sim.structures import BARRIER, CONTACT, CUTOFF, MATERIAL, dense, hand_made
+from tests.sim.structures import dense, hand_made
 
 EXACT = 1e-12
 """Relative to the largest entry."""
 REACH = 0.8
-LAW = DistanceLaw(CONTACT * (REACH / 2.0) ** 2, REACH)
+LAW = DistanceLaw(float(MATERIAL.contact) * (REACH / 2.0) ** 2, REACH)
 
 
 def ring(rng: np.random.Generator, n: int, size: float) -> Floats:
@@ -104,7 +105,7 @@ class Differentiable(NamedTuple):
 def numbers(case: Crowd) -> Differentiable:
     contacts = case.contacts
     scale = contacts.per_stiffness
-    return Differentiable(contacts.corner, contacts.centroid, np.array([CONTACT]), scale)
+    return Differentiable(contacts.corner, contacts.centroid, np.array([MATERIAL.contact]), scale)
 
 
 PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, ligament_energy
@@ -16,14 +17,7 @@ from sim.model import Values, parameters, topology
 from sim.network import Network
 from sim.plan import concrete_parameters
 from tests.sim.reference_scenes import compressed, reference
-from tests.sim.structures import (
-    BARRIER,
-    CUTOFF,
-    MATERIAL,
-    mixed_polygons,
-    rotating_squares,
-    some_ligaments,
-)
+from tests.sim.structures import mixed_polygons, rotating_squares, some_ligaments
 
 LAW = ContactLaw(1.5, BARRIER, CUTOFF)
 

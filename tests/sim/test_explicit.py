@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF
 from sim.arrays import Floats
 from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
@@ -16,7 +17,7 @@ from sim.potential import gradient, hessian_product
 from sim.splitting import BLANES_MOAN, LEAPFROG, Splitting
 from sim.system import system_of, workspace
 from tests.sim.pulse import DURATION, exact_end, order, pulsed
-from tests.sim.structures import BARRIER, CUTOFF, Rig, mixed_polygons, rotating_squares
+from tests.sim.structures import Rig, mixed_polygons, rotating_squares
 
 CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
 SPLITTINGS = pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from jax import Array
 from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray
 
+from benchmarks.constants import CUTOFF
 from sim.arrays import Floats
 from sim.dynamics import Drive, Solver, simulate
 from sim.explicit import ExplicitSolver
@@ -27,7 +28,7 @@ from sim.implicit import ImplicitSolver
 from sim.loads import Harmonic, LinearRamp, TimeSeries
 from sim.splitting import BLANES_MOAN, LEAPFROG
 from sim.statics import StaticSolver
-from tests.sim.structures import CUTOFF, Numbers, Rig, mixed_polygons, rotating_squares
+from tests.sim.structures import Numbers, Rig, mixed_polygons, rotating_squares
 
 TAYLOR = {
     "design": np.geomspace(1e-3, 1e-4, 4),

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF
 from sim.arrays import Floats
 from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
@@ -13,7 +14,7 @@ from sim.loads import Harmonic, LinearRamp, TimeSeries
 from sim.statics import StaticSolver
 from sim.tableau import ESDIRK3
 from tests.sim.pulse import DURATION, exact_end, order, pulsed
-from tests.sim.structures import BARRIER, CUTOFF, NONE, Rig, mixed_polygons, rotating_squares
+from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
 
 CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
 

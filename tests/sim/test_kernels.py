@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from jax import Array
 
+from benchmarks.constants import BARRIER, CUTOFF
 from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats, Ints, Numbers
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
@@ -17,7 +18,7 @@ from sim.geometry import shape
 from sim.lattice import Lattice, quads
 from sim.matrix import clear, matrix, number_free_dofs
 from sim.network import Network, Sensitivity
-from tests.sim.structures import BARRIER, CUTOFF, dense, mixed_polygons
+from tests.sim.structures import dense, mixed_polygons
 
 EXACT = 1e-12
 """Relative to the largest entry."""

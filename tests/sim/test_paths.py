@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim.arrays import Floats
 from sim.evaluation import evaluator
 from sim.loads import LinearRamp, held_dofs
@@ -16,7 +17,7 @@ from sim.optimise.paths import Paths
 from sim.optimise.problem import Evaluate
 from sim.plan import make_plan
 from sim.scene import Scene
-from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, NONE, rotating_squares
+from tests.sim.structures import NONE, rotating_squares
 
 OPTIONS = SqpOptions(evaluations=6, retreats=0)
 

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim.arrays import Floats
 from sim.dynamics import solve_case
 from sim.evaluation import evaluator, losses
@@ -22,7 +23,7 @@ from sim.model import topology
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Scene
 from sim.statics import StaticSolver
-from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, NONE
+from tests.sim.structures import NONE
 
 ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 NEGLIGIBLE = 1e-12

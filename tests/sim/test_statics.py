@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF
 from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
@@ -16,7 +17,7 @@ from sim.model import Values
 from sim.potential import gradient
 from sim.statics import StaticSolver
 from sim.system import system_of, workspace
-from tests.sim.structures import BARRIER, CUTOFF, NONE, Rig, mixed_polygons, rotating_squares
+from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
 
 LEFT = 5 * np.arange(5)
 

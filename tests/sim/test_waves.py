@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim.arrays import Floats
 from sim.dynamics import solve_case
 from sim.evaluation import objective
@@ -19,7 +20,7 @@ from sim.potential import gradient
 from sim.scene import Scene
 from sim.splitting import BLANES_MOAN
 from sim.system import system_of, workspace
-from tests.sim.structures import BARRIER, CUTOFF, MATERIAL, NONE, Rig, rotating_squares
+from tests.sim.structures import NONE, Rig, rotating_squares
 
 SIDE = 12
 HOLE = np.array([65, 66, 77, 78])

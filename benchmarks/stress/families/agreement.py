@@ -12,11 +12,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
+from benchmarks.constants import MATERIAL
 from benchmarks.stress.checks import Answer, apart, solved
 from benchmarks.stress.definition import balance, stiffness
 from benchmarks.stress.drawn import Draws
 from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import MATERIAL, NONE, Posed, posed, squares
+from benchmarks.stress.posed import NONE, Posed, posed, squares
 from sim.arrays import Floats
 from sim.explicit import ExplicitSolver
 from sim.implicit import ImplicitSolver

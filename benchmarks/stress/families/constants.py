@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.constants import MATERIAL
 from benchmarks.stress.checks import equilibria, motions
 from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import MATERIAL, Posed, pressed, shaken, squares
+from benchmarks.stress.posed import Posed, pressed, shaken, squares
 from sim.errors import SimulationError
 from sim.loads import Harmonic
 
