@@ -136,8 +136,10 @@ def _check_end(run: subprocess.Popen[str]) -> None:
 
 
 def _parts(checkout: Checkout) -> tuple[str, ...]:
-    found = checkout.results.rglob(".*part*")
-    return tuple(sorted(path.name for path in found))
+    """Names of what is being written; folders may go while they are looked into."""
+    walked = os.walk(checkout.results)
+    names = (name for _, folders, files in walked for name in (*folders, *files))
+    return tuple(sorted(name for name in names if name.startswith(".") and "part" in name))
 
 
 def _at_work(checkout: Checkout) -> str:
