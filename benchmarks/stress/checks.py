@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ FAR_FROM_BALANCE = 1e-6
 displacement, mm/mm."""
 MOST_TOLERANCES = 50.0
 """A stage's own criterion is an estimate from how fast its iteration contracts."""
+ADVICE = "accuracy: tight"
 MOST_STAGES = 24
 """Stages of an implicit run whose balance is checked, evenly spread."""
 
@@ -177,6 +179,28 @@ def motions(case: Posed, asked: Floats, error: float, solver: Solver | None = No
         *checks,
         Check("change with half the steps", typically_apart(case, answer, finer), error, True),
     ]
+
+
+def motions_as_advised(case: Posed, asked: Floats, error: float) -> list[Check]:
+    """The same as planned by default; and if that is not enough by its own account, tight.
+
+    Args:
+        case: the case.
+        asked: times of the output, s.
+        error: as of ``motions``.
+
+    Raises:
+        SimulationError: it cannot be integrated, or not without other changes.
+    """
+    try:
+        checks = motions(case, asked, error)
+    except SimulationError as refusal:
+        if ADVICE not in str(refusal):
+            raise
+    else:
+        if all(check.kept or not check.stated for check in checks):
+            return checks
+    return motions(replace(case, scene=replace(case.scene, accuracy="tight")), asked, error)
 
 
 def stages(case: Posed, solver: implicit.ImplicitSolver, record: implicit.Record) -> list[Check]:

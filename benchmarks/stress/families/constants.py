@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.constants import MATERIAL
-from benchmarks.stress.checks import equilibria, motions
+from benchmarks.stress.checks import equilibria, motions_as_advised
 from benchmarks.stress.frame import Case, Check, Family
 from benchmarks.stress.posed import Posed, pressed, shaken, squares
-from sim.errors import SimulationError
 from sim.loads import Harmonic
 
 SIDE = 5
 LOADS = np.array([0.5, 1.0])
-ADVICE = "accuracy: tight"
 
 
 def family() -> Family:
@@ -27,8 +24,8 @@ def family() -> Family:
         "constants",
         "each stiffness, and that of an inclusion, 1e-3 to 1e6 times the paper's; no damping to 1e9"
         " times the paper's; masses even and spread over 6 decades: pressed, shaken at 2 and 60 Hz",
-        "balance by the definition, void angles by geometry, half the steps; where the default"
-        " accuracy does not do by its own estimate or message, at the tight one, as that advises",
+        "balance by the definition, void angles by geometry, half the steps; tight where the"
+        " default accuracy does not do, as its message or estimate of error says",
         _cases,
     )
 
@@ -76,14 +73,4 @@ def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterato
 
 
 def _shaken(case: Posed) -> Sequence[Check]:
-    """As planned by default; and if that is not enough by its own account, tight."""
-    asked = np.linspace(0.0, case.scene.duration, 26)
-    try:
-        checks = motions(case, asked, 0.05)
-    except SimulationError as refusal:
-        if ADVICE not in str(refusal):
-            raise
-    else:
-        if all(check.kept or not check.stated for check in checks):
-            return checks
-    return motions(replace(case, scene=replace(case.scene, accuracy="tight")), asked, 0.05)
+    return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 26), 0.05)

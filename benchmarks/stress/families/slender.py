@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import equilibria, motions
+from benchmarks.stress.checks import equilibria, motions_as_advised
 from benchmarks.stress.drawn import Draws
 from benchmarks.stress.frame import Case, Check, Family
 from benchmarks.stress.posed import Posed, pressed, shaken, squares
@@ -49,4 +49,4 @@ def _attempt(draws: Draws, seed: int, case: Posed) -> Sequence[Check]:
     made = replace(case, vertices=vertices)
     if case.scene.static:
         return [margin, *equilibria(made, np.array([0.5, 1.0]))]
-    return [margin, *motions(made, np.linspace(0.0, case.scene.duration, 26), 0.05)]
+    return [margin, *motions_as_advised(made, np.linspace(0.0, case.scene.duration, 26), 0.05)]
