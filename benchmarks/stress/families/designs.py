@@ -26,8 +26,8 @@ def family() -> Family:
         "designs",
         f"random designs of {SIDE} x {SIDE} units that can be made, shifts up to {LARGEST} mm: each"
         " pressed by 10 %, a third shaken slowly, a third fast, a third with contact on distances",
-        "balance by the definition, void angles and overlaps by geometry, half the steps; tight where"
-        " the default accuracy does not do, as its message or estimate of error says",
+        "balance by the definition, void angles and overlaps by geometry, half the steps; tight"
+        " where the default accuracy does not do, as its message or estimate of error says",
         _cases,
     )
 
