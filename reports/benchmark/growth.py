@@ -30,7 +30,7 @@ def build(data: xr.Dataset) -> Figure:
     for axes, values in ((left, times), (right, memory)):
         _lines(axes, measured["method"].values, sizes.values, values, FITTED[of])
     left.set(ylabel="processor time, s", yscale="log")
-    right.set(ylabel="peak memory, MiB", ylim=(0, None))
+    right.set(ylabel="peak memory, MiB", ylim=(0, 1.1 * memory.max()))
     left.legend(loc="upper left")
     right.legend(loc="lower right")
     for axes in (left, right):
