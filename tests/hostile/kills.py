@@ -7,7 +7,7 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -104,13 +104,13 @@ def killed(
     while left:
         kill = _one(checkout, random, span)
         if kill is None:
-            wrong += _differences(checkout, wanted)
+            wrong += differences(checkout, wanted)
             shutil.rmtree(checkout.results)
         else:
             left -= 1
             tell(kill)
     finished(checkout)
-    return wrong + _differences(checkout, wanted)
+    return wrong + differences(checkout, wanted)
 
 
 def _one(checkout: Checkout, random: Random, span: float) -> Kill | None:
@@ -151,7 +151,8 @@ def _date(path: Path) -> float:
     return path.stat().st_mtime
 
 
-def _differences(checkout: Checkout, wanted: dict[str, bytes]) -> list[str]:
+def differences(checkout: Checkout, wanted: Mapping[str, bytes]) -> list[str]:
+    """Names of the results that differ from the wanted ones, or that only one has."""
     found = built(checkout)
     names = sorted(found.keys() | wanted.keys())
     return [name for name in names if found.get(name) != wanted.get(name)]
