@@ -9,7 +9,7 @@ PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(adds
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
-PYTEST ?= -n auto --dist loadgroup --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
+PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 
