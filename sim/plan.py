@@ -9,6 +9,7 @@ import numpy as np
 
 from sim import grid
 from sim.adaptive import adapted
+from sim.admission import refuse_idle
 from sim.arrays import Floats, Ints
 from sim.dynamics import Solver
 from sim.explicit import ExplicitSolver
@@ -113,7 +114,11 @@ def make_plan(
         asked: (n_asked,) output times, s; None for the loss's own samples.
         threads: cases to solve side by side.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
+
+    Raises:
+        SimulationError: nothing can move, or nothing acts on what does.
     """
+    refuse_idle(scene.topology)
     structure = scene.lattice.vertices if vertices is None else vertices
     values = concrete_parameters(scene, structure)
     times = sample_times(scene) if asked is None else asked

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.stress import __main__ as suite
 from benchmarks.stress import checks, registry
 from benchmarks.stress.definition import balance, stiffness
+from benchmarks.stress.families import pieces
 from benchmarks.stress.frame import Case, Check, Family, Tally, attempted
 from benchmarks.stress.posed import DISTANCE, Posed, pressed, shaken, squares
 from sim.errors import SimulationError
@@ -169,3 +170,12 @@ def test_a_wrong_answer_fails_the_suite(
 def test_an_unknown_family_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert suite.main(["tides"]) == 2
     assert "no family tides" in capsys.readouterr().err
+
+
+def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
+    alone = [case for case in pieces.family().cases(False) if "no ligament" in case.name]
+    assert len(alone) == 3
+    for case in alone:
+        outcome = attempted(case)
+        assert outcome.verdict == "refused"
+        assert "no two units are joined" in outcome.message
