@@ -97,7 +97,7 @@ class Constraints:
         entries = (2 * free[:, None] + [0, 1]).ravel(), (2 * row[free, None] + [0, 1]).ravel()
         ones = np.ones(2 * len(free))
         gather = sp.csr_array((ones, entries), shape=(2 * space.lattice.n_vertices, count))
-        return sp.csr_array(gather @ sp.csr_array(space.basis))
+        return sp.csr_array(gather @ space.basis)
 
     @cached_property
     def _scatter(self) -> tuple[tuple[Ints, Ints], sp.csr_array]:

@@ -10,6 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 from jax import Array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from sim.arrays import Floats, Ints, Numbers
 from sim.lattice import Lattice
@@ -34,12 +36,12 @@ class DesignSpace:
     Attributes:
         lattice: the initial network; a zero design vector leaves it as it is.
         groups: (n_free,) free design groups.
-        basis: (2 n_free, n_variables) columns of shifts, one per variable.
+        basis: (2 n_free, n_variables) orthogonal columns of shifts, one per variable.
     """
 
     lattice: Lattice
     groups: Ints
-    basis: Floats
+    basis: sp.csr_array
 
     @property
     def n_variables(self) -> int:
@@ -53,13 +55,16 @@ class DesignSpace:
 
     def vertices(self, design: Numbers) -> Array:
         """Vertex positions (n_vertices, 2) of a design vector (n_variables,), mm."""
-        free_shifts = (jnp.asarray(self.basis) @ design).reshape(-1, 2)
+        basis = self.basis.tocoo()
+        moved = jnp.asarray(basis.data) * jnp.asarray(design)[basis.col]
+        free_shifts = jnp.zeros(basis.shape[0]).at[basis.row].add(moved).reshape(-1, 2)
         shifts = jnp.zeros((self.lattice.n_groups, 2)).at[self.groups].set(free_shifts)
         return jnp.asarray(self.lattice.vertices) + shifts[self.lattice.group]
 
     def project(self, shifts: Floats) -> Floats:
         """Design vector closest to the given group shifts (n_groups, 2), mm."""
-        return np.asarray(np.linalg.lstsq(self.basis, shifts[self.groups].ravel(), rcond=None)[0])
+        square = self.basis.power(2).sum(axis=0)  # of orthogonal columns
+        return np.asarray(self.basis.T @ shifts[self.groups].ravel() / square)
 
 
 def design_space(
@@ -84,40 +89,35 @@ def design_space(
     return DesignSpace(lattice, groups, _symmetric_basis(lattice, groups, symmetry))
 
 
-def _symmetric_basis(lattice: Lattice, groups: Ints, symmetry: Symmetry) -> Floats:
+def _symmetric_basis(lattice: Lattice, groups: Ints, symmetry: Symmetry) -> sp.csr_array:
     """Orthogonal basis of the shifts of ``groups`` that the symmetry's operations leave alone."""
-    size = 2 * len(groups)
-    if symmetry == "none":
-        return np.eye(size)
-    projector = np.eye(size)
+    identity = sp.csr_array(sp.eye_array(2 * len(groups)))
+    projector = identity
     for operation in _OPERATIONS[symmetry]:
         image = _group_image(lattice, groups, operation)
-        permutation = sp.csr_matrix(
-            (np.ones(len(groups)), (image, np.arange(len(groups)))), shape=(len(groups),) * 2
-        )
-        step = sp.kron(permutation, operation).toarray()
-        powers = [np.eye(size)]
-        while not np.allclose(nxt := step @ powers[-1], np.eye(size)):
-            powers.append(nxt)
-        projector = np.mean(powers, axis=0) @ projector
-    return _orbit_basis(projector)
+        ones, order = np.ones(len(groups)), np.arange(len(groups))
+        permutation = sp.csr_array((ones, (image, order)), shape=(len(groups),) * 2)
+        step = sp.csr_array(sp.kron(permutation, operation))
+        powers = [identity]
+        while abs((following := step @ powers[-1]) - identity).max() > 0.0:
+            powers.append(following)
+        projector = sum(powers[1:], powers[0]) @ projector / len(powers)
+    return _orbits(projector)
 
 
-def _orbit_basis(projector: Floats) -> Floats:
-    """Orthogonal columns spanning a projector's range, each on one orbit, largest entry 1."""
-    columns: list[Floats] = []
-    covered = np.zeros(len(projector), dtype=bool)
-    for k in range(len(projector)):
-        if covered[k]:
-            continue
-        column = projector[:, k]
-        for other in columns:
-            column = column - (other @ column) * other
-        norm = np.linalg.norm(column)
-        if norm > 1e-9:
-            columns.append(column / norm)
-            covered |= np.abs(column) > 1e-9
-    return np.stack([column / np.abs(column).max() for column in columns], axis=1)
+def _orbits(projector: sp.csr_array) -> sp.csr_array:
+    """Columns that span a projector's range, one for each orbit of signed permutations.
+
+    Their largest entry is 1; an orbit that a symmetry holds in place has none.
+    """
+    if projector.shape[0] == 0:
+        return projector
+    _, orbit = connected_components(projector, directed=False)
+    _, first = np.unique(orbit, return_index=True)
+    columns = projector[:, np.sort(first)]
+    largest = abs(columns).max(axis=0).toarray().ravel()
+    moving = np.flatnonzero(largest)
+    return sp.csr_array(columns[:, moving] @ sp.diags_array(1.0 / largest[moving]))
 
 
 def _group_image(lattice: Lattice, groups: Ints, operation: Floats) -> Ints:
@@ -127,8 +127,7 @@ def _group_image(lattice: Lattice, groups: Ints, operation: Floats) -> Ints:
     count = np.bincount(lattice.group, minlength=lattice.n_groups)
     np.add.at(centre, lattice.group, lattice.vertices - middle)
     centre = (centre / count[:, None])[groups]
-    distance = np.linalg.norm((centre @ operation.T)[:, None] - centre[None], axis=2)
-    image = distance.argmin(axis=1)
-    if len(groups) and distance.min(axis=1).max() > 1e-6 * lattice.spacing:
+    distance, image = KDTree(centre).query(centre @ operation.T)
+    if len(groups) and distance.max() > 1e-6 * lattice.spacing:
         raise ValueError("the initial lattice or its cloak does not have this symmetry")
-    return image
+    return np.asarray(image)

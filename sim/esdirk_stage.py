@@ -22,6 +22,9 @@ MAX_ITERATIONS = 30
 MAX_FACTORS = 12
 REFACTOR_ABOVE = 0.3
 KEEP_FROM_BARRIER = 0.9
+MEMORY = 0.5
+"""Most that the rate may fall from one iteration to the next: one that gets rid of what contracts
+fast looks better than the iterations after it, which are left with the rest."""
 
 CONVERGED, STALLED, INDEFINITE = 0, 1, 2
 
@@ -105,7 +108,7 @@ def solve_stage(
                 return STALLED, False, 1.0
             if not factorise_stage(motion, system, work, base.k):
                 return INDEFINITE, False, 1.0
-            fresh, previous = True, 0.0
+            fresh, previous, rate = True, 0.0, min(rate, REFACTOR_ABOVE)
         gap, size = _newton_step(motion, target, base, system, work)
         counts[0] += 1
         counts[2] += 1
@@ -117,7 +120,7 @@ def solve_stage(
             fresh = False
             continue
         if previous > 0.0:
-            rate = size / previous
+            rate = max(size / previous, MEMORY * rate)
         likely = min(rate, 0.9)
         settled = likely / (1.0 - likely) * size <= tolerance or size <= 1e-13
         if gap == 0.0 and settled:

@@ -87,7 +87,7 @@ def _newton(of: Structure, state: Floats, free: Ints) -> tuple[Floats, int]:
     step = np.zeros_like(state)
     if len(free) == 0:
         return step, 0
-    matrix = stiffness(of, state)[np.ix_(free, free)]
+    matrix = stiffness(of, state)[free][:, free]
     factor = _factor(sp.csc_array(matrix))
     step[free] = factor.solve(balance(of, state).force[free])
     return step, negative_pivots(factor)
@@ -217,7 +217,7 @@ def stages(case: Posed, solver: implicit.ImplicitSolver, record: implicit.Record
         state = record.u[n, s]
         inertia = mass * record.a[n, s] + damping * record.v[n, s]
         right = (balance(case.structure, state).force - inertia)[free]
-        matrix = stiffness(case.structure, state)[np.ix_(free, free)]
+        matrix = stiffness(case.structure, state)[free][:, free]
         more = sp.diags_array(((mass / k + damping) / k)[free], format="csc")
         factor = _factor(sp.csc_array(matrix + more))
         step = np.zeros_like(state)

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.stress import __main__ as suite
 from benchmarks.stress import checks, registry
 from benchmarks.stress.definition import balance, stiffness
-from benchmarks.stress.families import pieces
+from benchmarks.stress.families import constants, pieces
 from benchmarks.stress.frame import Case, Check, Family, Tally, attempted
 from benchmarks.stress.posed import DISTANCE, Posed, pressed, shaken, squares
 from sim.errors import SimulationError
@@ -179,3 +179,9 @@ def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
         outcome = attempted(case)
         assert outcome.verdict == "refused"
         assert "no two units are joined" in outcome.message
+
+
+def test_stages_settle_that_contract_fast_at_first_and_slowly_then() -> None:
+    name = "axial stiffness times 1e+01, shaken at 60 Hz"
+    stiff = [case for case in constants.family().cases(False) if case.name == name]
+    assert [attempted(case).verdict for case in stiff] == ["solved"]

@@ -88,6 +88,13 @@ def same_set(one: Floats, other: Floats) -> bool:
     return bool(apart.min(axis=0).max() < 1e-9 and apart.min(axis=1).max() < 1e-9)
 
 
+@pytest.mark.parametrize("symmetry", ["none", "mirror_x"])
+def test_memory_grows_as_the_cloak_does(symmetry: Symmetry) -> None:
+    lattice = quads(60, 60, 15.0, 3.0, np.deg2rad(25.0))
+    space = design_space(lattice, np.arange(lattice.n_units), symmetry=symmetry)
+    assert 10_000 < space.basis.nnz <= space.basis.shape[0]
+
+
 def test_project_inverts_a_symmetric_design() -> None:
     lattice = rotating_squares()
     space = design_space(lattice, RING, MIDDLE, "C4")
