@@ -118,6 +118,18 @@ def squeezed_case(folder: Path) -> Case:
     return _track_case(folder, track, TRUTH | begin, list(begin))
 
 
+def shaken_case(folder: Path) -> Case:
+    """A motion in time, which inertia slows down: it tells stiffness itself, and damping."""
+    begin = {"shear_stiffness": "1.0 N/mm", "damping": {"ratio": 0.015}}
+    error = {"displacement": "0.02 mm", "rotation": "0.1 deg"}
+    track = {
+        "problem": "shaken.yaml",
+        "bias": error,
+        "virtual": {"rate": "150 Hz", "noise": error, "bias": error},
+    }
+    return _track_case(folder, track, TRUTH | begin, ["shear_stiffness", "damping_ratio"])
+
+
 def _track_case(
     folder: Path, given: dict[str, Any], begin_of: dict[str, Any], wanted: list[str]
 ) -> Case:
@@ -177,7 +189,7 @@ def _bound(case: Case) -> Floats:
     return np.sqrt(np.diag(covariance))[: len(model.names)]
 
 
-@pytest.mark.parametrize("case", [forces_case, decay_case, squeezed_case])
+@pytest.mark.parametrize("case", [forces_case, decay_case, squeezed_case, shaken_case])
 def test_intervals_hold_and_are_no_wider_than_need_be(
     case: Callable[[Path], Case], tmp_path: Path
 ) -> None:
