@@ -85,23 +85,23 @@ def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
     assert loss(holed, whole, part) == pytest.approx(exact, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("bias_deg", "stiffened", "drift"),
-    [(20.0, False, 1e-3), (40.0, True, 1e-3), (40.0, False, 1e-2)],
-    ids=["free", "in contact", "in contact, at the limit without it"],
-)
-def test_energy_does_not_drift_in_1e5_steps(bias_deg: float, stiffened: bool, drift: float) -> None:
-    """At half the stability limit, undamped, after the drive has come to rest."""
+@pytest.mark.parametrize(("bias_deg", "share"), [(20.0, 0.5), (40.0, 0.1)], ids=["free", "touch"])
+def test_energy_does_not_drift_in_1e5_steps(bias_deg: float, share: float) -> None:
+    """At half the stability limit or more, undamped, after the drive has come to rest.
+
+    Where voids close, the limit is that in the state in which one is closed most.
+    """
     rig = pushed(bias_deg)
-    limit = stability_limit(rig, deepest(rig) if stiffened else None)
-    u, v = undamped(rig, 0.5 * limit, 100_000)
+    step = share * stability_limit(rig)
+    u, v = undamped(rig, step, 100_000)
     system = system_of(rig.topology, rig.values)
     work = workspace(system)
     potential = np.array([sum(gradient(state, system, work.turn, work.force)) for state in u])
     energy = potential + 0.5 * v**2 @ rig.values.mass.ravel()
-    closed = smallest_voids(rig, u).min()
-    assert (closed < CUTOFF) == (bias_deg > 20.0)
-    np.testing.assert_allclose(energy, energy[0], rtol=drift)
+    voids = rig.topology.smallest_void_angle(rig.values.void, u.reshape(len(u), -1, 3))
+    assert (voids.min() < CUTOFF) == (bias_deg > 20.0)
+    assert step >= 0.5 * stability_limit(rig, u[voids.argmin()])
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-3)
 
 
 def pushed(bias_deg: float) -> Rig:
@@ -110,10 +110,10 @@ def pushed(bias_deg: float) -> Rig:
     return Rig(rotating_squares(3, bias_deg), np.array([0]), np.array([4]), push)
 
 
-def undamped(rig: Rig, step: float, n_steps: int, n_asked: int = 2_000) -> tuple[Floats, Floats]:
-    """Displacement and velocity (n_asked, n_dofs) after the push, held dofs at rest."""
+def undamped(rig: Rig, step: float, n_steps: int) -> tuple[Floats, Floats]:
+    """Displacement and velocity (n_asked, n_dofs) every second step after the push."""
     values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
-    asked = np.asarray(step * np.arange(500, n_steps + 1, n_steps // n_asked))
+    asked = np.asarray(step * np.arange(500, n_steps + 1, 2))
     solver = ExplicitSolver(rig.topology, n_steps * step, n_steps, asked)
     u, v, record = solver.forward(values, rig.drive)
     assert record.steps.n_steps == n_steps
@@ -121,23 +121,11 @@ def undamped(rig: Rig, step: float, n_steps: int, n_asked: int = 2_000) -> tuple
     return u, v
 
 
-def deepest(rig: Rig) -> Floats:
-    """The state (n_dofs,) of 40 000 in which a void is closed most."""
-    u, _ = undamped(rig, stability_limit(rig) / 8, 40_000, 40_000)
-    return u[smallest_voids(rig, u).argmin()]
-
-
 def stability_limit(rig: Rig, state: Floats | None = None) -> float:
     """Longest stable step, s: without contact, or with that in a state."""
     touching = NONE if state is None else None
     frequency = highest_frequency(rig.topology, rig.values, state, touching)
     return BLANES_MOAN.stability / frequency
-
-
-def smallest_voids(rig: Rig, states: Floats) -> Floats:
-    """Of each state, rad."""
-    motion = states.reshape(len(states), -1, 3)
-    return rig.topology.smallest_void_angle(rig.values.void, motion)
 
 
 def test_memory_of_the_adjoint_grows_with_the_root_of_the_steps() -> None:
