@@ -21,6 +21,8 @@ from sim.system import System, Workspace
 MAX_ITERATIONS = 30
 MAX_FACTORS = 12
 REFACTOR_ABOVE = 0.3
+NEW_RATE = 0.3
+"""At which a new factor is presumed to contract at most, until it is seen."""
 KEEP_FROM_BARRIER = 0.9
 MEMORY = 0.5
 """Most that the rate may fall from one iteration to the next: one that gets rid of what contracts
@@ -108,7 +110,7 @@ def solve_stage(
                 return STALLED, False, 1.0
             if not factorise_stage(motion, system, work, base.k):
                 return INDEFINITE, False, 1.0
-            fresh, previous, rate = True, 0.0, min(rate, REFACTOR_ABOVE)
+            fresh, previous, rate = True, 0.0, min(rate, NEW_RATE)
         gap, size = _newton_step(motion, target, base, system, work)
         counts[0] += 1
         counts[2] += 1

@@ -162,7 +162,7 @@ class ExplicitSolver:
             raise SimulationError(
                 f"the explicit run needs {n_steps} steps of {h:.3g} s to be stable, and"
                 f" {needed / 1e9:.3g} GB for its drive alone; try softer ligaments, heavier units,"
-                " a shorter time or accuracy: default"
+                " a shorter time or integrator: implicit"
             )
         held = drive.values(self.topology.held, self._kick_times(n_steps))
         return Steps(

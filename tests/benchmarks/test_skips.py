@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import pytest
 
 from benchmarks.frame import errors
 from benchmarks.skips import SKIPS, Skip
+from sim.arrays import Floats
 
 COMPILED = ("compilation", "fresh factors")
-"""Those that compile every loop anew, a minute each: `snakemake benchmark` measures them."""
+"""Those that compile every loop anew, minutes each: tests/slow/test_skips.py tries them."""
 
 
 @pytest.mark.parametrize(
@@ -17,6 +20,10 @@ COMPILED = ("compilation", "fresh factors")
 def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
     name = "small_wave" if skip.wave else "small_push"
     done, skipped = (skip.prepare(name, made, "loss")().values for made in (0.0, 1.0))
+    refuse_change(skip, done, skipped)
+
+
+def refuse_change(skip: Skip, done: Mapping[str, Floats], skipped: Mapping[str, Floats]) -> None:
     changes = errors(done, skipped)
     assert changes.keys() == done.keys() == skipped.keys()
     assert max(changes.values()) <= skip.tolerance
