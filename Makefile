@@ -67,8 +67,6 @@ setup: .venv/requirements.lock
 wheels:
 	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements.lock \
 	    --dest "$(or $(WHEELS),wheels)"
-	@$(PYTHON) -m pip download --quiet --disable-pip-version-check setuptools wheel \
-	    --dest "$(or $(WHEELS),wheels)"  # what builds the packages that come as source
 
 $(STUDIES) $(PAGES): setup
 	@exec $(BIN)/python -m pipeline.run "$$TARGET"

@@ -106,10 +106,10 @@ def decay_case(folder: Path) -> Case:
     return Case(asked, true, draw, [decay.experiment(known, *one)])
 
 
-def squeezed_case(folder: Path) -> Case:
+def squeezed_case(folder: Path, noise: float = 1.0) -> Case:
     """Equilibria, which tell ratios of stiffness."""
     begin = {"bending_stiffness": "1.7 N mm/rad", "axial_stiffness": "100 N/mm"}
-    error = {"displacement": "0.003 mm", "rotation": "0.02 deg"}
+    error = {"displacement": f"{0.003 * noise} mm", "rotation": f"{0.02 * noise} deg"}
     track = {
         "problem": "squeezed.yaml",
         "bias": error,
@@ -118,14 +118,14 @@ def squeezed_case(folder: Path) -> Case:
     return _track_case(folder, track, TRUTH | begin, list(begin))
 
 
-def shaken_case(folder: Path) -> Case:
+def shaken_case(folder: Path, noise: float = 1.0) -> Case:
     """A motion in time, which inertia slows down: it tells stiffness itself, and damping."""
     begin = {"shear_stiffness": "1.0 N/mm", "damping": {"ratio": 0.015}}
-    error = {"displacement": "0.02 mm", "rotation": "0.1 deg"}
+    error = {"displacement": f"{0.02 * noise} mm", "rotation": f"{0.1 * noise} deg"}
     track = {
         "problem": "shaken.yaml",
         "bias": error,
-        "virtual": {"rate": "150 Hz", "noise": error, "bias": error},
+        "virtual": {"rate": "300 Hz", "noise": error, "bias": error},
     }
     return _track_case(folder, track, TRUTH | begin, ["shear_stiffness", "damping_ratio"])
 
@@ -197,3 +197,16 @@ def test_intervals_hold_and_are_no_wider_than_need_be(
     for name, inside, width in zip(*told, strict=True):
         assert FEWEST <= inside <= MOST, name
         assert width < WIDEST, name
+
+
+@pytest.mark.parametrize("case", [squeezed_case, shaken_case])
+def test_a_track_of_little_noise_tells_constants_within_1_percent(
+    case: Callable[[Path, float], Case], tmp_path: Path
+) -> None:
+    made = case(tmp_path, 0.1)
+    model = Model(start(made.asked), made.asked.fit, made.draw(np.random.default_rng(0)))
+    found = settled(model)
+    estimate = findings.estimate(found, uncertainty.uncertainty(found))
+    middle = np.sqrt(estimate.low * estimate.high)[: len(made.asked.fit)]
+    true = np.exp(made.true.logs(made.asked.fit))
+    np.testing.assert_allclose(middle, true, rtol=0.01)
