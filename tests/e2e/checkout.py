@@ -77,10 +77,12 @@ class Checkout:
     def take_kernels(self, root: Path) -> None:
         """Compiled loops of another checkout with the same sources, which Numba files by folder."""
         locate = numba.core.caching.UserProvidedCacheLocator.get_suitable_cache_subpath
-        there, here = (locate(str(folder / "sim/band.py")) for folder in (root, self.root))  # type: ignore[no-untyped-call]
-        for folder in root.glob(f".cache/numba/*/{there}"):
-            target = self.root / folder.relative_to(root).with_name(here)
-            shutil.copytree(folder, target, dirs_exist_ok=True)
+        sources = (path for room in ROOMS for path in root.glob(f"{room}/**/*.py"))
+        for room in {path.parent.relative_to(root) for path in sources}:
+            there, here = (locate(str(folder / room / "loop.py")) for folder in (root, self.root))  # type: ignore[no-untyped-call]
+            for folder in root.glob(f".cache/numba/*/{there}"):
+                target = self.root / folder.relative_to(root).with_name(here)
+                shutil.copytree(folder, target, dirs_exist_ok=True)
 
     @property
     def problem(self) -> Path:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import fcntl
+import os
 from pathlib import Path
 
 import pytest
@@ -10,11 +12,19 @@ from tests.e2e.checkout import Checkout
 
 @pytest.fixture(scope="session")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
-    """A checkout in which `make` built the study at one go; not to be changed."""
-    checkout = Checkout.made(tmp_path_factory.mktemp("undisturbed") / "checkout")
-    checkout.take_kernels(ROOT)
-    ended = checkout.make()
-    assert ended.returncode == 0, ended.stdout + ended.stderr
+    """A checkout in which `make` built the study at one go, once for all; not to be changed."""
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:  # each has a folder of its own in the run's
+        folder = folder.parent
+    checkout, built = Checkout(folder / "undisturbed"), folder / "undisturbed_is_built"
+    with (folder / "undisturbed.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not built.exists():
+            Checkout.made(checkout.root)
+            checkout.take_kernels(ROOT)
+            ended = checkout.make()
+            assert ended.returncode == 0, ended.stdout + ended.stderr
+            built.touch()
     return checkout
 
 
