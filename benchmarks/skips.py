@@ -189,7 +189,7 @@ SKIPS = (
     Skip("equal load cases", equal_cases, True, 1e-6, "the symmetry turns one into the other"),
     Skip("paths from rest", cold_start, False, 1e-9, "a similar design's path is near"),
     Skip("compilation", fresh.compilation, True, EXACT, "loops compiled before are on the disk", 1),
-    Skip("fresh factors", fresh.factors, True, 1e-6, "an old factor still converges"),
+    Skip("fresh factors", fresh.factors, True, 1e-4, "stages are solved to a tolerance anyway"),
 )
 
 
