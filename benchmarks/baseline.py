@@ -53,7 +53,7 @@ class RungeKutta:
 def force(scene: Scene) -> Force:
     """Function (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
     pairs = scene.lattice.ligament_units
-    barrier, cutoff = jnp.asarray(scene.barrier), jnp.asarray(scene.cutoff)
+    barrier, cutoff = np.asarray(scene.barrier), np.asarray(scene.cutoff)
 
     def energy(ends: Array, values: tuple[Array, ...]) -> Array:
         arm, vector, void, law, contact = values
@@ -75,10 +75,10 @@ def field(scene: Scene, drive: Drive) -> tuple[Callable[..., Any], Callable[[Arr
     """Right-hand side for the free dofs, and the map from a time and free dofs to all motion."""
     top = scene.topology
     gradient, free = force(scene), np.sort(top.free_dofs)
-    rest = jnp.zeros(top.n_dofs)
 
     def motion(time: Array, displacement: Array) -> Array:
         held = held_values(top.held, drive.units, drive.motion, time[None])[0]
+        rest = jnp.zeros(top.n_dofs)
         return rest.at[top.held].set(held).at[free].set(displacement).reshape(-1, 3)
 
     def rates(time: Array, state: tuple[Array, Array], values: Parameters) -> tuple[Array, Array]:

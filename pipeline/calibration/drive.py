@@ -4,8 +4,10 @@ Every course is a cubic spline with equal intervals that begins at zero, as the 
 a constant that stays with its unit, which is no motion. A spline that smooths until its residuals
 are as large as the noise would leave out a part of the motion that all driven units have in common;
 least squares leave out only what the intervals are too long for. Their number is found over all
-courses together by the criterion of Akaike, corrected for short series (Hurvich & Tsai 1989), and
-doubled, which makes what is left out sixteen times smaller.
+courses together by the criterion of Akaike, corrected for short series (Hurvich & Tsai 1989). The
+criterion leaves out what is worth no unknown of its own, but all of that together may be worth many
+standard errors of a constant, and free units that resonate show it larger still. So the intervals
+are a quarter as long, and what is left out 256 times smaller.
 
 The coefficients are linear in the measured values, so that their covariance is known: each column
 of its root is a change of the drive by one standard deviation, independent of all others.
@@ -28,6 +30,8 @@ from sim.scene import Scene
 _DEGREE = 3
 _FLOOR = 0.01
 """Mean square of residuals, in the tracker's variances, below which they are rounding."""
+_FINER, _COARSE = 4, 2
+"""Times as many intervals as the criterion finds are wanted; with fewer than that is warned of."""
 _PART = 0.5
 """Coefficients are at most this part of the frames."""
 
@@ -61,7 +65,7 @@ class Followed(NamedTuple):
     Attributes:
         held: units, and their motion by values and slopes at the knots.
         changes: of that motion, independent of one another.
-        coarse: whether the frames are too few to double the number of intervals.
+        coarse: whether the frames are too few for enough intervals.
     """
 
     held: redrive.Held
@@ -137,7 +141,7 @@ def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
     places = np.flatnonzero(~held.assumed).tolist()
     most = max(1, int(_PART * len(seen.time)) - _DEGREE)
     best = min(_doubled(most), key=lambda count: _criterion(seen, places, count))
-    intervals = min(2 * best, most)
+    intervals = min(_FINER * best, most)
     value, slope = (np.zeros((intervals + 1, len(held.unit), 3)) for _ in range(2))
     changes: list[Change] = []
     for place in places:
@@ -150,7 +154,7 @@ def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
     for course in (value, slope):
         course[:, guessed] = course[:, mean].mean(axis=1, keepdims=True)
     motion = redrive.Course(seen.time[-1] / intervals, value, slope)
-    return Followed(held._replace(motion=motion), tuple(changes), intervals < 2 * best)
+    return Followed(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
 
 
 def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> _Seen:
