@@ -53,13 +53,14 @@ class RungeKutta:
 def force(scene: Scene) -> Force:
     """Function (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
     pairs = scene.lattice.ligament_units
-    barrier, cutoff = np.asarray(scene.barrier), np.asarray(scene.cutoff)
 
     def energy(ends: Array, values: tuple[Array, ...]) -> Array:
         arm, vector, void, law, contact = values
         strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
         angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
-        return strain + jnp.sum(contact_energy(angles, ContactLaw(contact, barrier, cutoff)))
+        return strain + jnp.sum(
+            contact_energy(angles, ContactLaw(contact, scene.barrier, scene.cutoff))
+        )
 
     of_ends = jax.vmap(jax.grad(energy))
 

@@ -86,9 +86,14 @@ class Measured:
         )
 
     def causes(self, deviation: Floats) -> Floats:
-        """The expected causes (m,) of deviations (n,) from the values, in standard deviations."""
-        along = self.axes.T @ self._less_mean(deviation / self.sigma)
-        return np.asarray(self.mixture @ (along * self.spread / (1 + self.spread**2)))
+        """The expected causes (m, ...) of deviations (n, ...), in standard deviations."""
+        along = self.axes.T @ self._less_mean((deviation.T / self.sigma).T)
+        return np.asarray(self.mixture @ (along.T * self.spread / (1 + self.spread**2)).T)
+
+    def unexplained(self, causes: Floats) -> Floats:
+        """Causes (m, ...) times their covariance once the values are known, 1 before."""
+        known = self.spread**2 / (1 + self.spread**2)
+        return causes - self.mixture @ (known * (self.mixture.T @ causes).T).T
 
     def _less_common(self, white: Floats) -> Floats:
         if not len(self.spread):

@@ -82,6 +82,20 @@ class Field:
         """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
         return self.simulation.pulled_back(constants, bar, self.drive)
 
+    def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
+        drive = self.drive or self.simulation.drive
+        motion = self.simulation.pulled_to_drive(constants, bar, drive)
+        assert isinstance(motion, redrive.Course)
+        value, slope = np.asarray(motion.value), np.asarray(motion.slope)
+        return np.array(
+            [
+                value[:, each.place, each.dof] @ each.value
+                + slope[:, each.place, each.dof] @ each.slope
+                for each in self.changes
+            ]
+        )
+
     def with_drive_noise(self, constants: Constants) -> Field:
         """The same, knowing what the noise of the measured drive does to the prediction.
 

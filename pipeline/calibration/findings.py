@@ -32,6 +32,7 @@ class Estimate(NamedTuple):
         wanted: how many of them were fitted.
         value: (n,) in working units.
         error: (n,) standard errors of their logarithms.
+        bound: (n,) of Cramer and Rao, of the standard errors.
         low, high: (n,) ends of the 95 % intervals.
         covariance: (n, n) of the logarithms.
         status: (n,) how well each is determined.
@@ -43,6 +44,7 @@ class Estimate(NamedTuple):
     wanted: int
     value: Floats
     error: Floats
+    bound: Floats
     low: Floats
     high: Floats
     covariance: Floats
@@ -80,7 +82,7 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     logs = fit.unknowns[: len(names)]
     turn = slopes(fit.model.begin, names, logs, lambda each: each.logs(every))
     covariance = turn @ known.covariance @ turn.T
-    error = np.sqrt(np.diag(covariance))
+    error, bound = (np.sqrt(np.diag(each)) for each in (covariance, turn @ known.least @ turn.T))
     here = fit.model.constants(fit.unknowns)
     reach = _quantile(fit) * error
     low, high = (_values(here, every, here.logs(every) + sign * reach) for sign in (-1, 1))
@@ -92,7 +94,9 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     scaled = known.covariance / np.outer(error[: len(names)], error[: len(names)])
     axes = np.linalg.eigvalsh(scaled)
     condition = float(np.sqrt(axes[-1] / max(axes[0], 1e-16)))
-    return Estimate(every, len(names), values, error, low, high, covariance, status, condition)
+    return Estimate(
+        every, len(names), values, error, bound, low, high, covariance, status, condition
+    )
 
 
 def _values(here: Constants, names: Sequence[Name], logs: Floats) -> Floats:

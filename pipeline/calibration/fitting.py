@@ -17,7 +17,7 @@ from pipeline.errors import UserError
 from sim.arrays import Floats
 from sim.errors import SimulationError
 
-_ROUNDS = 3
+_ROUNDS = 5
 """At most, in which the effect of the drive's noise is found anew, at better constants."""
 _HALVINGS = 5
 """At most, of the steps in time."""
@@ -82,7 +82,7 @@ def settled(model: Model) -> Fit:
     """The fit with steps in time, and an effect of the drives' noise, that suit what it finds."""
     if not any(isinstance(each, Field) for each in model.experiments):
         return fit(model)
-    found = _resolved(fit(_noisy(model, model.begin)))
+    found = fit(_noisy(model, model.begin))
     for _ in range(_ROUNDS):
         before, known = found, _noisy(found.model, found.model.constants(found.unknowns))
         found = _resolved(fit(known, before.unknowns))

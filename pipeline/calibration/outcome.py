@@ -37,8 +37,7 @@ def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         "lower": ("parameter", found.low),
         "upper": ("parameter", found.high),
         "standard_error": ("parameter", found.error),
-        # the weights are the inverse of the noise's covariance, so the bound is attained
-        "bound": ("parameter", found.error),
+        "bound": ("parameter", found.bound),
         "covariance": (("parameter", "with_parameter"), found.covariance),
         "correlation": (("parameter", "with_parameter"), found.correlation),
         "condition": ((), found.condition),
