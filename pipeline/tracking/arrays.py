@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sim import compiling
+
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Reals = NDArray[np.floating[Any]]
@@ -21,11 +23,8 @@ Picture = Image | Singles
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-_HOW: dict[str, Any] = {
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": {"reassoc", "contract", "arcp", "nsz"},
-}
+_SUMS = {"reassoc", "contract", "arcp", "nsz"}
+"""What fast mathematics may do to them."""
 
 
 def compiled(function: F) -> F:
@@ -34,9 +33,10 @@ def compiled(function: F) -> F:
     What it calls must be `inlined`: sums of a loop of its own would be ordered in one way when the
     caller has just been compiled, and in another when it comes from the cache.
     """
-    return cast(F, njit(cache=True, **_HOW)(function))
+    return compiling.compiled(function, fastmath=_SUMS)
 
 
 def inlined(function: F) -> F:
     """Makes a loop a part of the `compiled` ones that call it."""
-    return cast(F, njit(inline="always", **_HOW)(function))
+    how: Any = {"nogil": True, "error_model": "numpy", "fastmath": _SUMS}
+    return cast(F, njit(inline="always", **how)(function))
