@@ -15,19 +15,20 @@ from numba import njit
 F = TypeVar("F", bound=Callable[..., Any])
 
 _WITHIN = RLock()
-_depth = 0
+_mine: set[str] = set()
+"""Loops that this process compiles now: one, what it calls, what that calls."""
 
 
 def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
     """Compiles a loop once, caches it on disk, and runs it without the interpreter's lock.
 
-    A process that wants the loop while another compiles it waits, and finds it in the cache.
+    A process that wants a loop while another compiles it waits, and finds it in the cache.
     """
     loop: Any = njit(cache=True, nogil=True, error_model="numpy", **how)(function)
-    compile_one = loop.compile
+    compile_one, name = loop.compile, f"{function.__module__}.{function.__qualname__}"
 
     def compile_in_turn(signature: object) -> object:
-        with _turn():
+        with _turn(name):
             return compile_one(signature)
 
     loop.compile = compile_in_turn
@@ -35,24 +36,24 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
 
 
 @contextmanager
-def _turn() -> Iterator[None]:
-    """Keeps other processes with the same cache from compiling; over when this one dies, too."""
-    global _depth  # noqa: PLW0603  (loops that call loops are compiled within one turn)
+def _turn(loop: str) -> Iterator[None]:
+    """Keeps other processes with the same cache from compiling a loop; over when this one dies.
+
+    They cannot wait for one another: who waits for a loop holds only loops that call it.
+    """
     with _WITHIN, ExitStack() as taken:
-        if not _depth:
-            _take(taken)
-        _depth += 1
-        try:
-            yield
-        finally:
-            _depth -= 1
+        if loop not in _mine:
+            _mine.add(loop)
+            taken.callback(_mine.discard, loop)
+            _take(taken, loop)
+        yield
 
 
-def _take(turn: ExitStack) -> None:
+def _take(turn: ExitStack, loop: str) -> None:
     """Waits for the turn; where no file can be made or locked, nobody waits for anybody."""
     if not (cache := os.environ.get("NUMBA_CACHE_DIR")):
         return
     with suppress(OSError):
-        folder = Path(cache)
+        folder = Path(cache) / "turns"
         folder.mkdir(parents=True, exist_ok=True)
-        fcntl.flock(turn.enter_context((folder / "compiling.lock").open("w")), fcntl.LOCK_EX)
+        fcntl.flock(turn.enter_context((folder / loop).open("w")), fcntl.LOCK_EX)
