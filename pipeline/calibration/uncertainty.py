@@ -59,6 +59,8 @@ def uncertainty(fit: Fit) -> Uncertainty:
 
 def _wider(inverse: Floats, lost: Floats) -> Floats:
     """A covariance when a part of the information whose inverse it was is lost."""
+    if not lost.any():
+        return inverse
     root = np.linalg.cholesky(inverse)
     part, turn = np.linalg.eigh(np.eye(len(inverse)) - root.T @ lost @ root)
     axes = root @ turn / np.maximum(part, _LEAST)
