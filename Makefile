@@ -95,7 +95,7 @@ test-slow: setup
 	$(BIN)/python -m pytest tests/slow
 
 clients: setup
-	$(BIN)/python -m pytest tests/clients
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients
 
 cluster: setup
 	tests/cluster/start.sh

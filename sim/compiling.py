@@ -14,6 +14,7 @@ from numba import njit
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+_HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 _WITHIN = RLock()
 _mine: set[str] = set()
 """Loops that this process compiles now: one, what it calls, what that calls."""
@@ -24,7 +25,7 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
 
     A process that wants a loop while another compiles it waits, and finds it in the cache.
     """
-    loop: Any = njit(cache=True, nogil=True, error_model="numpy", **how)(function)
+    loop: Any = njit(cache=True, **_HOW, **how)(function)
     compile_one, name = loop.compile, f"{function.__module__}.{function.__qualname__}"
 
     def compile_in_turn(signature: object) -> object:
@@ -33,6 +34,11 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
 
     loop.compile = compile_in_turn
     return cast(F, loop)
+
+
+def inlined(function: F, **how: Any) -> F:  # noqa: ANN401
+    """Makes a loop a part of the `compiled` ones that call it, in place of one of its own."""
+    return cast(F, njit(inline="always", **_HOW, **how)(function))
 
 
 @contextmanager

@@ -180,7 +180,10 @@ def forward(
 
 def backward(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Pulled:
     """Reverse sweep of ``forward`` from loss derivatives shaped as its outputs."""
-    flat_u, flat_v = (bar.reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v))
+    # copies, as jax's arrays are read only: loops would be compiled once more for these
+    flat_u, flat_v = (
+        np.array(bar).reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v)
+    )
     results = _spread(
         lambda case: solver.backward(
             records.values, records.records[case], flat_u[case], flat_v[case]

@@ -99,13 +99,15 @@ def march(
     work = workspace(system)
     motion = np.empty(len(system.mass))
     base_u, base_v = np.empty_like(motion), np.empty_like(motion)
-    fresh, rate, factored_k = False, 0.1, -1.0
+    rate, factored_k = 0.1, -1.0
+    fresh = factored_k > 0.0  # not the constant, for which the stage would be compiled once more
     _start(drive[0], system, work, u[0, 0], v[0, 0], a[0, 0])
     for n in range(n_steps):
         h = times[n + 1] - times[n]
         base = Base(base_u, base_v, h * stages[1, 1])
-        if abs(base.k - factored_k) > 1e-9 * base.k:
-            fresh, factored_k = False, base.k
+        fresh = fresh and abs(base.k - factored_k) <= 1e-9 * base.k
+        if not fresh:
+            factored_k = base.k
         for s in range(1, n_stages):
             _stage_base(s, h, stages, u[n], v[n], a[n], base)
             _guess(s, nodes, u[n], a[n], base, system, work, motion)
@@ -116,7 +118,7 @@ def march(
             if status != CONVERGED:  # after a kink in the drive the extrapolation leads astray
                 motion[:] = u[n, s - 1]
                 status, fresh, rate = solve_stage(
-                    motion, target, base, tolerance * h, system, work, False, rate, counts
+                    motion, target, base, tolerance * h, system, work, fresh, rate, counts
                 )
             if status != CONVERGED:
                 return status, n, _worst(system, work.step)

@@ -58,7 +58,7 @@ class Outputs(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """States within some steps, for the reverse sweep.
+    """States within some steps, for the reverse sweep: step ``n`` is at ``n % len(u)``.
 
     Attributes:
         u, v: (n, n_kicks + 1, n_dofs) where the flights start, that is at and after the kicks.
@@ -90,15 +90,15 @@ def _hold(n: int, m: int, u: Floats, steps: Steps, system: System) -> None:
 
 @compiled
 def _step(
-    n: int, slot: int, u: Floats, v: Floats, steps: Steps, system: System, work: Workspace,
-    flight: Flight, trace: Trace,
+    n: int, u: Floats, v: Floats, steps: Steps, system: System, work: Workspace, flight: Flight,
+    trace: Trace,
 ) -> float:  # fmt: skip
-    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps its states in a slot of ``trace``.
+    """Advances ``u``, ``v`` (n_dofs,) by step ``n``; keeps its states in ``trace``.
 
     Returns:
         the sum of the energies at the kicks: not finite once a void is beyond its barrier.
     """
-    total, n_kicks = 0.0, len(steps.gain)
+    total, n_kicks, slot = 0.0, len(steps.gain), n % len(trace.u)
     for m in range(n_kicks + 1):
         trace.u[slot, m] = u
         trace.v[slot, m] = v
@@ -145,7 +145,7 @@ def run(
             checkpoints[n // steps.segment, 1] = v
         last_u[:] = u
         last_v[:] = v
-        if not np.isfinite(_step(n, 0, u, v, steps, system, work, flight, trace)):
+        if not np.isfinite(_step(n, u, v, steps, system, work, flight, trace)):
             return n
         while asked < len(outputs.interval) and outputs.interval[asked] == n:
             w, r = outputs.values[asked], outputs.rates[asked]
@@ -176,10 +176,11 @@ def _flight_back(
 
 @compiled
 def _kick_back(
-    n: int, m: int, slot: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps,
-    system: System, work: Workspace, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
+    n: int, m: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
+    work: Workspace, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
 ) -> None:  # fmt: skip
     """Takes derivatives by the velocities after kick ``m`` of step ``n`` to those before it."""
+    slot = n % len(trace.u)
     work.step[:] = 0.0
     for d in system.dofs:
         gain, before = steps.gain[m, d], trace.before[slot, m, d]
@@ -198,10 +199,11 @@ def _kick_back(
 
 @compiled
 def _step_back(
-    n: int, slot: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
+    n: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
     work: Workspace, flight: Flight, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
 ) -> None:  # fmt: skip
     """Takes derivatives by the end of step ``n`` to its start."""
+    slot = n % len(trace.u)
     for m in range(len(steps.gain), -1, -1):
         work.trial[:] = trace.u[slot, m]
         work.saved[:] = trace.v[slot, m]
@@ -209,7 +211,7 @@ def _step_back(
             n, m, work.trial, work.saved, bar_u, bar_v, steps, system, flight, bars
         )  # fmt: skip
         if m > 0:
-            _kick_back(n, m - 1, slot, bar_u, bar_v, trace, steps, system, work, which, bars,
+            _kick_back(n, m - 1, bar_u, bar_v, trace, steps, system, work, which, bars,
                        bar_decay, bar_gain)  # fmt: skip
 
 
@@ -237,7 +239,7 @@ def sweep_back(
         u[:] = checkpoints[part, 0]
         v[:] = checkpoints[part, 1]
         for n in range(count):
-            _step(start + n, n, u, v, steps, system, work, flight, trace)
+            _step(start + n, u, v, steps, system, work, flight, trace)
         for n in range(count - 1, -1, -1):
             bar_u += left_u
             bar_v += left_v
@@ -250,5 +252,5 @@ def sweep_back(
                 left_v += w[2] * out_bar_u[asked] + r[2] * out_bar_v[asked]
                 bar_v += w[3] * out_bar_u[asked] + r[3] * out_bar_v[asked]
                 asked -= 1
-            _step_back(start + n, n, bar_u, bar_v, trace, steps, system, work, flight, which, bars,
+            _step_back(start + n, bar_u, bar_v, trace, steps, system, work, flight, which, bars,
                        bar_decay, bar_gain)  # fmt: skip

@@ -84,8 +84,7 @@ class Field:
 
     def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
         """Derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
-        drive = self.drive or self.simulation.drive
-        motion = self.simulation.pulled_to_drive(constants, bar, drive)
+        motion = self.simulation.pulled_to_drive(constants, bar, self.drive)
         assert isinstance(motion, redrive.Course)
         value, slope = np.asarray(motion.value), np.asarray(motion.slope)
         return np.array(

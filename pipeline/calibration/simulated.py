@@ -144,19 +144,22 @@ class Simulation:
         total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
         return np.asarray(self._parameters_back(numbers, Parameters(*total)))
 
-    def pulled_to_drive(self, constants: Constants, bar: Floats, drive: KnownDrive) -> Motion:
+    def pulled_to_drive(
+        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+    ) -> Motion:
         """Derivatives of `bar @ predict` by the numbers of the drive's motion, by the adjoint.
 
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
         solver, made = self._solver(constants), self.parameters(constants.numbers)
+        known = drive or self.drive
 
         def seen(motion: Motion) -> Array:
-            drives = (Drive(drive.units, motion),)
+            drives = (Drive(known.units, motion),)
             return self.seen(dynamics.simulate(solver, made, drives).displacement[0], made)
 
-        return jax.vjp(seen, drive.motion)[1](jnp.asarray(bar))[0]
+        return jax.vjp(seen, known.motion)[1](jnp.asarray(bar))[0]
 
     def finer(self) -> Simulation:
         """The same with half the steps in time; of equilibria there are none."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from sim import compiling
@@ -38,5 +37,4 @@ def compiled(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Makes a loop a part of the `compiled` ones that call it."""
-    how: Any = {"nogil": True, "error_model": "numpy", "fastmath": _SUMS}
-    return cast(F, njit(inline="always", **how)(function))
+    return compiling.inlined(function, fastmath=_SUMS)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
+from typing import cast
 
 import jax
 import jax.numpy as jnp
@@ -18,11 +19,16 @@ import numpy as np
 import pytest
 from jax import Array
 from jax.flatten_util import ravel_pytree
+from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
 from benchmarks.constants import CUTOFF
+from sim import equilibrium, esdirk_adjoint, kickdrift
 from sim.arrays import Floats
-from sim.dynamics import Drive, Solver, simulate
+from sim.dynamics import Drive, Solver, backward, forward, simulate
+from sim.equilibrium import follow
+from sim.esdirk import march
+from sim.esdirk_stage import solve_stage
 from sim.explicit import ExplicitSolver
 from sim.implicit import ImplicitSolver
 from sim.loads import Harmonic, LinearRamp, TimeSeries
@@ -232,3 +238,18 @@ def test_motions_deep_in_contact(quantity: str) -> None:
 def test_polygons_of_any_kind(solver: str, quantity: str) -> None:
     rig = pulled()
     assert_exact(Ray(rig, SOLVERS[solver](rig), quantity))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_loops_are_compiled_for_one_kind_of_arguments(solver: str) -> None:
+    """Derivatives come as arrays of JAX, which are read only, or of NumPy."""
+    rig = shaken() if solver in DYNAMIC else squeezed(4.0)
+    method = SOLVERS[solver](rig)
+    by_jax = Ray(rig, method, "design").slope
+    motion, velocity, records = forward(method, rig.values, (rig.drive,))
+    pulled = backward(method, records, np.ones_like(motion), np.zeros_like(velocity))
+    assert np.isfinite(by_jax)
+    assert np.isfinite(pulled.parameters.law).all()
+    loops = (follow, equilibrium.adjoint, march, solve_stage, esdirk_adjoint.adjoint)
+    for loop in (*loops, kickdrift.run, kickdrift._step, kickdrift.sweep_back):
+        assert len(cast(Dispatcher, loop).signatures) <= 1, loop
