@@ -183,7 +183,9 @@ def _nlopt(algorithm: str, asked: Field) -> None:
     made.set_lower_bounds(-REACH)
     made.set_upper_bounds(REACH)
     if algorithm == "LD_AUGLAG":
-        made.set_local_optimizer(nlopt.opt(nlopt.LD_LBFGS, asked.n_variables))
+        within = nlopt.opt(nlopt.LD_CCSAQ, asked.n_variables)  # its L-BFGS fails here
+        within.set_ftol_rel(1e-3)
+        made.set_local_optimizer(within)
     made.optimize(np.zeros(asked.n_variables))
 
 
@@ -197,7 +199,7 @@ OPTIMISERS: dict[str, Callable[[Field], None]] = {
     "nlopt SLSQP": partial(_nlopt, "LD_SLSQP"),
     "nlopt AUGLAG": partial(_nlopt, "LD_AUGLAG"),
 }
-"""trust-constr is an interior-point method here, AUGLAG an augmented Lagrangian over L-BFGS."""
+"""trust-constr is an interior-point method here, AUGLAG an augmented Lagrangian over CCSAQ."""
 
 
 @dataclass(frozen=True)
