@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.newton import (
     FACTORS,
     INCREMENTS,
@@ -38,7 +38,7 @@ EASY = 5
 MAX_SADDLES = 4
 
 
-@compiled
+@inlined
 def _predict(motion: Floats, load: Floats, share: float, system: System, work: Workspace) -> None:
     """Fills ``work.step`` along the path: the held dofs by ``share`` of the way to ``load``."""
     work.product[:] = 0.0
@@ -51,7 +51,7 @@ def _predict(motion: Floats, load: Floats, share: float, system: System, work: W
         work.step[d] = work.product[d]
 
 
-@compiled
+@inlined
 def _length(one: Floats, other: Floats, system: System) -> float:
     """Distance of the free dofs of two motions, mm."""
     total = 0.0
@@ -60,7 +60,7 @@ def _length(one: Floats, other: Floats, system: System) -> float:
     return np.sqrt(total)
 
 
-@compiled
+@inlined
 def _settle(
     motion: Floats, predicted: float, relative: float, absolute: float, system: System,
     work: Workspace, counts: Ints,
@@ -95,7 +95,7 @@ def _stabilise(
     return factorise_tangent(motion, system, work, 0.0, counts), True
 
 
-@compiled
+@inlined
 def _advance(
     motion: Floats, load: Floats, relative: float, absolute: float, increment: float,
     system: System, work: Workspace, counts: Ints,
@@ -140,7 +140,7 @@ def _advance(
     return done, increment, jumped
 
 
-@compiled
+@inlined
 def _repeat(
     motion: Floats, load: Floats, step: Floats, relative: float, absolute: float, system: System,
     work: Workspace, counts: Ints,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.esdirk_stage import CONVERGED, Base, solve_stage
 from sim.potential import admissible_step, gradient
 from sim.system import System, Workspace, workspace
 
 
-@compiled
+@inlined
 def _stage_base(
     s: int, h: float, stages: Floats, u: Floats, v: Floats, a: Floats, base: Base
 ) -> None:
@@ -23,7 +23,7 @@ def _stage_base(
         base.v[:] += h * stages[s, j] * a[j]
 
 
-@compiled
+@inlined
 def _guess(
     s: int, nodes: Floats, u: Floats, a: Floats, base: Base, system: System, work: Workspace,
     motion: Floats,
@@ -43,7 +43,7 @@ def _guess(
         motion[:] = u[s - 1]
 
 
-@compiled
+@inlined
 def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats, a: Floats) -> None:
     """Puts the held dofs of the initial state in place and fills its acceleration."""
     for i in range(len(system.held)):
@@ -54,7 +54,7 @@ def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats,
         a[d] = -(work.force[d] + system.damping[d] * v[d]) / system.mass[d]
 
 
-@compiled
+@inlined
 def _worst(system: System, step: Floats) -> int:
     """Free dof with the largest (scaled) step."""
     worst = system.dofs[0]

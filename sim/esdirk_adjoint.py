@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.esdirk_stage import factorise_stage
 from sim.matrix import solve
 from sim.potential import hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
 
 
-@compiled
+@inlined
 def _gather(
     motion: Floats,
     velocity: Floats,
@@ -39,7 +39,7 @@ def _gather(
         drive[i] += work.product[system.held[i]]
 
 
-@compiled
+@inlined
 def _stage_back(
     s: int, h: float, stages: Floats, system: System, work: Workspace, v: Floats, a: Floats,
     next_u: Floats, next_v: Floats,

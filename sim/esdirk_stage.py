@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.matrix import add, clear, factorise, solve
 from sim.potential import admissible_step, gradient, hessian_product, tangent
 from sim.system import System, Workspace
@@ -50,7 +50,7 @@ def factorise_stage(motion: Floats, system: System, work: Workspace, k: float) -
     return factorise(work.matrix)
 
 
-@compiled
+@inlined
 def _newton_step(
     motion: Floats, target: Floats, base: Base, system: System, work: Workspace
 ) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.potential import gradient, hessian_product, mixed
 from sim.system import Bars, System, Workspace, workspace
 from sim.void_flight import Flight, Pace, flight_of, fly, fly_back
@@ -70,7 +70,7 @@ class Trace(NamedTuple):
     before: Floats
 
 
-@compiled
+@inlined
 def _trace(n: int, steps: Steps) -> Trace:
     n_kicks, n_dofs = steps.gain.shape
     return Trace(
@@ -80,7 +80,7 @@ def _trace(n: int, steps: Steps) -> Trace:
     )
 
 
-@compiled
+@inlined
 def _hold(n: int, m: int, u: Floats, steps: Steps, system: System) -> None:
     """Sets the held dofs for flight ``m`` of step ``n``: between the kicks before and after it."""
     last, following = max(m - 1, 0), min(m, len(steps.gain) - 1)
@@ -155,7 +155,7 @@ def run(
     return -1
 
 
-@compiled
+@inlined
 def _flight_back(
     n: int, m: int, u: Floats, v: Floats, bar_u: Floats, bar_v: Floats, steps: Steps,
     system: System, flight: Flight, bars: Bars,
@@ -174,7 +174,7 @@ def _flight_back(
             bars.drive[n, following, i] += 0.5 * flight.pull[unit]
 
 
-@compiled
+@inlined
 def _kick_back(
     n: int, m: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
     work: Workspace, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,
@@ -197,7 +197,7 @@ def _kick_back(
         bars.drive[n, m, i] += work.product[system.held[i]]
 
 
-@compiled
+@inlined
 def _step_back(
     n: int, bar_u: Floats, bar_v: Floats, trace: Trace, steps: Steps, system: System,
     work: Workspace, flight: Flight, which: Ints, bars: Bars, bar_decay: Floats, bar_gain: Floats,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.matrix import add, clear, factorise, solve
 from sim.potential import admissible_step, gradient, tangent
 from sim.system import System, Workspace
@@ -34,7 +34,7 @@ GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
 """Places in the counts that the solvers gather."""
 
 
-@compiled
+@inlined
 def balance(motion: Floats, system: System, work: Workspace) -> tuple[float, float, float]:
     """Energy, and the largest out-of-balance and reaction force (moments over the scale), N."""
     strain, contact = gradient(motion, system, work.turn, work.force)
@@ -60,7 +60,7 @@ def factorise_tangent(
     return factorise(work.matrix)
 
 
-@compiled
+@inlined
 def _factorise(
     motion: Floats, system: System, work: Workspace, first: float, counts: Ints
 ) -> float:
@@ -86,12 +86,12 @@ def factorise_shifted(motion: Floats, system: System, work: Workspace, counts: I
     return _factorise(motion, system, work, _first_shift(system), counts)
 
 
-@compiled
+@inlined
 def _first_shift(system: System) -> float:
     return FIRST_SHIFT * float(np.median(system.net.law[:, 0]))
 
 
-@compiled
+@inlined
 def solve_free(system: System, work: Workspace) -> None:
     """Fills ``work.step`` with what takes the force off the free dofs, by the tangent's factor."""
     for i in range(len(system.dofs)):
@@ -103,7 +103,7 @@ def solve_free(system: System, work: Workspace) -> None:
         work.step[system.dofs[i]] = work.right[i]
 
 
-@compiled
+@inlined
 def _descend(
     motion: Floats, energy: float, residual: float, newton: bool, system: System, work: Workspace,
     counts: Ints,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.arrays import Floats, Ints
-from sim.compiling import compiled
+from sim.compiling import compiled, inlined
 from sim.network import Sensitivity
 from sim.system import System
 from sim.void_kernels import void_slopes
@@ -76,7 +76,7 @@ def flight_of(watched: Ints, n_units: int) -> Flight:
     )  # fmt: skip
 
 
-@compiled
+@inlined
 def _find(tau: float, u: Floats, v: Floats, system: System, flight: Flight) -> None:
     """Notes the voids that may come to contact within ``tau``, and the units beside them."""
     net, n_near, n_units = system.net, 0, 0
@@ -105,7 +105,7 @@ def _agility(unit: int, system: System) -> float:
     return 1.0 / system.mass[3 * unit + 2] if system.free[3 * unit + 2] >= 0 else 0.0
 
 
-@compiled
+@inlined
 def _finer_steps(tau: float, pace: Pace, system: System, flight: Flight) -> int:
     """How many finer steps follow the barrier where the energy of each void can carry it to."""
     net, fastest = system.net, 0.0
@@ -127,7 +127,7 @@ def _finer_steps(tau: float, pace: Pace, system: System, flight: Flight) -> int:
     return math.ceil(max(steps, 1.0)) if steps <= MOST else MOST + 1
 
 
-@compiled
+@inlined
 def _moments(u: Floats, system: System, flight: Flight) -> bool:
     """Fills the moments of the barriers on the units that meet; whether none is passed."""
     net = system.net
@@ -152,14 +152,14 @@ def _turn(tau: float, u: Floats, v: Floats, flight: Flight) -> None:
         u[d] += tau * v[d]
 
 
-@compiled
+@inlined
 def _push(tau: float, v: Floats, system: System, flight: Flight) -> None:
     for i in range(flight.found[1]):
         unit = flight.units[i]
         v[3 * unit + 2] -= tau * _agility(unit, system) * flight.force[unit]
 
 
-@compiled
+@inlined
 def _bounce(
     tau: float, n: int, u: Floats, v: Floats, pace: Pace, system: System, flight: Flight
 ) -> bool:
@@ -200,7 +200,7 @@ def fly(tau: float, u: Floats, v: Floats, pace: Pace, system: System, flight: Fl
     return -1
 
 
-@compiled
+@inlined
 def _pull(
     weight: float, u: Floats, bar_u: Floats, bar_v: Floats, system: System, flight: Flight,
     out: Sensitivity, by_mass: Floats,
@@ -226,7 +226,7 @@ def _pull(
             bar_u[3 * b + 2] -= moment
 
 
-@compiled
+@inlined
 def _bounce_back(
     tau: float, n: int, u: Floats, v: Floats, bar_u: Floats, bar_v: Floats, pace: Pace,
     system: System, flight: Flight, out: Sensitivity, by_mass: Floats,
