@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from typing import Any
 
 import numpy as np
@@ -26,14 +28,15 @@ class Table:
     @property
     def csv(self) -> bytes:
         """The table as CSV: ten significant digits, empty where there is no value."""
-        lines = [",".join(self.columns)]
+        lines = StringIO()
+        writer = csv.writer(lines, lineterminator="\n")
+        writer.writerow(self.columns)
         cells = ([_cell(value) for value in column] for column in self.columns.values())
-        lines += [",".join(row) for row in zip(*cells, strict=True)]
-        return ("\n".join(lines) + "\n").encode("utf-8")
+        writer.writerows(zip(*cells, strict=True))
+        return lines.getvalue().encode("utf-8")
 
 
 def _cell(value: object) -> str:
     if isinstance(value, float | np.floating):
         return "" if np.isnan(value) else f"{value:.10g}"
-    text = str(value)
-    return f'"{text.replace(chr(34), chr(34) * 2)}"' if set(text) & set(',"\n') else text
+    return str(value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -152,6 +153,14 @@ def test_the_page_shows_every_picture_with_its_data(folder: Path) -> None:
     assert "gradients.pdf" in page
     assert "abacus, 2 cores, 2026-01-01, commit 0123456789" in page
     assert "not the same bytes" in page
+
+
+def test_tables_have_a_name_for_every_column(folder: Path) -> None:
+    for name in GIVEN:
+        with (folder / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+            heading, *rows = csv.reader(file)
+        assert rows
+        assert {len(row) for row in rows} == {len(heading)}
 
 
 def test_failures_are_listed_with_their_reason(folder: Path) -> None:

@@ -137,8 +137,8 @@ def test_cells_of_a_table() -> None:
     columns = {
         "number": np.array([1.0 / 3.0, np.nan]),
         "count": np.array([7, -8]),
-        "text": np.array(['a, "b"', "plain"]),
+        "text, quoted": np.array(['a, "b"', "plain"]),
     }
     assert Table("t.csv", "", columns).csv.decode() == (
-        'number,count,text\n0.3333333333,7,"a, ""b"""\n,-8,plain\n'
+        'number,count,"text, quoted"\n0.3333333333,7,"a, ""b"""\n,-8,plain\n'
     )
