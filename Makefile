@@ -60,8 +60,7 @@ setup: .venv/requirements.lock
 	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes $(OFFLINE) \
-	    -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE) -r requirements.lock
 	@cp requirements.lock $@
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
