@@ -11,8 +11,8 @@ from pathlib import Path
 from snakemake.iocontainers import Wildcards
 
 from pipeline.calibration.description import Calibration, TrackedMotion
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 from pipeline.problem.loading import section
 
 _FOLDER = "experiments/calibration"

@@ -7,13 +7,11 @@ these variables once, when they are imported, so `pipeline` sets them on its own
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-CACHE = ROOT / ".cache"
+from pipeline.locations import CACHE
+from pipeline.sources import kernels_hash
+
 RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
 
 ONE_THREAD = {
@@ -37,51 +35,11 @@ CACHES = {
     "MPLCONFIGDIR": str(CACHE / "matplotlib"),
 }
 
-_LOOP = b"@compiled"
-_IMPORT = re.compile(r"^from ((?:sim|pipeline)[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
-_WORD = re.compile(r"\w+")
-
 
 def pin() -> None:
     """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
     os.environ.update(ONE_THREAD | REPRODUCIBLE | BOUNDED)
-    for name, value in (
-        CACHES | {"NUMBA_CACHE_DIR": str(CACHE / "numba" / kernels_hash())}
-    ).items():
+    for name, value in CACHES.items():
         os.environ.setdefault(name, value)
-
-
-def kernels_hash(root: Path = ROOT) -> str:
-    """Hash of the files with compiled loops and of what they import: the name of Numba's cache.
-
-    Numba takes a cached loop for current as long as its own file is unchanged, even if another
-    file holds what it calls.
-    """
-    sources = {path.relative_to(root): path.read_bytes() for path in _sources(root)}
-    waiting = [path for path, source in sources.items() if b"njit(" in source or _LOOP in source]
-    needed: set[Path] = set()
-    while waiting:
-        path = waiting.pop()
-        if path in sources and path not in needed:
-            needed.add(path)
-            waiting += _imported(sources[path].decode())
-    digest = hashlib.sha256()
-    for path in sorted(needed):
-        digest.update(f"{path.as_posix()} {len(sources[path])}\n".encode() + sources[path])
-    return digest.hexdigest()[:16]
-
-
-def _sources(root: Path) -> list[Path]:
-    return [*(root / "sim").glob("*.py"), *(root / "pipeline/tracking").glob("*.py")]
-
-
-def _imported(source: str) -> list[Path]:
-    """Files that may be imported: `from a.b import c` gives a/b.py and a/b/c.py."""
-    found = []
-    for base, names in _IMPORT.findall(source):
-        folder = Path(*base.split("."))
-        found += [
-            folder.with_suffix(".py"),
-            *(folder / f"{name}.py" for name in _WORD.findall(names)),
-        ]
-    return found
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        os.environ["NUMBA_CACHE_DIR"] = str(CACHE / "numba" / kernels_hash())

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 from pipeline.tracking.recording import Recording, load
 
 RECORDINGS = "_recordings"

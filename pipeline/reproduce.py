@@ -14,8 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline import cli
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 
 LOG = logging.getLogger(__name__)
 

@@ -17,8 +17,9 @@ from pathlib import Path
 import psutil
 
 from pipeline import leftovers, streams
-from pipeline.environment import ROOT, RUN_MARK
+from pipeline.environment import RUN_MARK
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 from pipeline.workflow import check_problems
 
 _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
 from pipeline.filmed import RECORDINGS
+from pipeline.locations import ROOT
 from pipeline.movies import MOVIES
 from pipeline.problem import Problem, joint, load, preset_names, yamlfile
 from pipeline.problem.families import count, numbered

@@ -15,9 +15,10 @@ from tempfile import NamedTemporaryFile
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.environment import ROOT, RUN_MARK
+from pipeline.environment import RUN_MARK
 from pipeline.errors import UserError
 from pipeline.filmed import shown_recordings
+from pipeline.locations import ROOT
 from pipeline.problem import (
     Problem,
     Stage,

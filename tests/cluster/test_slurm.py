@@ -14,8 +14,8 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.environment import ROOT
 from pipeline.leftovers import PREFIX
+from pipeline.locations import ROOT
 from tests.e2e.checkout import Checkout, wait_until
 
 TARGET = "fig3@quick"

@@ -18,7 +18,7 @@ from typing import Any
 import pytest
 
 from pipeline import new
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
 from tests.e2e.checkout import Checkout
 

@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from pipeline import failures, run
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 from pipeline.problem import load
 from pipeline.problem.loading import overlaid
 from pipeline.tracking import recognition

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import yaml
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.problem import load
 from pipeline.problem.loading import overlaid
 from pipeline.tracking import points, recording

@@ -17,7 +17,8 @@ import numba.core.caching
 import psutil
 import yaml
 
-from pipeline.environment import ROOT, RUN_MARK
+from pipeline.environment import RUN_MARK
+from pipeline.locations import ROOT
 
 STUDY = "tiny"
 SMALLER = {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from tests.e2e.checkout import Checkout
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets, problem, simulate, track
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.problem.loading import overlaid
 from pipeline.scenes import scene_of
 from pipeline.structures import network_variables

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.problem.loading import overlaid
 from tests.e2e.stages import Built, build
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from reports import build as report
 from tests.e2e.stages import Built, build, build_verification
 

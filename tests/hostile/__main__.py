@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.provenance import git_commit
 from pipeline.whole import whole
 from reports.survival import build

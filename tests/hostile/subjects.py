@@ -19,10 +19,10 @@ from pipeline.calibration import readings
 from pipeline.calibration.description import Calibration
 from pipeline.casebook import Casebook, Found
 from pipeline.datasets import TABLES, Kind
-from pipeline.environment import ROOT
 from pipeline.fabrication import manifest
 from pipeline.lab.encode import encode
 from pipeline.lab.setup import Codec
+from pipeline.locations import ROOT
 from pipeline.problem import canonical_json, joint, load
 from pipeline.problem.loading import section
 from pipeline.scenes import TIME_SERIES_COLUMNS, scene_of

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from pipeline import design
-from pipeline.environment import ROOT
 from pipeline.errors import UserError
+from pipeline.locations import ROOT
 from pipeline.problem import content_hash, load, section_hash
 from pipeline.problem.families import numbered, parted
 from pipeline.studies import Study, families, together

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.reference.__main__ import main, pages
 
 NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline import problem
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from reports import kinds
 from reports.path import measures
 from reports.structure import from_dataset

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 
 LOOPS = """
 from sim.compiling import compiled

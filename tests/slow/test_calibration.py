@@ -27,7 +27,7 @@ from pipeline.calibration.description import (
 from pipeline.calibration.estimate import Model
 from pipeline.calibration.experiment import Experiment
 from pipeline.calibration.fitting import settled
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from sim.arrays import Floats
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,

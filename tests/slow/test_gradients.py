@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from pipeline import contacts, problem
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.scenes import scene_of
 from sim.arrays import Floats
 from sim.evaluation import evaluator

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.measuring import UNSTABLE
 from tests.e2e.stages import Built, build, build_again, build_verification
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline import problem
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.scenes import scene_of
 from sim.arrays import Floats
 from sim.dynamics import solve_case

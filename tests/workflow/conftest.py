@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 
 STAGES = (
     "pipeline/design",

@@ -6,7 +6,7 @@ import importlib
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)

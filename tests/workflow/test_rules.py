@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.workflow import check_room
 from tests.workflow.conftest import Sandbox
 

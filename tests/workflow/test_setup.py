@@ -12,7 +12,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 
 WHEEL = "nothing-1.0-py3-none-any.whl"
 FILES = {

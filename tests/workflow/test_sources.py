@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.sources import source_files, source_hash
 
 FILES = {
@@ -21,6 +21,11 @@ FILES = {
     "pipeline/stage.py": "from . import late\nfrom .cli import main\nfrom sim.energy import law\n",
     "pipeline/loop_a.py": "import pipeline.loop_b\n",
     "pipeline/loop_b.py": "import pipeline.loop_a\n",
+    "sim/lazy/__init__.py": "",
+    "sim/lazy/__init__.pyi": "from .wanted import law as law\nfrom .other import less as less\n",
+    "sim/lazy/wanted.py": "",
+    "sim/lazy/other.py": "",
+    "pipeline/through_a_face.py": "from sim.lazy import law\n",
     "reports/__init__.py": "",
     "reports/build.py": "import pipeline.errors\n",
     "reports/templates/page.html": "<html>",
@@ -54,6 +59,16 @@ def test_closure_follows_every_form_of_import(tree: Path) -> None:
         "sim/energy.py",
         "sim/inner/__init__.py",
         "sim/inner/deep.py",
+    }
+
+
+def test_closure_follows_one_name_through_a_lazy_package(tree: Path) -> None:
+    assert closure("pipeline.through_a_face", tree) == {
+        "pipeline/__init__.py",
+        "pipeline/through_a_face.py",
+        "sim/__init__.py",
+        "sim/lazy/__init__.py",
+        "sim/lazy/wanted.py",
     }
 
 
@@ -108,5 +123,5 @@ def test_hash_ignores_dates_and_places(
 def test_closure_of_the_problem_reader_is_what_python_imports() -> None:
     found = closure("pipeline.problem.loading", ROOT)
     assert "pipeline/problem/model.py" in found
-    assert "pipeline/environment.py" in found
+    assert "pipeline/locations.py" in found
     assert not any(name.startswith("reports/") for name in found)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline.calibration.drive import Followed, followed
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.problem import load
 from pipeline.scenes import scene_of
 from sim.arrays import Floats

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline import calibrate, datasets
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from tests.pipeline.calibration.specimens import described, written
 
 SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"

@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline import calibrate, datasets
 from pipeline.calibration.readings import read
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from pipeline.units import FORCE, LENGTH
 from tests.pipeline.calibration.specimens import (
     TRUTH,

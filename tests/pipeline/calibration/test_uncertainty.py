@@ -15,7 +15,7 @@ from pipeline.calibration.estimate import Fit, Model
 from pipeline.calibration.simulated import KnownDrive
 from pipeline.calibration.uncertainty import lost_to_drives, uncertainty
 from pipeline.comparison import redrive
-from pipeline.environment import ROOT
+from pipeline.locations import ROOT
 from sim.arrays import Floats
 from tests.pipeline.calibration.specimens import TRUTH, described, loaded
 
