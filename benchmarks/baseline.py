@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from benchmarks.frame import Run, Sample
 from sim.dynamics import Drive
-from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
+from sim.energy import LigamentLaw, ligament_energy
 from sim.evaluation import Objective, structure
 from sim.loads import held_values
 from sim.model import Parameters
 from sim.scene import Scene
+from sim.void_law import ContactLaw, contact_energy, contact_void_angles
 
 Force = Callable[[Parameters, Array], Array]
 Floats = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.model import Material, damping_of_ratio
+from sim.material import Material, damping_of_ratio
 
 SPACING, LIGAMENT = 15.0, 2.25
 """mm."""

@@ -51,7 +51,7 @@ def _no_cache() -> Iterator[None]:
 def _default(name: str) -> Run:
     """The loss by the scene's own plan."""
     from benchmarks.ladders.cases import scene
-    from benchmarks.skips import loss
+    from benchmarks.scene_loss import loss
     from sim.plan import make_plan
 
     return loss(name, make_plan(scene(name)).solver)

@@ -16,7 +16,7 @@ from sim import explicit, implicit, statics
 from sim.dynamics import Solver, solve_case
 from sim.lattice import quads
 from sim.loads import Harmonic, LinearRamp, TanhRamp, held_dofs
-from sim.model import Material, damping_of_ratio
+from sim.material import Material, damping_of_ratio
 from sim.objectives import StrainEnergyMimicking
 from sim.plan import concrete_parameters
 from sim.scene import Scene

@@ -17,7 +17,7 @@ from benchmarks.climb import Ladder, Point, Rules, Task, climb
 from benchmarks.frame import Run, Sample
 from benchmarks.ladders import cases
 from benchmarks.measure import Tell, Worker
-from benchmarks.scenes import work_of
+from benchmarks.scene_loss import _loss_of, _warmed, loss
 from benchmarks.suites import warm
 from sim import dynamics
 from sim.arrays import Ints
@@ -159,25 +159,6 @@ def cold_start(name: str, skipped: float, task: Task) -> Run:
     """Paths followed from rest for every design, or from the last design's."""
     del task
     return warm.walk(cases.scene(name), 1e-10, warm=bool(skipped))
-
-
-def loss(name: str, solver: Solver) -> Run:
-    """Run of the loss alone by a solver."""
-    return _loss_of(cases.case(name), solver)
-
-
-def _loss_of(posed: cases.Case, solver: Solver) -> Run:
-    def run() -> Sample:
-        motion, _, records = dynamics.forward(solver, posed.values, posed.scene.drives)
-        work = work_of(records.records[0])
-        return Sample(posed.results(*posed.measured(motion, posed.values)), work)
-
-    return _warmed(run)
-
-
-def _warmed(run: Run) -> Run:
-    run()
-    return run
 
 
 SKIPS = (

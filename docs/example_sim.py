@@ -6,7 +6,7 @@ from sim.constraints import Constraints
 from sim.evaluation import evaluator
 from sim.lattice import quads
 from sim.loads import Harmonic, held_dofs
-from sim.model import Material, damping_of_ratio
+from sim.material import Material, damping_of_ratio
 from sim.optimise import SqpOptions, minimise
 from sim.plan import make_plan
 from sim.requirements import Limits

@@ -90,8 +90,8 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     from pipeline.comparison.quantities import quantities
     from pipeline.comparison.registration import pixel_size
     from pipeline.comparison.simulation import simulation
+    from pipeline.measuring import structures_of
     from pipeline.scenes import scene_of
-    from pipeline.simulate import structures_of
     from pipeline.structures import read_design
     from pipeline.tracking.specimen import as_built
 

@@ -67,8 +67,8 @@ def trials(
     Raises:
         SimulationError: a structure cannot be simulated as it was run.
     """
+    from pipeline.measuring import structures_of, times_of
     from pipeline.scenes import scene_of
-    from pipeline.simulate import structures_of, times_of
     from sim.errors import SimulationError
 
     structures = structures_of(scene_of(asked, folder), design)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
     from sim.batch import Case, Measure, Solved
     from sim.observables import Observables
     from sim.scene import Scene
 
-Floats = NDArray[np.float64]
+from sim.arrays import Floats
+
 Places = NDArray[np.int64]
 
 CLEARANCE_STRIDE = 4
@@ -160,3 +165,37 @@ def _stability(solved: Solved, at: Places) -> NDArray[np.int8]:
                 LOG.warning("the equilibrium %s at load %s of %d", what, which + 1, len(flags))
         return flags[at].astype(np.int8)
     return np.full(len(at), NOT_ASKED, dtype=np.int8)
+
+
+def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, Structure]:
+    """The structures to compare, by name; an intact one only where something is to be mimicked."""
+    from pipeline.structures import flat_vertices
+
+    found = {
+        "altered": Structure(scene, scene.lattice.vertices),
+        "cloaked": Structure(scene, flat_vertices(scene.lattice, design["vertices"])),
+    }
+    if scene.reference is None:
+        return found
+    intact = replace(scene.reference, reference=scene.reference)
+    return {"intact": Structure(intact, intact.lattice.vertices), **found}
+
+
+def times_of(asked: Problem, scene: Scene) -> Times:
+    """Output times of a problem's response."""
+    from sim.plan import sample_times
+
+    horizon = scene.duration
+    end = (
+        horizon
+        if asked.frequency is None
+        else max(horizon, asked.response.cycles / asked.frequency)
+    )
+    shown = np.linspace(0.0, end, asked.response.samples)
+    integrated = sample_times(scene)
+    sampled = integrated if scene.steps else np.linspace(0.0, horizon, asked.horizon.samples)
+    wanted = (shown, integrated, sampled)
+    nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
+    every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
+    ends = np.cumsum([len(times) for times in wanted])[:-1]
+    return Times(np.asarray(every * 1e-9), *np.split(place, ends))

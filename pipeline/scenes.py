@@ -16,7 +16,7 @@ from pipeline.problem.drives import Harmonic, LinearRamp, Pulse, RampHarmonic, T
 from sim import loads
 from sim.contact import activation_distance
 from sim.lattice import Lattice
-from sim.model import Material
+from sim.material import Material
 from sim.requirements import Limits
 from sim.scene import Scene
 

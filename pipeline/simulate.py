@@ -10,10 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pipeline import cli, contacts, failures, problem
-from pipeline.measuring import Floats, Measured, Structure, Times, measure
+from pipeline.measuring import Floats, Measured, Structure, Times, measure, structures_of, times_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,40 +106,6 @@ def _until(scene: Scene, steps: int) -> Scene:
         steps=steps,
         reference=scene.reference and _until(scene.reference, steps),
     )
-
-
-def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, Structure]:
-    """The structures to compare, by name; an intact one only where something is to be mimicked."""
-    from pipeline.structures import flat_vertices
-
-    found = {
-        "altered": Structure(scene, scene.lattice.vertices),
-        "cloaked": Structure(scene, flat_vertices(scene.lattice, design["vertices"])),
-    }
-    if scene.reference is None:
-        return found
-    intact = replace(scene.reference, reference=scene.reference)
-    return {"intact": Structure(intact, intact.lattice.vertices), **found}
-
-
-def times_of(asked: Problem, scene: Scene) -> Times:
-    """Output times of a problem's response."""
-    from sim.plan import sample_times
-
-    horizon = scene.duration
-    end = (
-        horizon
-        if asked.frequency is None
-        else max(horizon, asked.response.cycles / asked.frequency)
-    )
-    shown = np.linspace(0.0, end, asked.response.samples)
-    integrated = sample_times(scene)
-    sampled = integrated if scene.steps else np.linspace(0.0, horizon, asked.horizon.samples)
-    wanted = (shown, integrated, sampled)
-    nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
-    every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
-    ends = np.cumsum([len(times) for times in wanted])[:-1]
-    return Times(np.asarray(every * 1e-9), *np.split(place, ends))
 
 
 def response_dataset(

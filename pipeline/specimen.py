@@ -38,8 +38,8 @@ def work(args: argparse.Namespace) -> None:
         UserError: the recording has no specimen, or it cannot be made or simulated.
     """
     from pipeline import datasets, provenance
+    from pipeline.measuring import structures_of
     from pipeline.scenes import scene_of
-    from pipeline.simulate import structures_of
     from pipeline.structures import read_design
     from pipeline.tracking import recording as recordings
 
@@ -94,7 +94,7 @@ def _asked_for(held: dict[str, Structure], recording: Recording) -> Structure:
 
 def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
     """When the specimen is looked at: as the response, and as often again on the way back."""
-    from pipeline.simulate import times_of
+    from pipeline.measuring import times_of
 
     wanted = times_of(asked, scene)
     times = wanted.asked[wanted.shown]

@@ -80,9 +80,9 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
     """
     import xarray as xr
 
+    from pipeline.measuring import structures_of
     from pipeline.responses import case_directions
     from pipeline.scenes import lattice_of, scene_of
-    from pipeline.simulate import structures_of
     from pipeline.structures import network_variables, read_design, spread, unit_coordinates
     from pipeline.waves import waves
 

@@ -14,10 +14,10 @@ from pipeline import problem as problems
 from pipeline.errors import UserError
 from pipeline.problem import Problem
 from pipeline.scenes import altered_lattice_of, lattice_of
+from sim.arrays import Floats
 from sim.lattice import Lattice
 from sim.scene import Scene
 
-Floats = NDArray[np.float64]
 Variables = dict[str, tuple[Any, ...]]
 
 SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.problem.prediction import Tolerances
 from sim.imperfection import LARGEST_FACTOR, Copy, assembled, shifted, stiffened
-from sim.model import Material
+from sim.material import Material
 from sim.scene import Scene
 
 Floats = NDArray[np.float64]

@@ -95,8 +95,9 @@ def _finer_loads(
     asked: Problem, folder: Path, design: xr.Dataset, threads: int
 ) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
     """Numbers by check and structure of a path of equilibria, and why a check has none."""
+    from pipeline.measuring import structures_of, times_of
     from pipeline.scenes import scene_of
-    from pipeline.simulate import measured_cases, structures_of, times_of
+    from pipeline.simulate import measured_cases
 
     posed = variants(asked)
     tables: dict[str, Table] = {}

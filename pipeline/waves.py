@@ -13,7 +13,8 @@ from pipeline.structures import Variables
 from sim.bloch import Cell, bands, brillouin_path, cell_of, strained
 from sim.errors import SimulationError
 from sim.geometry import shape
-from sim.model import Parameters, parameters, topology
+from sim.model import Parameters, parameters
+from sim.topology import topology
 
 
 def waves(asked: Problem, wanted: Spectrum) -> Variables:

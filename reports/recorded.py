@@ -10,8 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
-
-Array = NDArray[np.float64]
+from reports.structure import Array
 
 LABEL = "SYNTHETIC"
 """Stands wherever a motion is shown that was rendered and not filmed."""

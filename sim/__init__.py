@@ -4,7 +4,10 @@ Pure functions on arrays: no files, no configuration, no plotting. Units through
 tonne, rad, float64.
 """
 
-import jax
+import os
+import sys
 
-# here, so that whatever room is entered first has it
-jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
+# JAX reads the variable when it is imported; one that was imported before is told.
+os.environ["JAX_ENABLE_X64"] = "1"
+if "jax" in sys.modules:
+    sys.modules["jax"].config.update("jax_enable_x64", True)

@@ -16,9 +16,10 @@ from sim.arrays import Floats
 from sim.errors import SimulationError
 from sim.loads import Motion
 from sim.meeting import contacts_of, refuse_strangers
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.neighbours import find
 from sim.outlines import Contacts
+from sim.topology import Topology
 
 NEVER_NEGATIVE = {
     "law": "stiffness of the ligaments",

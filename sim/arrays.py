@@ -1,14 +1,20 @@
-"""Types of the arrays that sim/ works on, all of 64 bits."""
+"""Defines the types of arrays, all of 64 bits where nothing else is said."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from jax import Array
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
-Numbers: TypeAlias = Array | Floats
+Mask: TypeAlias = NDArray[np.bool_]
+Singles: TypeAlias = NDArray[np.float32]
+Reals: TypeAlias = NDArray[np.floating[Any]]
+Image: TypeAlias = NDArray[np.uint8]
+Numbers: TypeAlias = "Array | Floats"
 """What a JAX function takes; it returns ``Array``."""

@@ -14,17 +14,12 @@ import scipy.linalg as la
 from jax import Array
 
 from sim.arrays import Floats, Ints
-from sim.energy import (
-    ContactLaw,
-    LigamentLaw,
-    contact_energy,
-    contact_void_angles,
-    ligament_energy,
-    ligament_strain,
-)
+from sim.energy import LigamentLaw, ligament_energy, ligament_strain
 from sim.errors import SimulationError
 from sim.lattice import Lattice
-from sim.model import Topology, Values
+from sim.model import Values
+from sim.topology import Topology
+from sim.void_law import ContactLaw, contact_energy, contact_void_angles
 
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""

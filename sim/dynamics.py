@@ -24,7 +24,8 @@ from sim.admission import refuse_idle, refuse_nonsense
 from sim.arrays import Floats, Ints
 from sim.errors import StrangersMeet
 from sim.loads import Motion, held_values
-from sim.model import Parameters, Topology, Values
+from sim.model import Parameters, Values
+from sim.topology import Topology
 
 T = TypeVar("T")
 R = TypeVar("R")

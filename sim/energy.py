@@ -1,6 +1,6 @@
-"""Energy of one ligament and of one contact pair: the definition that all else is derived from.
+"""Defines the energy of one ligament, from which all else is derived.
 
-The compiled kernels (sim/ligament_kernels.py, sim/void_kernels.py) are tested against the automatic
+The compiled kernels (sim/ligament_kernels.py) are tested against the automatic
 derivatives of these functions.
 """
 
@@ -18,14 +18,6 @@ class LigamentLaw(NamedTuple):
     axial: float | Array
     shear: float | Array
     bending: float | Array
-
-
-class ContactLaw(NamedTuple):
-    """Contact of two units on the void angle: N mm/rad^2, rad, rad."""
-
-    stiffness: float | Array
-    barrier: float | Array
-    cutoff: float | Array
 
 
 def rotate(vector: Array, angle: Array) -> Array:
@@ -81,24 +73,3 @@ def ligament_energy(
         + law.shear * (rest_length * strain.shear) ** 2
         + law.bending * strain.bend**2
     )
-
-
-def contact_energy(void_angle: float | Array, law: ContactLaw) -> Array:
-    """Energy of one void that closes below the cutoff, infinite at the barrier, N mm.
-
-    With x = (angle - cutoff) / (cutoff - barrier) it is k/4 (cutoff - barrier)^2 (1/(x+1) - 1/(x-1)
-    - 2), which is k/2 (angle - cutoff)^2 / (1 - x^2). Beyond the barrier the authors' law is
-    silently zero; here it
-    is infinite: a state there is not admissible.
-    """
-    width = law.cutoff - law.barrier
-    x = jnp.minimum(void_angle - law.cutoff, 0.0) / width
-    inside = x > -1
-    energy = law.stiffness / 2 * (width * x) ** 2 / (1 - jnp.where(inside, x, 0.0) ** 2)
-    return jnp.where(inside, energy, jnp.inf)
-
-
-def contact_void_angles(void_angle: Array, rotation_a: Array, rotation_b: Array) -> Array:
-    """Current void angles (2,) of a ligament; exact, since the units are rigid."""
-    turn = rotation_a - rotation_b
-    return void_angle + jnp.array([turn, -turn])

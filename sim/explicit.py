@@ -13,11 +13,12 @@ from sim.dynamics import Drive
 from sim.errors import SimulationError
 from sim.kickdrift import Outputs, Steps, run, sweep_back
 from sim.meeting import refuse_strangers
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.modes import highest_frequency
 from sim.observables import observe
 from sim.splitting import BLANES_MOAN, Splitting
 from sim.system import as_values, empty_bars, system_of
+from sim.topology import Topology
 from sim.void_flight import Pace
 
 MAX_REFINEMENTS = 4

@@ -15,7 +15,7 @@ from sim.arrays import Floats, Ints
 from sim.clearance import overlapping_pairs, polygons
 from sim.geometry import void_angles
 from sim.lattice import Lattice
-from sim.model import Material
+from sim.material import Material
 
 MOST_ROUNDS = 500
 LARGEST_FACTOR = 3.0

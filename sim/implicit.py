@@ -15,9 +15,10 @@ from sim.esdirk import march
 from sim.esdirk_adjoint import adjoint
 from sim.esdirk_stage import CONVERGED
 from sim.meeting import refuse_strangers
-from sim.model import Topology, Values
+from sim.model import Values
+from sim.splitting import ESDIRK3, Tableau
 from sim.system import as_values, empty_bars, system_of
-from sim.tableau import ESDIRK3, Tableau
+from sim.topology import Topology
 
 MAX_SPLITS = 100
 PATIENCE = 20

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from sim.arrays import Floats, Ints
 from sim.matrix import clear, matrix, number_free_dofs
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.potential import tangent
 from sim.system import system_of
+from sim.topology import Topology
 
 Complexes: TypeAlias = NDArray[np.complex128]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +10,9 @@ from sim.arrays import Ints
 from sim.clearance import close_pairs
 from sim.errors import StrangersMeet
 from sim.lattice import Lattice
+from sim.model import Values
 from sim.neighbours import MAX_STRANGERS, TERMS_PER_VERTEX
 from sim.outlines import Contacts, Watch
-
-if TYPE_CHECKING:
-    from sim.model import Values
 
 MARGIN = 1 / 15
 """Motion of a unit after which neighbours are searched for again, in lattice spacings."""

@@ -9,9 +9,10 @@ import scipy.sparse.linalg as spla
 
 from sim.arrays import Floats, Ints
 from sim.matrix import clear, factorise, matrix, solve
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.potential import hessian_product, tangent
 from sim.system import system_of
+from sim.topology import Topology
 
 
 def highest_frequency(

@@ -14,10 +14,11 @@ from sim.compiling import compiled
 from sim.energy import LigamentStrain, ligament_strain
 from sim.errors import StrangersMeet
 from sim.meeting import refuse_strangers
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.neighbours import pairs_in_contact
 from sim.potential import gradient
 from sim.system import System, system_of
+from sim.topology import Topology
 
 
 class Observables(NamedTuple):

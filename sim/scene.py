@@ -13,7 +13,8 @@ from sim.design import DesignSpace, Symmetry, design_space
 from sim.dynamics import Drive
 from sim.lattice import Lattice
 from sim.loads import Motion
-from sim.model import Material, Topology, topology
+from sim.material import Material
+from sim.topology import Topology, topology
 
 Accuracy = Literal["draft", "default", "tight"]
 Integrator = Literal["auto", "implicit", "explicit"]

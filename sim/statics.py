@@ -12,8 +12,9 @@ from sim.dynamics import Drive
 from sim.equilibrium import adjoint, follow
 from sim.errors import SimulationError
 from sim.meeting import refuse_strangers
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.system import as_values, empty_bars, system_of
+from sim.topology import Topology
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
 """Of the end of a ligament at rest, mm, and per mm that the drive moves it by: what its axial

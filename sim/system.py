@@ -10,9 +10,10 @@ from sim.arrays import Floats, Ints
 from sim.compiling import compiled
 from sim.matrix import Matrix, Pattern, matrix
 from sim.meeting import contacts_of
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.network import Network, Sensitivity
 from sim.outlines import Contacts
+from sim.topology import Topology
 
 
 class System(NamedTuple):

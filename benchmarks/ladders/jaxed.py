@@ -19,7 +19,7 @@ from benchmarks.frame import Run, Sample
 from benchmarks.ladders.cases import Case, case
 from sim.evaluation import structure
 from sim.loads import LinearRamp, TanhRamp
-from sim.model import damping_of_ratio
+from sim.material import damping_of_ratio
 from sim.scene import Scene
 
 SOLVERS = ("Tsit5", "Dopri5", "Kvaerno5")

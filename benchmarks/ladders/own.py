@@ -20,11 +20,12 @@ from sim.explicit import ExplicitSolver
 from sim.grid import halved
 from sim.implicit import ImplicitSolver
 from sim.matrix import number_free_dofs
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.modes import highest_frequency
 from sim.plan import STIFFENING, make_plan
 from sim.splitting import BLANES_MOAN, LEAPFROG, Splitting
 from sim.statics import StaticSolver
+from sim.topology import Topology
 
 Make = Callable[[Case, float], Solver]
 SPLITTINGS: dict[str, Splitting] = {"leapfrog": LEAPFROG, "Blanes-Moan": BLANES_MOAN}

@@ -17,15 +17,10 @@ from jax import Array
 from sim.arrays import Floats, Ints
 from sim.clearance import close_pairs, displaced
 from sim.contact import DistanceLaw, Polygon, pair_energy
-from sim.energy import (
-    ContactLaw,
-    LigamentLaw,
-    contact_energy,
-    contact_void_angles,
-    ligament_energy,
-)
+from sim.energy import LigamentLaw, ligament_energy
 from sim.lattice import Lattice
 from sim.model import Values
+from sim.void_law import ContactLaw, contact_energy, contact_void_angles
 
 
 class Structure(NamedTuple):

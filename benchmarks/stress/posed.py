@@ -15,9 +15,10 @@ from sim.arrays import Floats, Ints
 from sim.dynamics import Drive, Solver
 from sim.lattice import Lattice, quads
 from sim.loads import LinearRamp, Motion, held_dofs
-from sim.model import Topology, Values
+from sim.model import Values
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Scene
+from sim.topology import Topology
 
 DISTANCE = LIGAMENT / 12
 """Activation distance of contact between units, mm."""

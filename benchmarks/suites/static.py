@@ -12,10 +12,12 @@ from sim.dynamics import Drive, solve_case
 from sim.geometry import shape
 from sim.lattice import quads
 from sim.loads import LinearRamp, held_dofs
+from sim.material import Material
 from sim.matrix import number_free_dofs
-from sim.model import Material, Topology, Values, parameters, topology
+from sim.model import Values, parameters
 from sim.observables import observe
 from sim.statics import StaticSolver
+from sim.topology import Topology, topology
 
 SIDES = (15, 30, 60, 120)
 ALL_IN_BANDS = 60

@@ -23,10 +23,11 @@ from pipeline.datasets import TABLES
 from pipeline.errors import UserError
 from sim.arrays import Floats, Ints, Numbers
 from sim.implicit import ImplicitSolver
-from sim.model import Parameters, topology
+from sim.model import Parameters
 from sim.plan import TURN_ALLOWANCE
 from sim.scene import Scene
 from sim.statics import StaticSolver
+from sim.topology import topology
 
 TOLERANCE = 1e-12
 """Of equilibria, relative."""

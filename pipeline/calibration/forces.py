@@ -20,9 +20,10 @@ from pipeline.errors import UserError
 from sim.arrays import Floats, Ints, Numbers
 from sim.lattice import Lattice
 from sim.loads import TimeSeries, held_dofs
-from sim.model import Parameters, topology
+from sim.model import Parameters
 from sim.objectives import strain_energies
 from sim.statics import StaticSolver
+from sim.topology import topology
 
 DIRECTIONS = {"tension": (0.0, 1.0), "compression": (0.0, -1.0), "shear": (1.0, 0.0)}
 TOLERANCE = 1e-12

@@ -20,7 +20,8 @@ from sim.geometry import shape
 from sim.implicit import ImplicitSolver
 from sim.lattice import Lattice
 from sim.loads import Motion, held_values
-from sim.model import Material, Parameters, Values, parameters
+from sim.material import Material
+from sim.model import Parameters, Values, parameters
 from sim.statics import StaticSolver
 
 AnySolver = StaticSolver | ImplicitSolver

@@ -18,7 +18,7 @@ from pipeline.structures import network_variables, spread, unit_coordinates
 from pipeline.tracking.dataset import absent, labelled
 from sim.arrays import Floats
 from sim.dynamics import solve_case
-from sim.model import Material
+from sim.material import Material
 from sim.observables import observe
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Scene

@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
-Floats = NDArray[np.float64]
+from sim.arrays import Floats
+
 THIN_WALL = 1.2
 """Walls below this print, but break easily: they are warned of, mm."""
 

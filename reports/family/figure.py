@@ -11,7 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from reports import draft, style
 from reports.family.designs import Design, Family
-from reports.structure import draw, draw_clamps, from_dataset, outline
+from reports.structure import from_dataset
+from reports.structure_drawing import draw, draw_clamps, outline
 
 PER_ROW = 3
 """Panels in a row; the first is the curve."""

@@ -25,13 +25,10 @@ from reports.structure import (
     DRIVEN,
     Structure,
     deformed,
-    draw,
-    draw_clamps,
-    drive_arrows,
     from_dataset,
     middle_of_top_edge,
-    outline,
 )
+from reports.structure_drawing import draw, draw_clamps, drive_arrows, outline
 
 Array = NDArray[np.float64]
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from reports.design_tables import Columns, history, vertices
 from reports.mapped import mapped
 from reports.scene import Scene
 from reports.structure import from_dataset, middle_of_top_edge
 from reports.study import Study
 from reports.tables import Table
-
-Columns = dict[str, NDArray[Any]]
 
 
 def build(study: Study) -> list[Table]:
@@ -30,39 +26,6 @@ def build(study: Study) -> list[Table]:
         ),
         Table("robustness.csv", "loss over loading angle and frequency (panel e)", robust(sweep)),
     ]
-
-
-def vertices(design: xr.Dataset) -> Columns:
-    """One row a vertex, mm."""
-    shape = design["vertices"].transpose("unit", "vertex", "xy").values
-    initial = design["vertices_initial"].transpose("unit", "vertex", "xy").values
-    unit, vertex = np.nonzero(~np.isnan(shape[..., 0]))
-    return {
-        **{name: design[name].values[unit] for name in ("unit", "i", "j", "region")},
-        "vertex": vertex,
-        "x_mm": shape[unit, vertex, 0],
-        "y_mm": shape[unit, vertex, 1],
-        "x_initial_mm": initial[unit, vertex, 0],
-        "y_initial_mm": initial[unit, vertex, 1],
-    }
-
-
-def history(design: xr.Dataset) -> Columns:
-    """One row an evaluation."""
-    loss = design["loss"].transpose("method", "evaluation").values
-    cases = design["loss_case"].transpose("method", "evaluation", "case").values
-    method, evaluation = np.nonzero(np.isfinite(loss))
-    columns = {
-        "method": design["method"].values[method],
-        "evaluation": evaluation,
-        "J": loss[method, evaluation],
-    }
-    for k, angle in enumerate(design["direction"].values):
-        columns[f"J_{angle:g}deg"] = cases[method, evaluation, k]
-    for name in ("violation", "accepted"):
-        values = design[name].transpose("method", "evaluation").values
-        columns[name] = values[method, evaluation]
-    return columns
 
 
 def top_edge(scene: Scene, response: xr.Dataset) -> Columns:

@@ -11,17 +11,8 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from numpy.typing import NDArray
 
 from reports import style
-from reports.structure import (
-    CLAMPED,
-    DRIVEN,
-    SURROUNDINGS,
-    Structure,
-    deformed,
-    draw,
-    draw_clamps,
-    drive_arrows,
-    outline,
-)
+from reports.structure import CLAMPED, DRIVEN, SURROUNDINGS, Structure, deformed
+from reports.structure_drawing import draw, draw_clamps, drive_arrows, outline
 
 Array = NDArray[np.float64]
 

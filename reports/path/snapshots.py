@@ -15,7 +15,8 @@ from pipeline.problem import Problem
 from reports import style
 from reports.path.course import SECOND, Course, course, display_name, structures
 from reports.path.structures import Shade, shade_of
-from reports.structure import draw, from_dataset
+from reports.structure import from_dataset
+from reports.structure_drawing import draw
 from reports.study import Study
 
 LABEL, BAR, GAP = 6.0, 14.0, 1.2

@@ -16,16 +16,8 @@ from pipeline.problem import Problem
 from pipeline.problem.regions import Region
 from reports import style
 from reports.player import Field, round_up, scalar
-from reports.structure import (
-    CLAMPED,
-    CLOAK,
-    DRIVEN,
-    INCLUSION,
-    Structure,
-    draw,
-    draw_clamps,
-    from_dataset,
-)
+from reports.structure import CLAMPED, CLOAK, DRIVEN, INCLUSION, Structure, from_dataset
+from reports.structure_drawing import draw, draw_clamps
 
 Array = NDArray[np.float64]
 

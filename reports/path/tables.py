@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from reports.fig2.tables import history, vertices
+from reports.design_tables import history, vertices
 from reports.path import measures, scatter
 from reports.path.course import course, structures
 from reports.path.curves import over_cases

@@ -11,7 +11,8 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline.problem import Problem
 from reports import style
-from reports.structure import draw, from_dataset
+from reports.structure import from_dataset
+from reports.structure_drawing import draw
 
 MODES = 4
 """Modes of each structure that are drawn, the lowest ones."""

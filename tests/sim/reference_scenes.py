@@ -12,7 +12,7 @@ import numpy as np
 from sim.arrays import Floats, Ints
 from sim.lattice import Lattice, quads
 from sim.loads import Harmonic, LinearRamp, held_dofs
-from sim.model import Material, damping_of_ratio
+from sim.material import Material, damping_of_ratio
 from sim.scene import Scene
 
 FOLDER = Path(__file__).parents[1] / "data/reference"

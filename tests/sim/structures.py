@@ -19,9 +19,11 @@ from sim.dynamics import Drive, Solver, simulate
 from sim.geometry import shape
 from sim.lattice import Lattice, quads
 from sim.loads import Motion, held_dofs
+from sim.material import Material
 from sim.matrix import Matrix
-from sim.model import Material, Parameters, Topology, parameters, topology
+from sim.model import Parameters, parameters
 from sim.network import Network
+from sim.topology import Topology, topology
 
 NONE = np.array([], dtype=np.int64)
 

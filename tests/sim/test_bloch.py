@@ -10,7 +10,8 @@ from sim.bloch import Cell, bands, brillouin_path, cell_of, strained
 from sim.errors import SimulationError
 from sim.geometry import shape
 from sim.lattice import Lattice, kagome
-from sim.model import Values, parameters, topology
+from sim.model import Values, parameters
+from sim.topology import topology
 from tests.sim.structures import NONE, rotating_squares
 
 NO_LOOSE = np.zeros((2, 2))

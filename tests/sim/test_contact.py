@@ -30,10 +30,11 @@ from sim.contact import (
 from sim.geometry import shape
 from sim.lattice import Lattice
 from sim.matrix import clear, matrix, number_free_dofs
-from sim.model import Values, parameters, topology
+from sim.model import Values, parameters
 from sim.network import Sensitivity
 from sim.outlines import Contacts
 from sim.system import System, system_of
+from sim.topology import topology
 from tests.sim.structures import dense, hand_made
 
 EXACT = 1e-12

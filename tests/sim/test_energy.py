@@ -10,12 +10,14 @@ from hypothesis import strategies as st
 from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
 from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats
-from sim.energy import ContactLaw, LigamentLaw, contact_energy, ligament_energy
+from sim.energy import LigamentLaw, ligament_energy
 from sim.geometry import shape
 from sim.lattice import Lattice
-from sim.model import Values, parameters, topology
+from sim.model import Values, parameters
 from sim.network import Network
 from sim.plan import concrete_parameters
+from sim.topology import topology
+from sim.void_law import ContactLaw, contact_energy
 from tests.sim.reference_scenes import compressed, reference
 from tests.sim.structures import mixed_polygons, rotating_squares, some_ligaments
 

@@ -8,7 +8,7 @@ from sim.clearance import overlapping_pairs, polygons
 from sim.geometry import void_angles
 from sim.imperfection import Copy, assembled, clashing_units, shifted, stiffened
 from sim.lattice import quads
-from sim.model import Material
+from sim.material import Material
 
 LATTICE = quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
 CUTOFF = np.deg2rad(-10.0)

@@ -11,8 +11,8 @@ from sim.dynamics import Drive, solve_case
 from sim.errors import SimulationError
 from sim.implicit import ImplicitSolver
 from sim.loads import Harmonic, LinearRamp, TimeSeries
+from sim.splitting import ESDIRK3
 from sim.statics import StaticSolver
-from sim.tableau import ESDIRK3
 from tests.sim.pulse import DURATION, exact_end, order, pulsed
 from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
 

@@ -13,11 +13,12 @@ from jax import Array
 from benchmarks.constants import BARRIER, CUTOFF
 from sim import ligament_kernels, void_kernels
 from sim.arrays import Floats, Ints, Numbers
-from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
+from sim.energy import LigamentLaw, ligament_energy
 from sim.geometry import shape
 from sim.lattice import Lattice, quads
 from sim.matrix import clear, matrix, number_free_dofs
 from sim.network import Network, Sensitivity
+from sim.void_law import ContactLaw, contact_energy, contact_void_angles
 from tests.sim.structures import dense, mixed_polygons
 
 EXACT = 1e-12

@@ -19,10 +19,10 @@ from sim.explicit import ExplicitSolver
 from sim.implicit import ImplicitSolver
 from sim.lattice import quads
 from sim.loads import Harmonic, LinearRamp, TimeSeries, held_dofs
-from sim.model import topology
 from sim.plan import concrete_parameters, make_plan
 from sim.scene import Scene
 from sim.statics import StaticSolver
+from sim.topology import topology
 from tests.sim.structures import NONE
 
 ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
