@@ -69,18 +69,18 @@ wheels:
 	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
-	@exec $(BIN)/python -m pipeline.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
 
 # what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings
 $(PRODUCTS): setup
-	@exec $(BIN)/python -m pipeline.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
 
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
-	@exec $(BIN)/python -m pipeline.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
 
 reproduce: setup
-	@$(BIN)/python -m pipeline.reproduce $(STUDY)
+	@$(BIN)/python -m pipeline.workflow.reproduce $(STUDY)
 
 test: setup
 	$(BIN)/python -m pytest $(PYTEST)
@@ -121,7 +121,7 @@ bench-tracking: setup
 
 stress: setup
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \
-	    $(BIN)/python -m reports.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
+	    $(BIN)/python -m reports.products.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
 
 survive: setup
 	$(BIN)/python -m tests.hostile $(PARTS)

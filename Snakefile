@@ -6,14 +6,43 @@ import sys
 
 from snakemake.utils import min_version
 
-from pipeline.calibrated import calibrations, description, measurements, problems_of
-from pipeline.filmed import compared, comparisons, filmed, recording_pages, tracked
-from pipeline.sources import source_hash
-from pipeline.studies import FRAMED, families, figures, joints, movies, targets
-from pipeline.workflow import any_of, check_problems, check_room, chunks, comparisons_of
-from pipeline.workflow import copies, datasets_of, designs, hashes_of, member_hashes
-from pipeline.workflow import members, options, packages, prepare_jobs, product_pages
-from pipeline.workflow import (
+from pipeline.workflow.calibration_inputs import (
+    calibrations,
+    description,
+    measurements,
+    problems_of,
+)
+from pipeline.workflow.recordings import (
+    compared,
+    comparisons,
+    filmed,
+    recording_pages,
+    tracked,
+)
+from pipeline.runtime.source_closure import source_hash
+from pipeline.workflow.studies import FRAMED, families, figures, joints, movies, targets
+from pipeline.workflow.rule_inputs import (
+    any_of,
+    check_problems,
+    check_room,
+    chunks,
+    comparisons_of,
+)
+from pipeline.workflow.rule_inputs import (
+    copies,
+    datasets_of,
+    designs,
+    hashes_of,
+    member_hashes,
+)
+from pipeline.workflow.rule_inputs import (
+    members,
+    options,
+    packages,
+    prepare_jobs,
+    product_pages,
+)
+from pipeline.workflow.rule_inputs import (
     robust_designs,
     section,
     shown,

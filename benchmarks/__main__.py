@@ -7,9 +7,18 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks import compare, registry, store, table
-from benchmarks.frame import Benchmark, Outcome, Report
-from benchmarks.measure import CandidateError, measure, pin
+from benchmarks import registry
+from benchmarks.harness import (
+    Benchmark,
+    BenchmarkReport,
+    CandidateError,
+    CandidateResult,
+    comparison,
+    measure,
+    pin,
+    storage,
+    text_table,
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,34 +32,37 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     good = True
     for benchmark in chosen:
-        yard = compare.yardstick()
+        yard = comparison.yardstick()
         try:
             report = _report(benchmark, asked.repeats, asked.skip_baseline, asked.out, core)
         except CandidateError as failed:
             print(f"error: {benchmark.name}: no reference: {failed}", file=sys.stderr)
             good = False
             continue
-        print(f"\n{table.text(report)}\n")
-        print("  stored:", *store.write(report, asked.out), flush=True)
-        made = compare.record(report, yard)
-        print(compare.told(benchmark.name, made), flush=True)
+        print(f"\n{text_table.text(report)}\n")
+        print("  stored:", *storage.write(report, asked.out), flush=True)
+        made = comparison.record(report, yard)
+        print(comparison.told(benchmark.name, made), flush=True)
         if asked.keep:
-            compare.keep(benchmark.name, made)
+            comparison.keep(benchmark.name, made)
         good = good and not any(outcome.failure for outcome in report.outcomes)
     return 0 if good else 1
 
 
 def _report(
     benchmark: Benchmark, repeats: int, skip_baseline: bool, folder: Path, core: int
-) -> Report:
-    machine = store.machine(core)
+) -> BenchmarkReport:
+    machine = storage.machine(core)
     chosen = [one for one in benchmark.candidates if not (skip_baseline and one.baseline)]
     measured = {
         outcome.name: outcome for outcome in measure(benchmark, chosen, repeats, tell=_tell)
     }
-    known: dict[str, Outcome] = {**store.stored_outcomes(benchmark.name, folder), **measured}
+    known: dict[str, CandidateResult] = {
+        **storage.stored_outcomes(benchmark.name, folder),
+        **measured,
+    }
     ordered = tuple(known[one.name] for one in benchmark.candidates if one.name in known)
-    return Report(benchmark, ordered, machine)
+    return BenchmarkReport(benchmark, ordered, machine)
 
 
 def _tell(line: str) -> None:
@@ -74,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--keep",
         action="store_true",
-        help=f"store this as what later ones are compared with ({compare.STORED.name})",
+        help=f"store this as what later ones are compared with ({comparison.STORED.name})",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results/benchmark"), help="folder (default %(default)s)"

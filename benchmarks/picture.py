@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports import style
+from reports.base import style
 
 PAGE = Path(__file__).resolve().parent.parent / "docs/benchmarks.md"
 _TABLE = re.compile(r"^```\n(\w+): .*?\n  -+\n(.*?)```", re.MULTILINE | re.DOTALL)
@@ -18,7 +18,7 @@ _ROW = re.compile(r"^  (\S.*?)  +([\d.]+) +(?:\d+ %|-) +[\d.]+ +[\d.]+ +([\d.e-]
 _BASELINE = ("diffrax", "pseudo-dynamics")
 
 
-class Row(NamedTuple):
+class TableRow(NamedTuple):
     """A candidate: its time, s, and its first error, relative."""
 
     name: str
@@ -26,15 +26,17 @@ class Row(NamedTuple):
     error: float
 
 
-def tables(text: str) -> dict[str, list[Row]]:
+def tables(text: str) -> dict[str, list[TableRow]]:
     """The tables of the page, by the names of their scenes."""
     return {
-        scene: [Row(name, float(time), float(error)) for name, time, error in _ROW.findall(rows)]
+        scene: [
+            TableRow(name, float(time), float(error)) for name, time, error in _ROW.findall(rows)
+        ]
         for scene, rows in _TABLE.findall(text)
     }
 
 
-def figure(measured: dict[str, list[Row]]) -> Figure:
+def figure(measured: dict[str, list[TableRow]]) -> Figure:
     """Time of loss and gradient beside the baselines, and time against error."""
     drawn, (left, right) = plt.subplots(
         1, 2, figsize=(style.TWO_COLUMNS / style.MM_PER_INCH, 2.5), width_ratios=(1, 1.2)
@@ -45,7 +47,7 @@ def figure(measured: dict[str, list[Row]]) -> Figure:
     return drawn
 
 
-def _beside(axes: Axes, measured: dict[str, list[Row]]) -> None:
+def _beside(axes: Axes, measured: dict[str, list[TableRow]]) -> None:
     rows = [
         (scene, row)
         for scene in ("fig4", "fig2")
@@ -65,7 +67,7 @@ def _beside(axes: Axes, measured: dict[str, list[Row]]) -> None:
     axes.set_xlabel("processor time of loss and gradient, s")
 
 
-def _against(axes: Axes, rows: list[Row]) -> None:
+def _against(axes: Axes, rows: list[TableRow]) -> None:
     for kind, colour in (("implicit", style.INTACT), ("explicit", style.METHOD_COLOURS["mma"])):
         chosen = sorted(
             (row for row in rows if row.name.startswith(kind)), key=lambda row: row.time

@@ -7,7 +7,7 @@ import pkgutil
 from collections.abc import Sequence
 
 from benchmarks import suites
-from benchmarks.frame import Benchmark
+from benchmarks.harness import Benchmark
 
 
 def names() -> list[str]:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from pipeline import cli
+from pipeline.runtime import cli
 
 LOG = logging.getLogger("pipeline.benchmarks")
 VIDEOS = Path("tests/data/tracking")
@@ -21,7 +21,7 @@ VIDEOS = Path("tests/data/tracking")
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
-    from benchmarks.climb import Rules
+    from benchmarks.harness import MeasuringLimits
 
     made = cli.parser("benchmarks.stage", str(__doc__), study=False)
     made.add_argument("suite", help="which: precision_fig2, growth, ablation, ...")
@@ -30,9 +30,11 @@ def parser() -> argparse.ArgumentParser:
         "--videos", type=Path, default=VIDEOS, metavar="FOLDER",
         help="videos with truth, for the suite tracking (default: %(default)s)",
     )  # fmt: skip
-    made.add_argument("--repeats", type=int, default=Rules().repeats, help="runs of a point")
     made.add_argument(
-        "--limit", type=float, default=Rules().limit_s, metavar="S",
+        "--repeats", type=int, default=MeasuringLimits().repeats, help="runs of a point"
+    )
+    made.add_argument(
+        "--limit", type=float, default=MeasuringLimits().limit_s, metavar="S",
         help="processor time that a run may take, s",
     )  # fmt: skip
     return made
@@ -44,15 +46,15 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: there is no such suite, or its reference cannot be computed.
     """
-    from benchmarks import store, studies
-    from benchmarks.climb import Rules
-    from benchmarks.measure import CandidateError
-    from pipeline import datasets, provenance
-    from pipeline.errors import UserError
+    from benchmarks.harness import CandidateError, MeasuringLimits, storage
+    from benchmarks.studies import catalogue
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.runtime import UserError
 
-    suite = studies.named(args.suite, args.videos)
-    rules = Rules(args.repeats, args.limit)
-    machine = store.machine()
+    suite = catalogue.named(args.suite, args.videos)
+    rules = MeasuringLimits(args.repeats, args.limit)
+    machine = storage.machine()
     try:
         measured = suite.measure(rules, LOG.info)
     except CandidateError as failed:

@@ -2,15 +2,11 @@
 
 import numpy as np
 
-from sim.constraints import Constraints
-from sim.evaluation import evaluator
-from sim.lattice import quads
-from sim.loads import Harmonic, held_dofs
-from sim.material import Material, damping_of_ratio
+from sim.constraints import ConstraintVector, Limits
 from sim.optimise import SqpOptions, minimise
-from sim.plan import make_plan
-from sim.requirements import Limits
-from sim.scene import Scene
+from sim.scene import Scene, evaluator, make_plan
+from sim.solvers import Harmonic, held_dofs
+from sim.structure import Material, damping_of_ratio, quads
 
 lattice = quads(7, 7, spacing=15.0, ligament_length=2.25, bias_angle=np.deg2rad(20.0))  # mm
 ring = np.abs(lattice.index - 3).max(axis=1)  # of each unit around the centre
@@ -35,7 +31,7 @@ plan = make_plan(scene)
 evaluate = evaluator(scene, plan)
 loss, gradient, _ = evaluate(np.zeros(scene.space.n_variables))
 limits = Limits(edge_length=5.0, block_angle=np.deg2rad(30.0), void_angle=0.0, gap=0.2)
-best = minimise("sqp", evaluate, Constraints(scene.space, limits), np.zeros_like(gradient),
+best = minimise("sqp", evaluate, ConstraintVector(scene.space, limits), np.zeros_like(gradient),
                 options=SqpOptions(evaluations=8))  # fmt: skip
 print(plan.describe())
 print(f"loss {loss:.4f}, |gradient| {np.linalg.norm(gradient):.4f} / mm -> loss {best.loss:.4f}")

@@ -1,5 +1,5 @@
 """The stages: each module reads datasets, calls `sim`, and writes a dataset."""
 
-from pipeline.environment import pin
+from pipeline.runtime import pin
 
 pin()

@@ -4,7 +4,7 @@ import signal
 
 from hypothesis import HealthCheck, settings
 
-from pipeline.environment import pin
+from pipeline.runtime import pin
 
 pin()  # before anything imports the libraries that this is about
 

@@ -8,8 +8,8 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.stress import registry, store
-from benchmarks.stress.frame import Family, Outcome, Tally, attempted
+from benchmarks.stress import registry, storage
+from benchmarks.stress.verdicts import StressFamily, StressOutcome, Tally, attempted
 
 ENOUGH = 0.99
 """Share of the cases in range that must be solved, of each family and of all."""
@@ -28,14 +28,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     tallies = [_tally(family, asked.small, asked.only) for family in families]
-    store.write(tallies, asked.out)
-    print(store.table(tallies))
+    storage.write(tallies, asked.out)
+    print(storage.table(tallies))
     failures = [line for tally in tallies for line in _failures(tally)]
     print(*failures, sep="\n")
     return 1 if failures and not asked.tolerant else 0
 
 
-def _tally(family: Family, small: bool, only: str) -> Tally:
+def _tally(family: StressFamily, small: bool, only: str) -> Tally:
     """Attempts the cases of a family, and tells of those that are not solved."""
     start, outcomes = time.process_time(), []
     for case in family.cases(small):
@@ -47,7 +47,7 @@ def _tally(family: Family, small: bool, only: str) -> Tally:
     return Tally(family, tuple(outcomes))
 
 
-def _tell(family: Family, outcome: Outcome) -> None:
+def _tell(family: StressFamily, outcome: StressOutcome) -> None:
     if outcome.verdict != "solved":
         line = f"{family.name}: {outcome.case.name}: {outcome.verdict}: {outcome.message}"
         print(line, file=sys.stderr, flush=True)

@@ -9,15 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
-from benchmarks.stress.definition import Structure, balance, stiffness
-from benchmarks.stress.frame import Check
-from benchmarks.stress.posed import Posed
-from sim import explicit, implicit, statics
-from sim.arrays import Floats, Ints
-from sim.clearance import clearance, displaced
-from sim.dynamics import Solver, solve_case
-from sim.errors import SimulationError
-from sim.geometry import void_angles
+from benchmarks.stress.reference_energy import ReferenceStructure, balance, stiffness
+from benchmarks.stress.stress_scenes import StressScene
+from benchmarks.stress.verdicts import Check
+from sim.core import Floats, Ints, SimulationError
+from sim.quasistatics import static_solver
+from sim.solvers import Solver, solve_case
+from sim.structure import clearance, displaced, void_angles
+from sim.time_integration import explicit, implicit
 
 FAR_FROM_BALANCE = 1e-6
 """Largest distance of an equilibrium from the one that the definition has, relative to the largest
@@ -34,15 +33,15 @@ class Answer(NamedTuple):
 
     displacement: Floats
     velocity: Floats
-    record: statics.Record | implicit.Record | explicit.Record
+    record: static_solver.StaticRecord | implicit.ImplicitRecord | explicit.ExplicitRecord
 
 
-def solved(case: Posed, solver: Solver) -> Answer:
-    """The answer to one case, by ``sim.dynamics.solve_case``."""
+def solved(case: StressScene, solver: Solver) -> Answer:
+    """The answer to one case, by ``sim.solvers.base.solve_case``."""
     return Answer(*solve_case(solver, case.values, case.drive))
 
 
-def equilibria(case: Posed, loads: Floats, halving: bool = False) -> list[Check]:
+def equilibria(case: StressScene, loads: Floats, halving: bool = False) -> list[Check]:
     """Solves for equilibria and checks them, on request also against a path of smaller steps.
 
     Raises:
@@ -61,10 +60,10 @@ def equilibria(case: Posed, loads: Floats, halving: bool = False) -> list[Check]
     return checks
 
 
-def balanced(case: Posed, answer: Answer) -> list[Check]:
+def balanced(case: StressScene, answer: Answer) -> list[Check]:
     """Distance of equilibria from those of the definition, and whether these are minima."""
     record = answer.record
-    assert isinstance(record, statics.Record)
+    assert isinstance(record, static_solver.StaticRecord)
     if not record.stable.all():
         raise SimulationError(
             f"the record says that load {int(record.stable.argmin())} has no stable equilibrium;"
@@ -82,7 +81,7 @@ def balanced(case: Posed, answer: Answer) -> list[Check]:
     ]
 
 
-def _newton(of: Structure, state: Floats, free: Ints) -> tuple[Floats, int]:
+def _newton(of: ReferenceStructure, state: Floats, free: Ints) -> tuple[Floats, int]:
     """Newton's step (n_dofs,) to balance, and the number of negative pivots of the stiffness."""
     step = np.zeros_like(state)
     if len(free) == 0:
@@ -114,7 +113,7 @@ def negative_pivots(factor: spla.SuperLU) -> int:
     return int((factor.U.diagonal() < 0).sum())
 
 
-def reached(case: Posed, states: Floats, times: Floats) -> Check:
+def reached(case: StressScene, states: Floats, times: Floats) -> Check:
     """How far the driven units are from where they should be, mm or rad."""
     wanted = np.asarray(case.drive.motion(times), dtype=float)
     wanted = wanted[:, None] if wanted.ndim == 2 else wanted
@@ -122,7 +121,7 @@ def reached(case: Posed, states: Floats, times: Floats) -> Check:
     return Check("driven units off their motion", float(np.abs(moved - wanted).max()), 1e-9)
 
 
-def admissible(case: Posed, states: Floats) -> list[Check]:
+def admissible(case: StressScene, states: Floats) -> list[Check]:
     """Finite numbers, no void beyond its barrier, no unit through another: by geometry."""
     motion = states.reshape(len(states), -1, 3)
     checks = [Check("numbers that are not finite", int((~np.isfinite(states)).sum()), 0)]
@@ -145,18 +144,20 @@ def admissible(case: Posed, states: Floats) -> list[Check]:
     ]
 
 
-def _turns(case: Posed, state: Floats) -> Floats:
+def _turns(case: StressScene, state: Floats) -> Floats:
     a, b = case.scene.lattice.ligament_units.T
     turn = state[a, 2] - state[b, 2]
     return np.stack([turn, -turn], axis=1)
 
 
-def _void_angles(case: Posed, state: Floats) -> Floats:
+def _void_angles(case: StressScene, state: Floats) -> Floats:
     lattice = case.scene.lattice
     return np.asarray(void_angles(lattice, displaced(lattice, case.vertices, state[None])[0]))
 
 
-def motions(case: Posed, asked: Floats, error: float, solver: Solver | None = None) -> list[Check]:
+def motions(
+    case: StressScene, asked: Floats, error: float, solver: Solver | None = None
+) -> list[Check]:
     """Integrates a motion and checks it, also against one of half the steps.
 
     Args:
@@ -171,7 +172,7 @@ def motions(case: Posed, asked: Floats, error: float, solver: Solver | None = No
     used = solver or case.solver(asked)
     answer = solved(case, used)
     checks = [*admissible(case, answer.displacement), reached(case, answer.displacement, asked)]
-    if isinstance(answer.record, implicit.Record):
+    if isinstance(answer.record, implicit.ImplicitRecord):
         assert isinstance(used, implicit.ImplicitSolver)
         checks += stages(case, used, answer.record)
     finer = solved(case, used.refined(answer.record))
@@ -181,7 +182,7 @@ def motions(case: Posed, asked: Floats, error: float, solver: Solver | None = No
     ]
 
 
-def motions_as_advised(case: Posed, asked: Floats, error: float) -> list[Check]:
+def motions_as_advised(case: StressScene, asked: Floats, error: float) -> list[Check]:
     """The same as planned by default; and if that is not enough by its own account, tight.
 
     Args:
@@ -203,7 +204,9 @@ def motions_as_advised(case: Posed, asked: Floats, error: float) -> list[Check]:
     return motions(replace(case, scene=replace(case.scene, accuracy="tight")), asked, error)
 
 
-def stages(case: Posed, solver: implicit.ImplicitSolver, record: implicit.Record) -> list[Check]:
+def stages(
+    case: StressScene, solver: implicit.ImplicitSolver, record: implicit.ImplicitRecord
+) -> list[Check]:
     """Distance of implicit stages from those of the definition, over the tolerance."""
     tableau, times = solver.tableau, record.times
     n_steps, n_stages = len(times) - 1, len(tableau.nodes)
@@ -230,7 +233,7 @@ def stages(case: Posed, solver: implicit.ImplicitSolver, record: implicit.Record
     ]
 
 
-def energies(case: Posed, answer: Answer) -> Floats:
+def energies(case: StressScene, answer: Answer) -> Floats:
     """Kinetic and elastic energy (n_asked,), N mm."""
     rates = answer.velocity.copy()
     rates[:, case.topology.held] = 0.0
@@ -238,7 +241,7 @@ def energies(case: Posed, answer: Answer) -> Floats:
     return kinetic + [balance(case.structure, state).energy for state in answer.displacement]
 
 
-def work(case: Posed, answer: Answer, times: Floats) -> tuple[Floats, Floats]:
+def work(case: StressScene, answer: Answer, times: Floats) -> tuple[Floats, Floats]:
     """Work of the drive and energy lost to damping (n_asked,) up to each time, N mm.
 
     By the trapezoidal rule, so the times must resolve the motion.
@@ -256,13 +259,13 @@ def _integral(values: Floats, times: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(parts)])
 
 
-def apart(case: Posed, one: Answer, other: Answer) -> float:
+def apart(case: StressScene, one: Answer, other: Answer) -> float:
     """Largest difference of two answers over the largest displacement."""
     size = max(_size(case, one.displacement), 1e-9)
     return _size(case, one.displacement - other.displacement) / size
 
 
-def typically_apart(case: Posed, one: Answer, other: Answer) -> float:
+def typically_apart(case: StressScene, one: Answer, other: Answer) -> float:
     """Root mean square difference of two answers over that of the first."""
     scale = case.topology.scale
     off, size = (
@@ -272,6 +275,6 @@ def typically_apart(case: Posed, one: Answer, other: Answer) -> float:
     return off / max(size, 1e-9)
 
 
-def _size(case: Posed, states: Floats) -> float:
+def _size(case: StressScene, states: Floats) -> float:
     """Largest displacement, rotations times the rotation scale, mm."""
     return float(np.abs(states * case.topology.scale).max(initial=0.0))

@@ -19,7 +19,7 @@ from benchmarks.stress.families import (
     times,
     windings,
 )
-from benchmarks.stress.frame import Family
+from benchmarks.stress.verdicts import StressFamily
 
 FAMILIES = tuple(
     made.family()
@@ -42,7 +42,7 @@ FAMILIES = tuple(
 NAMES = tuple(family.name for family in FAMILIES)
 
 
-def load(asked: Sequence[str]) -> list[Family]:
+def load(asked: Sequence[str]) -> list[StressFamily]:
     """The families asked for; all without a name.
 
     Raises:

@@ -1,1 +1,5 @@
-"""One benchmark a file: each module has a function ``benchmark()``."""
+"""Defines one benchmark a module: each has a function ``benchmark()``."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

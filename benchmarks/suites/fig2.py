@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import baseline, scenes
-from benchmarks.frame import (
+from benchmarks.harness import (
     Benchmark,
     Candidate,
     Run,
@@ -17,9 +16,10 @@ from benchmarks.frame import (
     seconds_of,
     speed_up,
 )
-from sim.design import Symmetry
-from sim.evaluation import evaluator, objective
-from sim.plan import make_plan, sample_times
+from benchmarks.methods import jax_baseline
+from benchmarks.scenes import paper_scenes
+from sim.scene import evaluator, make_plan, objective, sample_times
+from sim.structure import Symmetry
 
 ANGLES = (0.0, 45.0, 90.0, 135.0)
 MEASURED_ANGLE = 45.0
@@ -61,10 +61,10 @@ def benchmark() -> Benchmark:
 
 def _tight() -> Run:
     """Our explicit integrator of order 4 at the tight accuracy, each angle by itself."""
-    scene = scenes.fig2(accuracy="tight")
-    angles = [scenes.one_case(scene, degrees) for degrees in ANGLES]
+    scene = paper_scenes.fig2(accuracy="tight")
+    angles = [paper_scenes.one_case(scene, degrees) for degrees in ANGLES]
     evaluates = [evaluator(angle, make_plan(angle)) for angle in angles]
-    symmetric = scenes.fig2(symmetry="C4").space.basis
+    symmetric = paper_scenes.fig2(symmetry="C4").space.basis
 
     def run() -> Sample:
         found = [evaluate(np.zeros(scene.space.n_variables)) for evaluate in evaluates]
@@ -84,10 +84,10 @@ def _tight() -> Run:
 
 
 def _ours(symmetry: Symmetry) -> Run:
-    scene = scenes.fig2(symmetry=symmetry)
+    scene = paper_scenes.fig2(symmetry=symmetry)
     plan = make_plan(scene)
     evaluate, start = evaluator(scene, plan), np.zeros(scene.space.n_variables)
-    work = scenes.counted(scene, plan.solver, [int(case) for case in plan.simulated])
+    work = paper_scenes.counted(scene, plan.solver, [int(case) for case in plan.simulated])
     name = "gradient" if symmetry == "none" else f"gradient@{symmetry}"
 
     def run() -> Sample:
@@ -99,19 +99,19 @@ def _ours(symmetry: Symmetry) -> Run:
 
 
 def _diffrax_gradient() -> Run:
-    scene = scenes.one_case(scenes.fig2(), MEASURED_ANGLE)
-    return _at_one_angle(baseline.prepare_gradient(_loss(), scene.space.n_variables))
+    scene = paper_scenes.one_case(paper_scenes.fig2(), MEASURED_ANGLE)
+    return _at_one_angle(jax_baseline.prepare_gradient(_loss(), scene.space.n_variables))
 
 
 def _diffrax_loss() -> Run:
-    scene = scenes.one_case(scenes.fig2(), MEASURED_ANGLE)
-    return _at_one_angle(baseline.prepare_loss(_loss(), scene.space.n_variables))
+    scene = paper_scenes.one_case(paper_scenes.fig2(), MEASURED_ANGLE)
+    return _at_one_angle(jax_baseline.prepare_loss(_loss(), scene.space.n_variables))
 
 
-def _loss() -> baseline.Loss:
-    scene = scenes.one_case(scenes.fig2(), MEASURED_ANGLE)
-    method = baseline.RungeKutta(rtol=1e-8, atol=1e-4)
-    return baseline.loss(scene, 0, method, sample_times(scene), objective(scene))
+def _loss() -> jax_baseline.Loss:
+    scene = paper_scenes.one_case(paper_scenes.fig2(), MEASURED_ANGLE)
+    method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-4)
+    return jax_baseline.loss(scene, 0, method, sample_times(scene), objective(scene))
 
 
 def _at_one_angle(whole: Run) -> Run:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jax import Array
 
-from benchmarks import baseline, scenes
-from benchmarks.frame import (
+from benchmarks.harness import (
     Benchmark,
     Candidate,
     Run,
@@ -16,9 +15,11 @@ from benchmarks.frame import (
     seconds_of,
     speed_up,
 )
-from sim.evaluation import structure, value_and_gradient
-from sim.model import Parameters
-from sim.statics import StaticSolver
+from benchmarks.methods import jax_baseline
+from benchmarks.scenes import paper_scenes
+from sim.quasistatics import StaticSolver
+from sim.scene import structure, value_and_gradient
+from sim.structure import Parameters
 
 OURS, THEIRS, THEIRS_FORWARD = (
     "ours",
@@ -56,10 +57,10 @@ def _ours() -> Run:
     return _equilibrium(np.ones(1), 1e-10)
 
 
-def _equilibrium(loads: scenes.Floats, relative: float) -> Run:
-    scene = scenes.fig4()
+def _equilibrium(loads: paper_scenes.Floats, relative: float) -> Run:
+    scene = paper_scenes.fig4()
     solver = StaticSolver(scene.topology, loads, relative=relative)
-    energy = scenes.final_energy(scene)
+    energy = paper_scenes.final_energy(scene)
 
     def final(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
         value = energy(displacement[:, -1:], values)[0]
@@ -67,7 +68,7 @@ def _equilibrium(loads: scenes.Floats, relative: float) -> Run:
 
     evaluate = value_and_gradient(structure(scene), final, solver, scene.drives)
     start = np.zeros(scene.space.n_variables)
-    work = scenes.counted(scene, solver, [0])
+    work = paper_scenes.counted(scene, solver, [0])
 
     def run() -> Sample:
         value, gradient, _ = evaluate(start)
@@ -78,15 +79,15 @@ def _equilibrium(loads: scenes.Floats, relative: float) -> Run:
 
 
 def _dynamics_gradient() -> Run:
-    return baseline.prepare_gradient(_loss(), scenes.fig4().space.n_variables)
+    return jax_baseline.prepare_gradient(_loss(), paper_scenes.fig4().space.n_variables)
 
 
 def _dynamics_loss() -> Run:
-    return baseline.prepare_loss(_loss(), scenes.fig4().space.n_variables)
+    return jax_baseline.prepare_loss(_loss(), paper_scenes.fig4().space.n_variables)
 
 
-def _loss() -> baseline.Loss:
-    scene = scenes.fig4_as_dynamics()
-    method = baseline.RungeKutta(rtol=1e-8, atol=1e-8)
+def _loss() -> jax_baseline.Loss:
+    scene = paper_scenes.fig4_as_dynamics()
+    method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8)
     end = np.array([scene.duration])
-    return baseline.loss(scene, 0, method, end, scenes.final_energy(scene))
+    return jax_baseline.loss(scene, 0, method, end, paper_scenes.final_energy(scene))

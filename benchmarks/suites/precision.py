@@ -11,17 +11,18 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks import scenes
-from benchmarks.frame import Benchmark, Candidate, Run, Sample, Target, error_of
-from sim.dynamics import Solver, simulate
-from sim.evaluation import structure
-from sim.explicit import ExplicitSolver
-from sim.grid import halved
-from sim.implicit import ImplicitSolver
-from sim.objectives import DisplacementMimicking
-from sim.plan import make_plan
-from sim.scene import Accuracy, Scene
-from sim.splitting import BLANES_MOAN, LEAPFROG, Splitting
+from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of
+from benchmarks.scenes import paper_scenes
+from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, structure
+from sim.solvers import Solver, simulate
+from sim.time_integration import (
+    BLANES_MOAN,
+    LEAPFROG,
+    ExplicitSolver,
+    ImplicitSolver,
+    Splitting,
+    halved,
+)
 
 SAMPLES = np.linspace(0.0, 1.0, 200)
 """The authors' samples: the loss is their plain sum over these."""
@@ -80,7 +81,7 @@ def _implicit_name(accuracy: Accuracy, halvings: int) -> str:
 
 
 def _scene() -> Scene:
-    return scenes.one_case(scenes.fig2(), 45.0)
+    return paper_scenes.one_case(paper_scenes.fig2(), 45.0)
 
 
 def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
@@ -113,7 +114,7 @@ def _run_with(make: partial[Solver], warm: bool = True) -> Run:
 
     evaluate = jax.value_and_grad(loss, has_aux=True)
     start = jnp.zeros(scene.space.n_variables)
-    work = scenes.counted(scene, solver, [0]) if warm else {}
+    work = paper_scenes.counted(scene, solver, [0]) if warm else {}
 
     def run() -> Sample:
         (value, motion), gradient = evaluate(start)
@@ -138,7 +139,7 @@ def _stored() -> Run:
         values = {
             "rms": motion,
             "loss": stored["loss_tight"],
-            "gradient": scenes.by_variable(scene, dict(stored)),
+            "gradient": paper_scenes.by_variable(scene, dict(stored)),
         }
 
     def run() -> Sample:

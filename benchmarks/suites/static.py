@@ -6,18 +6,13 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.frame import Benchmark, Candidate, Outcomes, Run, Sample, Target
+from benchmarks.harness import Benchmark, Candidate, Outcomes, Run, Sample, Target
 from benchmarks.scenes import work_of
-from sim.dynamics import Drive, solve_case
-from sim.geometry import shape
-from sim.lattice import quads
-from sim.loads import LinearRamp, held_dofs
-from sim.material import Material
-from sim.matrix import number_free_dofs
-from sim.model import Values, parameters
-from sim.observables import observe
-from sim.statics import StaticSolver
-from sim.topology import Topology, topology
+from sim.energy import Topology, observe, topology
+from sim.linalg import number_free_dofs
+from sim.quasistatics import StaticSolver
+from sim.solvers import LinearRamp, PrescribedMotion, held_dofs, solve_case
+from sim.structure import ConcreteParameters, Material, parameters, quads, shape
 
 SIDES = (15, 30, 60, 120)
 ALL_IN_BANDS = 60
@@ -64,7 +59,7 @@ def _worst(found: Outcomes) -> float:
 
 
 @cache
-def _posed(side: int) -> tuple[Topology, Values, Drive]:
+def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
     """Ligaments 2.3 mm long, the left column clamped, the right one pushed in."""
     lattice = quads(side, side, 15.0, 2.3, np.deg2rad(20.0))
     left = side * np.arange(side)
@@ -72,8 +67,8 @@ def _posed(side: int) -> tuple[Topology, Values, Drive]:
     material = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)
     made = parameters(lattice, shape(lattice, lattice.vertices), material)
     posed = topology(lattice, held_dofs(left, right), *np.deg2rad([-15.0, -10.0]))
-    drive = Drive(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
-    return posed, Values(*(np.asarray(part) for part in made)), drive
+    drive = PrescribedMotion(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
+    return posed, ConcreteParameters(*(np.asarray(part) for part in made)), drive
 
 
 def strict(sides: tuple[int, ...]) -> Run:
@@ -115,6 +110,6 @@ def _solve(side: int, by_fronts: bool | None = None) -> Run:
     return run
 
 
-def _energy(top: Topology, values: Values, states: np.ndarray) -> np.ndarray:
+def _energy(top: Topology, values: ConcreteParameters, states: np.ndarray) -> np.ndarray:
     seen = observe(top, values, states.reshape(len(states), -1, 3))
     return np.asarray(seen.strain_energy[-1] + seen.contact_energy[-1])

@@ -7,12 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks import scenes
-from benchmarks.frame import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
-from sim.evaluation import evaluator
-from sim.plan import make_plan
-from sim.scene import Scene
-from sim.statics import Record, StaticSolver
+from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
+from benchmarks.scenes import paper_scenes
+from sim.quasistatics import StaticRecord, StaticSolver
+from sim.scene import Scene, evaluator, make_plan
 
 COLD, WARM = "from rest", "from the last design"
 STEPS, DESIGNS = 10, 10
@@ -41,24 +39,24 @@ def benchmark() -> Benchmark:
     )
 
 
-class Start:
+class WarmStart:
     """Offers the last design's path or none, and counts the work of all."""
 
     def __init__(self, warm: bool) -> None:
         self.warm = warm
         self.total: dict[str, int] = {}
-        self._records: Sequence[Record] | None = None
+        self._records: Sequence[StaticRecord] | None = None
 
-    def start(self) -> Sequence[Record] | None:
+    def start(self) -> Sequence[StaticRecord] | None:
         """The last design's path."""
         return self._records if self.warm else None
 
-    def keep(self, design: scenes.Floats, records: Sequence[Record]) -> None:
+    def keep(self, design: paper_scenes.Floats, records: Sequence[StaticRecord]) -> None:
         """Takes a path."""
         del design
         self._records = records
         for record in records:
-            for what, count in scenes.work_of(record).items():
+            for what, count in paper_scenes.work_of(record).items():
                 self.total[what] = self.total.get(what, 0) + count
 
     def forget(self) -> None:
@@ -80,14 +78,14 @@ def _warm() -> Run:
 
 
 def _scene() -> Scene:
-    return replace(scenes.fig4(), steps=STEPS)
+    return replace(paper_scenes.fig4(), steps=STEPS)
 
 
 def walk(scene: Scene, relative: float, warm: bool) -> Run:
     """Run of losses and gradients along a random walk of designs."""
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
-    memory = Start(warm)
+    memory = WarmStart(warm)
     strict = replace(plan, solver=replace(plan.solver, relative=relative))
     evaluate = evaluator(scene, strict, memory)
     rng = np.random.default_rng(0)

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pipeline.errors import UserError
-from pipeline.tracking.arrays import Floats
+from pipeline.runtime import Floats, UserError
 
 LEAST_FRAMES = 8
 LEAST_CORRELATION = 0.9
@@ -53,7 +52,7 @@ class Lag(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Course:
+class SampledMotion:
     """A motion at rest before its first time: times (n,) in s, values (n, channels) in mm."""
 
     time: Floats
@@ -69,14 +68,14 @@ class Course:
         return CubicSpline(self.time, self.value)
 
 
-def find_lag(measured: Course, nominal: Course) -> Lag:
+def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     """The lag at which the courses agree best, up to a gain and an offset.
 
     Raises:
         UserError: too few frames, or the courses agree at no lag.
     """
     seen = np.isfinite(measured.value).all(axis=1)
-    held = Course(measured.time[seen], measured.value[seen])
+    held = SampledMotion(measured.time[seen], measured.value[seen])
     if len(held.time) < LEAST_FRAMES:
         raise too_few(len(held.time))
     tried = _lags(held, nominal)
@@ -106,7 +105,7 @@ def too_few(frames: int) -> UserError:
     )
 
 
-def _lags(measured: Course, nominal: Course) -> Floats:
+def _lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
     """Lags (s) at which the courses overlap enough."""
     interval = float(np.median(np.diff(measured.time)))
     span, length = np.ptp(measured.time), np.ptp(nominal.time)
@@ -126,7 +125,7 @@ def _best(tried: Floats, found: Floats) -> tuple[int, bool]:
     return int(good[np.argmin(np.abs(tried[good]))] if ambiguous else best), ambiguous
 
 
-def _pair(measured: Course, nominal: Course, lag: float) -> tuple[Floats, Floats]:
+def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, Floats]:
     """Both courses at the frames where both are known, less their means."""
     there = nominal.at(measured.time - lag)
     both = np.isfinite(there).all(axis=1)
@@ -134,13 +133,13 @@ def _pair(measured: Course, nominal: Course, lag: float) -> tuple[Floats, Floats
     return first - first.mean(axis=0), last - last.mean(axis=0)
 
 
-def _correlation(measured: Course, nominal: Course, lag: float) -> float:
+def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
     first, last = _pair(measured, nominal, lag)
     size = np.sqrt(np.sum(first**2) * np.sum(last**2))
     return float(np.sum(first * last) / size) if size > 0 else 0.0
 
 
-def _refined(measured: Course, nominal: Course, lag: float) -> float:
+def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
     """The lag at the peak of the correlation, by golden section within a frame either way."""
     interval = float(np.median(np.diff(measured.time)))
     low, high = lag - interval / _PER_FRAME, lag + interval / _PER_FRAME
@@ -154,7 +153,7 @@ def _refined(measured: Course, nominal: Course, lag: float) -> float:
     return (low + high) / 2
 
 
-def _fit(measured: Course, nominal: Course, lag: float) -> tuple[float, float, float]:
+def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[float, float, float]:
     """Uncertainty of the lag, gain, and its uncertainty, by least squares about the lag."""
     step = 1e-3 * float(np.median(np.diff(measured.time)))
     first, last = _pair(measured, nominal, lag)
@@ -174,7 +173,7 @@ def _inflation(rest: Floats) -> float:
     return (1 + alike) / (1 - alike)
 
 
-def load_time(measured: Floats, nominal: Course) -> Floats:
+def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
     """The nominal time (frames,) at which the drive is where it was measured; NaN beyond its ends.
 
     Args:

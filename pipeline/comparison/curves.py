@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.comparison import band as bands
+from pipeline.comparison import tolerance_band as bands
+from pipeline.comparison.compared_quantities import Quantity
 from pipeline.comparison.metrics import COPIES, LEVEL, limits
-from pipeline.comparison.quantities import Quantity
 from pipeline.comparison.redrive import filtered
-from pipeline.tracking.arrays import Floats
+from pipeline.runtime import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
 """Standard deviations at the ends of an interval."""

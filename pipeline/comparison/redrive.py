@@ -18,14 +18,12 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.interpolate import UnivariateSpline
 
-from pipeline.errors import UserError
-from pipeline.measuring import Structure
-from sim.arrays import Numbers
-from sim.dynamics import solve_case
-from sim.errors import SimulationError
-from sim.observables import observe
-from sim.plan import concrete_parameters, make_plan
-from sim.scene import Scene
+from pipeline.posing import PosedStructure
+from pipeline.runtime import UserError
+from sim.core import Numbers, SimulationError
+from sim.energy import observe
+from sim.scene import Scene, concrete_parameters, make_plan
+from sim.solvers import solve_case
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -37,7 +35,7 @@ LEAST_SEEN = 8
 """Frames in which a unit must be seen to be followed."""
 
 
-class Course(NamedTuple):
+class HermiteMotion(NamedTuple):
     """A smooth motion, by values and slopes at equally spaced instants; it rests before and after.
 
     Attributes:
@@ -78,7 +76,7 @@ class Held(NamedTuple):
 
     unit: Places
     driven: Mask
-    motion: Course
+    motion: HermiteMotion
     noise: Floats
     filled: Floats
     assumed: Mask
@@ -138,7 +136,9 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     mean = driven & ~assumed
     for course in (value, slope):
         course[:, driven & assumed] = course[:, mean].mean(axis=1, keepdims=True)
-    return Held(unit, driven, Course(step, value, slope), noise, 1 - there.mean(axis=0), assumed)
+    return Held(
+        unit, driven, HermiteMotion(step, value, slope), noise, 1 - there.mean(axis=0), assumed
+    )
 
 
 def held_units(scene: Scene) -> tuple[Places, Mask]:
@@ -168,7 +168,7 @@ def under(scene: Scene, held: Held) -> Scene:
     )
 
 
-def redriven(structure: Structure, held: Held, times: Floats) -> Redriven:
+def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
     """The structure under the measured motion: in time, or as a path of equilibria.
 
     Args:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.tracking.arrays import Floats
-from pipeline.tracking.camera import Camera
+from pipeline.runtime import Floats
+from pipeline.tracking.geometry import Camera
 
 _LEAST = 3  # units
 

@@ -12,11 +12,9 @@ import xarray as xr
 
 from pipeline.datasets import seal
 from pipeline.datasets.migration import MIGRATED, migrated
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind, Variable
 from pipeline.datasets.validation import faults
-from pipeline.datasets.variables import Variable
-from pipeline.errors import UserError
-from pipeline.whole import whole
+from pipeline.runtime import UserError, write_atomically
 
 _CHUNK = bytes(1 << 20)
 _MOST = 1100
@@ -39,7 +37,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
         dataset: the data; its attributes are kept, those of the provenance added.
         path: the file; its folder is made if need be.
         kind: which table it obeys.
-        provenance: attributes from `pipeline.provenance.attributes`.
+        provenance: attributes from `pipeline.datasets.provenance.attributes`.
 
     Raises:
         SchemaError: the dataset is not as the table has it.
@@ -50,7 +48,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
     for fault in faults(described, kind):
         told = "" if fault.value is None else f": {fault.value}"
         raise SchemaError(f"{kind} dataset, {fault.name}: {fault.what}{told}")
-    with whole(path) as aside:
+    with write_atomically(path) as aside:
         try:
             _to_netcdf(described, aside, kind)
             seal.put(aside)

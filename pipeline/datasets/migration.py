@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind
-from pipeline.datasets.variables import Variable
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind, Variable
 
 MIGRATED = (1,)
 """Versions that are read besides the present one."""

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind
-from pipeline.datasets.variables import Variable
+from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
 
 _KINDS = {"float64": "f", "float32": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
 
 
 @dataclass(frozen=True)
-class Fault:
+class SchemaFault:
     """What is wrong with which variable (or attribute)."""
 
     what: str
@@ -23,28 +22,28 @@ class Fault:
     value: object = None
 
 
-def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[Fault]:
+def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
     """What keeps `dataset` from being one of `kind`, beside its provenance."""
     table = TABLES[kind]
     for name, variable in table.items():
         if name not in dataset.variables:
-            yield Fault("the variable is missing", name)
+            yield SchemaFault("the variable is missing", name)
         else:
             yield from _variable_faults(dataset.variables[name], name, variable)
     for unknown in dataset.variables.keys() - table.keys():
-        yield Fault(f"a {kind} dataset has no such variable", str(unknown))
+        yield SchemaFault(f"a {kind} dataset has no such variable", str(unknown))
     for name, meaning in ATTRIBUTES[kind].items():
         if name not in dataset.attrs:
-            yield Fault(f"the attribute is missing ({meaning})", name)
+            yield SchemaFault(f"the attribute is missing ({meaning})", name)
 
 
-def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator[Fault]:
+def _variable_faults(found: xr.Variable, name: str, table: Variable) -> Iterator[SchemaFault]:
     if found.dims != table.dims:
-        yield Fault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
+        yield SchemaFault(f"its dims are not {_tuple(table.dims)}", name, _tuple(found.dims))
     elif found.dtype.kind not in _KINDS[table.dtype]:
-        yield Fault(f"its type is not {table.dtype}", name, str(found.dtype))
+        yield SchemaFault(f"its type is not {table.dtype}", name, str(found.dtype))
     elif not _known_units(units := _units(found, table), table):
-        yield Fault(f"its unit is not {table.units!r}", name, units)
+        yield SchemaFault(f"its unit is not {table.units!r}", name, units)
     else:
         yield from _value_faults(found.values, name, table)
 
@@ -58,17 +57,19 @@ def _units(found: xr.Variable, table: Variable) -> object:
     return found.attrs.get(table.unit_attribute, table.units)
 
 
-def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Fault]:
+def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[SchemaFault]:
     if table.values and tuple(values.tolist()) != _expected(values, table):
-        yield Fault(f"its values are not {_tuple(table.values)}", name, _tuple(values.tolist()))
+        yield SchemaFault(
+            f"its values are not {_tuple(table.values)}", name, _tuple(values.tolist())
+        )
     if table.flags and not np.isin(values, list(table.flags.values())).all():
         meanings = ", ".join(f"{value} {flag}" for flag, value in table.flags.items())
-        yield Fault(f"a flag has no meaning ({meanings})", name)
+        yield SchemaFault(f"a flag has no meaning ({meanings})", name)
     if table.dtype in ("float64", "float32"):
         if np.isinf(values).any():
-            yield Fault("infinite values", name)
+            yield SchemaFault("infinite values", name)
         if not table.gaps and np.isnan(values).any():
-            yield Fault("NaN where every value is needed", name)
+            yield SchemaFault("NaN where every value is needed", name)
 
 
 def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:

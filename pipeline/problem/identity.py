@@ -6,8 +6,8 @@ import hashlib
 import json
 from typing import Any, Literal
 
+from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.model import Problem
-from pipeline.problem.quantities import SIM_UNITS
 
 Stage = Literal[
     "design",

@@ -6,15 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.drives import Drive, Harmonic, LinearRamp, RampHarmonic, TanhRamp
-from pipeline.problem.fabrication import Fabrication
-from pipeline.problem.families import Designs
-from pipeline.problem.lattices import Lattice
-from pipeline.problem.material import Contact, Material
-from pipeline.problem.objective import Objective
-from pipeline.problem.optimiser import Optimiser
-from pipeline.problem.prediction import Prediction, Tolerances
-from pipeline.problem.quantities import (
+from pipeline.problem.fields import (
     Angle,
     Count,
     Duration,
@@ -22,13 +14,33 @@ from pipeline.problem.quantities import (
     Length,
     Positive,
     Samples,
+    Section,
+    exactly_one,
 )
-from pipeline.problem.regions import CloakRegion, Region, VoidRegion
-from pipeline.problem.report import Report, Robustness
-from pipeline.problem.section import Section, exactly_one
-from pipeline.problem.selection import Selector
-from pipeline.problem.spectrum import Spectrum
-from pipeline.problem.sweeping import Sweep
+from pipeline.problem.sections import (
+    CloakRegion,
+    Contact,
+    Designs,
+    Drive,
+    Fabrication,
+    HarmonicDrive,
+    Lattice,
+    LinearRampDrive,
+    MaterialConstants,
+    Objective,
+    Optimiser,
+    Prediction,
+    RampHarmonicDrive,
+    Region,
+    ReportOptions,
+    Robustness,
+    Selector,
+    Spectrum,
+    Sweep,
+    TanhRampDrive,
+    Tolerances,
+    VoidRegion,
+)
 
 
 class Support(Section):
@@ -80,7 +92,7 @@ class Horizon(Section):
         return self
 
 
-class Constraints(Section):
+class ConstraintLimits(Section):
     """What can be made: lower bounds at every unit, none where a key is left out.
 
     Attributes:
@@ -98,7 +110,7 @@ class Constraints(Section):
     convex: bool = True
 
 
-class Solver(Section):
+class SolverOptions(Section):
     """Accuracy of the simulation, and the integrator.
 
     Attributes:
@@ -110,7 +122,7 @@ class Solver(Section):
     integrator: Literal["auto", "implicit", "explicit"] = "auto"
 
 
-class Response(Section):
+class ResponseOptions(Section):
     """How much of the response the report shows.
 
     Attributes:
@@ -154,7 +166,7 @@ class Problem(Section):
     title: str = ""
     doc: str = ""
     lattice: Lattice
-    material: Material
+    material: MaterialConstants
     contact: Contact
     supports: tuple[Support, ...] = ()
     drive: Drive
@@ -163,22 +175,22 @@ class Problem(Section):
     inclusion: Inclusion | None = None
     cloak: CloakRegion
     objective: Objective
-    constraints: Constraints = Constraints()
+    constraints: ConstraintLimits = ConstraintLimits()
     optimiser: Optimiser
-    solver: Solver = Solver()
-    response: Response = Response()
+    solver: SolverOptions = SolverOptions()
+    response: ResponseOptions = ResponseOptions()
     designs: Designs | None = None
     sweep: Sweep | None = None
     robustness: Robustness | None = None
     prediction: Prediction = Prediction()
     spectrum: Spectrum | None = None
-    report: Report = Report()
+    report: ReportOptions = ReportOptions()
     fabrication: Fabrication = Fabrication()
 
     @property
     def static(self) -> bool:
         """Whether the load grows so slowly that inertia plays no part."""
-        return isinstance(self.drive, LinearRamp | TanhRamp)
+        return isinstance(self.drive, LinearRampDrive | TanhRampDrive)
 
     def asks_more_than(self, own: Problem) -> bool:
         """Whether, as a preset of the study `own`, it is to hold against more or other loads."""
@@ -187,7 +199,11 @@ class Problem(Section):
     @property
     def frequency(self) -> float | None:
         """The frequency of the drive in Hz, where it has one."""
-        return self.drive.frequency if isinstance(self.drive, Harmonic | RampHarmonic) else None
+        return (
+            self.drive.frequency
+            if isinstance(self.drive, HarmonicDrive | RampHarmonicDrive)
+            else None
+        )
 
     @property
     def horizon_time(self) -> float:

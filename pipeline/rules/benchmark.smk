@@ -23,11 +23,11 @@ rule benchmark:
     threads: 1
     params:
         folder=subpath(output[0], parent=True),
-        source=lambda wildcards: source_hash("reports.benchmark.build"),
+        source=lambda wildcards: source_hash("reports.products.benchmark.build"),
     message:
         "Drawing the benchmarks"
     shell:
-        "python -m reports.benchmark.build --datasets {input} --out-dir {params.folder} --log {log}"
+        "python -m reports.products.benchmark.build --datasets {input} --out-dir {params.folder} --log {log}"
 
 
 rule measure:

@@ -4,7 +4,7 @@ rule calibrate:
         expand("results/calibration/{calibration}/fit.svg", calibration=calibrations()),
 
 
-rule synthesise:
+rule calibrate_synthesise:
     input:
         unpack(problems_of),
         description="experiments/calibration/{calibration}.yaml",
@@ -14,14 +14,14 @@ rule synthesise:
         "results/calibration/{calibration}/logs/synthesise.log",
     threads: 1
     params:
-        source=source_hash("pipeline.calibrate"),
+        source=source_hash("pipeline.stages.calibrate"),
     message:
         "Computing measurements for {wildcards.calibration} (synthetic)"
     shell:
-        "python -m pipeline.calibrate synthesise {input.description} --out-dir {output} --log {log}"
+        "python -m pipeline.stages.calibrate synthesise {input.description} --out-dir {output} --log {log}"
 
 
-rule calibration:
+rule calibrate_fit:
     input:
         unpack(measurements),
     output:
@@ -32,11 +32,11 @@ rule calibration:
     threads: 1
     params:
         description=description,
-        source=source_hash("pipeline.calibrate"),
+        source=source_hash("pipeline.stages.calibrate"),
     message:
         "Finding the constants of {wildcards.calibration}"
     shell:
-        "python -m pipeline.calibrate {params.description} --out {output.dataset} --log {log}"
+        "python -m pipeline.stages.calibrate {params.description} --out {output.dataset} --log {log}"
 
 
 rule calibration_figure:
@@ -49,9 +49,9 @@ rule calibration_figure:
     threads: 1
     params:
         folder=subpath(output[0], parent=True),
-        source=source_hash("reports.calibration.build"),
+        source=source_hash("reports.products.calibration.build"),
     message:
         "Drawing the fit of {wildcards.calibration}"
     shell:
-        "python -m reports.calibration.build --calibration {input} --out-dir {params.folder}"
+        "python -m reports.products.calibration.build --calibration {input} --out-dir {params.folder}"
         " --log {log}"

@@ -14,10 +14,10 @@ rule compare:
     params:
         study=options,
         problem=section("compare"),
-        source=source_hash("pipeline.compare"),
+        source=source_hash("pipeline.stages.compare"),
     message:
         "Comparing {wildcards.recording} of {wildcards.name}{wildcards.preset} with its simulation"
     shell:
-        "python -m pipeline.compare {params.study} --design {input.design}"
+        "python -m pipeline.stages.compare {params.study} --design {input.design}"
         " --response {input.response} --recording {input.recording} --track {input.track}"
         " --out {output} --log {log}"

@@ -15,11 +15,11 @@ rule design:
         study=options,
         start=lambda wildcards, input: [f"--start {path}" for path in input.start],
         problem=section("design"),
-        source=source_hash("pipeline.design"),
+        source=source_hash("pipeline.stages.design"),
     message:
         "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
     shell:
-        "python -m pipeline.design {params.study} --method {wildcards.method} {params.start}"
+        "python -m pipeline.stages.design {params.study} --method {wildcards.method} {params.start}"
         " --out {output} --log {log}"
 
 
@@ -36,16 +36,16 @@ rule select:
     params:
         study=options,
         problem=section("design"),
-        source=source_hash("pipeline.select"),
+        source=source_hash("pipeline.stages.select"),
     message:
         "Choosing the better design of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.select {params.study} --designs {input.designs}"
+        "python -m pipeline.stages.select {params.study} --designs {input.designs}"
         " --out {output} --log {log}"
 
 
 # A design by the angle law of contact, under contact on distance: kept, or optimised again.
-rule reconsider:
+rule redesign:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
         design="results/{name}{preset}/design.nc",
@@ -61,9 +61,9 @@ rule reconsider:
     params:
         study=options,
         problem=section("geometric"),
-        source=source_hash("pipeline.reconsider"),
+        source=source_hash("pipeline.stages.redesign"),
     message:
         "Reconsidering {wildcards.name}{wildcards.preset} with contact on distance"
     shell:
-        "python -m pipeline.reconsider {params.study} --design {input.design}"
+        "python -m pipeline.stages.redesign {params.study} --design {input.design}"
         " --response {input.response} --out {output} --log {log}"

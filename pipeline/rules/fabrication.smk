@@ -12,11 +12,11 @@ rule fabricate:
         study=options,
         folder=subpath(output[0], parent=True),
         problem=section("fabricate"),
-        source=source_hash("pipeline.fabricate"),
+        source=source_hash("pipeline.stages.fabricate"),
     message:
         "Drawing what is made of the {wildcards.structure} structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.fabricate {params.study} --design {input.design}"
+        "python -m pipeline.stages.fabricate {params.study} --design {input.design}"
         " --structure {wildcards.structure} --out-dir {params.folder} --log {log}"
 
 
@@ -35,9 +35,9 @@ rule fabrication_page:
             path.rpartition("/")[0] for path in input.packages
         ],
         problem=section("fabricate"),
-        source=source_hash("reports.fabrication.build"),
+        source=source_hash("reports.products.fabrication.build"),
     message:
         "Drawing the page of what is built of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.fabrication.build {params.study} --packages {params.folders}"
+        "python -m reports.products.fabrication.build {params.study} --packages {params.folders}"
         " --out {output} --log {log}"

@@ -13,11 +13,11 @@ rule fig1:
     params:
         folder=subpath(output.page, parent=True),
         problem=lambda wildcards: hashes_of(FRAMED),
-        source=source_hash("reports.framework.build"),
+        source=source_hash("reports.figures.framework.build"),
     message:
         "Drawing the framework"
     shell:
-        "python -m reports.framework.build --problem {input.problem} --results results"
+        "python -m reports.figures.framework.build --problem {input.problem} --results results"
         " --comparisons {input.comparisons} --out-dir {params.folder} --log {log}"
 
 

@@ -1,4 +1,4 @@
-rule gains:
+rule robust_gains:
     input:
         unpack(robust_designs),
     output:
@@ -10,15 +10,15 @@ rule gains:
         designs=lambda wildcards, input: [
             f"{name}={path}" for name, path in input.items()
         ],
-        source=source_hash("pipeline.gains"),
+        source=source_hash("pipeline.stages.robust_gains"),
     message:
         "Evaluating what the robust presets of {wildcards.name} gain"
     shell:
-        "python -m pipeline.gains --problem experiments/{wildcards.name}/problem.yaml"
+        "python -m pipeline.stages.robust_gains --problem experiments/{wildcards.name}/problem.yaml"
         " --designs {params.designs} --out {output} --log {log}"
 
 
-rule gains_page:
+rule robust_gains_page:
     input:
         gains="results/{name}/gains.nc",
     output:
@@ -29,9 +29,9 @@ rule gains_page:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        source=source_hash("reports.gains.build"),
+        source=source_hash("reports.products.robust_gains.build"),
     message:
         "Drawing what the robust presets of {wildcards.name} gain"
     shell:
-        "python -m reports.gains.build --problem experiments/{wildcards.name}/problem.yaml"
+        "python -m reports.products.robust_gains.build --problem experiments/{wildcards.name}/problem.yaml"
         " --gains {input.gains} --out-dir {params.folder} --log {log}"

@@ -9,11 +9,11 @@ rule all:
         "results/logs/index.log",
     threads: 1
     params:
-        source=source_hash("reports.index.build"),
+        source=source_hash("reports.products.index.build"),
     message:
         "Drawing the index of results"
     shell:
-        "python -m reports.index.build --results results --log {log}"
+        "python -m reports.products.index.build --results results --log {log}"
 
 
 # The same page over what is there now. It has no output, so it always runs when it is asked for.
@@ -24,4 +24,4 @@ rule index:
     message:
         "Drawing the index of what is there"
     shell:
-        "python -m reports.index.build --results results --log {log}"
+        "python -m reports.products.index.build --results results --log {log}"

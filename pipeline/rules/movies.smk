@@ -13,11 +13,11 @@ rule movie:
             study.problem for study in movies()[wildcards.movie]
         ],
         problem=lambda wildcards: hashes_of(movies()[wildcards.movie]),
-        source=source_hash("reports.movie.build"),
+        source=source_hash("reports.products.movie.build"),
     message:
         "Drawing movie {wildcards.movie}"
     shell:
-        "python -m reports.movie.build --problems {params.problems} --results results"
+        "python -m reports.products.movie.build --problems {params.problems} --results results"
         " --comparisons {input.comparisons} --out {output} --log {log}"
 
 

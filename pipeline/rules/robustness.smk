@@ -2,7 +2,7 @@
 MOST_PARTS = config.get("scatter_chunks", 2)
 
 
-rule scatter:
+rule monte_carlo:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
         design="results/{name}{preset}/design.nc",
@@ -18,15 +18,15 @@ rule scatter:
         study=options,
         chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
         problem=section("scatter"),
-        source=source_hash("pipeline.scatter"),
+        source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Simulating imperfect copies of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.scatter run {params.study} --design {input.design}"
+        "python -m pipeline.stages.monte_carlo run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
-rule gather_scatter:
+rule monte_carlo_gather:
     input:
         lambda wildcards: copies(wildcards, MOST_PARTS),
     output:
@@ -37,11 +37,11 @@ rule gather_scatter:
     threads: 1
     params:
         problem=section("scatter"),
-        source=source_hash("pipeline.scatter"),
+        source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.scatter gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline.stages.monte_carlo gather --parts {input} --out {output} --log {log}"
 
 
 # Not what the design depends on: finer steps of load or time, the other contact law.
@@ -57,9 +57,9 @@ rule verify:
     params:
         study=options,
         problem=section("verify"),
-        source=source_hash("pipeline.verify"),
+        source=source_hash("pipeline.stages.verify"),
     message:
         "Checking steps and contact of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.verify {params.study} --design {input.design}"
+        "python -m pipeline.stages.verify {params.study} --design {input.design}"
         " --out {output} --log {log}"

@@ -14,9 +14,9 @@ rule simulate:
         study=options,
         law=lambda wildcards: "--geometric" if wildcards.law else "",
         problem=section("simulate"),
-        source=source_hash("pipeline.simulate"),
+        source=source_hash("pipeline.stages.simulate"),
     message:
         "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.simulate {params.study} {params.law} --design {input.design}"
+        "python -m pipeline.stages.simulate {params.study} {params.law} --design {input.design}"
         " --out {output} --log {log}"

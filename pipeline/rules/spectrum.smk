@@ -10,11 +10,11 @@ rule spectrum:
     params:
         study=options,
         problem=section("spectrum"),
-        source=source_hash("pipeline.spectrum"),
+        source=source_hash("pipeline.stages.spectrum"),
     message:
         "Analysing small vibrations of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.spectrum {params.study} --design {input.design}"
+        "python -m pipeline.stages.spectrum {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 
@@ -36,9 +36,9 @@ rule spectrum_page:
         study=options,
         folder=subpath(output.page, parent=True),
         problem=section("spectrum"),
-        source=source_hash("reports.spectrum.build"),
+        source=source_hash("reports.products.spectrum.build"),
     message:
         "Drawing modes, transmission and waves of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.spectrum.build {params.study} --spectrum {input.spectrum}"
+        "python -m reports.products.spectrum.build {params.study} --spectrum {input.spectrum}"
         " --out-dir {params.folder} --log {log}"

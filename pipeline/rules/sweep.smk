@@ -18,15 +18,15 @@ rule sweep:
         study=options,
         chunks=lambda wildcards: len(chunks(wildcards, MOST_CHUNKS)),
         problem=section("sweep"),
-        source=source_hash("pipeline.sweep"),
+        source=source_hash("pipeline.stages.sweep"),
     message:
         "Sweeping parameters of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.sweep run {params.study} --design {input.design}"
+        "python -m pipeline.stages.sweep run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
-rule gather_sweep:
+rule sweep_gather:
     input:
         lambda wildcards: chunks(wildcards, MOST_CHUNKS),
     output:
@@ -37,11 +37,11 @@ rule gather_sweep:
     threads: 1
     params:
         problem=section("sweep"),
-        source=source_hash("pipeline.sweep"),
+        source=source_hash("pipeline.stages.sweep"),
     message:
         "Joining the parts of the sweep of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.sweep gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline.stages.sweep gather --parts {input} --out {output} --log {log}"
 
 
 rule sweep_page:
@@ -60,9 +60,9 @@ rule sweep_page:
         study=options,
         folder=subpath(output.page, parent=True),
         problem=section("report"),
-        source=source_hash("reports.sweep.build"),
+        source=source_hash("reports.products.sweep.build"),
     message:
         "Drawing the sweep of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.sweep.build {params.study} --sweep {input.sweep}"
+        "python -m reports.products.sweep.build {params.study} --sweep {input.sweep}"
         " --out-dir {params.folder} --log {log}"

@@ -1,6 +1,6 @@
 # A recording that was filmed is tracked from its own folder; one that is virtual is rendered first,
 # of a specimen of its own where it describes one.
-rule specimen:
+rule virtual_specimen:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         problem=ancient("experiments/{name}/problem.yaml"),
@@ -13,15 +13,15 @@ rule specimen:
     params:
         study=options,
         problem=section("simulate"),
-        source=source_hash("pipeline.specimen"),
+        source=source_hash("pipeline.stages.virtual_specimen"),
     message:
         "Simulating the specimen of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.specimen {input.recording} {params.study} --design {input.design}"
+        "python -m pipeline.stages.virtual_specimen {input.recording} {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 
-rule weigh:
+rule film_weigh:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         response=filmed,
@@ -31,15 +31,15 @@ rule weigh:
         "results/{name}{preset}/logs/weigh_{recording}.log",
     threads: 1
     params:
-        source=source_hash("pipeline.virtual_lab"),
+        source=source_hash("pipeline.stages.film"),
     message:
         "Weighing {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.virtual_lab weigh {input.recording} --response {input.response}"
+        "python -m pipeline.stages.film weigh {input.recording} --response {input.response}"
         " --out {output} --log {log}"
 
 
-rule render:
+rule film_render:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         design="results/{name}{preset}/design.nc",
@@ -52,11 +52,11 @@ rule render:
         "results/{name}{preset}/logs/render_{recording}.log",
     threads: 1
     params:
-        source=source_hash("pipeline.virtual_lab"),
+        source=source_hash("pipeline.stages.film"),
     message:
         "Rendering {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.virtual_lab render {input.recording} --design {input.design}"
+        "python -m pipeline.stages.film render {input.recording} --design {input.design}"
         " --response {input.response} --out {output.video} --log {log}"
 
 
@@ -70,11 +70,11 @@ rule track:
         "results/{name}{preset}/logs/track_{recording}.log",
     threads: 1
     params:
-        source=source_hash("pipeline.track"),
+        source=source_hash("pipeline.stages.track"),
     message:
         "Tracking {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.track {input.recording} --design {input.design}"
+        "python -m pipeline.stages.track {input.recording} --design {input.design}"
         " --out {output.track} --no-report --log {log}"
 
 
@@ -90,9 +90,9 @@ rule track_report:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        source=source_hash("reports.tracking.build"),
+        source=source_hash("reports.products.tracking.build"),
     message:
         "Drawing overlay and quality of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.tracking.build --track {input.track} --video {input.video:q}"
+        "python -m reports.products.tracking.build --track {input.track} --video {input.video:q}"
         " --out-dir {params.folder} --log {log}"

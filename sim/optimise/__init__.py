@@ -1,21 +1,5 @@
-"""Constrained minimisation of expensive, differentiable losses: one interface, two methods."""
+"""Minimises expensive, differentiable losses under constraints, by one of two methods."""
 
-from sim.optimise.interface import minimise
-from sim.optimise.journal import Journal, JournalInUseError
-from sim.optimise.kkt import Stationarity, stationarity
-from sim.optimise.mma import MmaOptions
-from sim.optimise.problem import Evaluation, InfeasibleStartError, Result
-from sim.optimise.sqp import SqpOptions
+import lazy_loader as lazy
 
-__all__ = [
-    "Evaluation",
-    "InfeasibleStartError",
-    "Journal",
-    "JournalInUseError",
-    "MmaOptions",
-    "Result",
-    "SqpOptions",
-    "Stationarity",
-    "minimise",
-    "stationarity",
-]
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

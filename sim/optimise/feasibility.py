@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.optimise.problem import InfeasibleStartError, Place, Problem
+from sim.core import Floats
+from sim.optimise.problem import ConstraintPoint, CountedProblem, InfeasibleStartError
 from sim.optimise.qp import reachable, shortest_step
 
 INSET = 1e-7
@@ -16,8 +16,8 @@ RETREAT_STEPS = 10
 
 
 def project(
-    problem: Problem, x: Floats, reach: float, rounds: int = 12, depth: float = 0.0
-) -> Place | None:
+    problem: CountedProblem, x: Floats, reach: float, rounds: int = 12, depth: float = 0.0
+) -> ConstraintPoint | None:
     """Design near ``x`` with every margin at least ``depth``, or None if the rounds find none.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
@@ -34,7 +34,9 @@ def project(
     return place if place.values.min(initial=np.inf) >= depth else None
 
 
-def _newton(problem: Problem, place: Place, reach: float, depth: float) -> Floats | None:
+def _newton(
+    problem: CountedProblem, place: ConstraintPoint, reach: float, depth: float
+) -> Floats | None:
     near = reachable(place.values - depth, place.jacobian, reach)
     found = shortest_step(
         np.zeros_like(place.x),
@@ -46,7 +48,9 @@ def _newton(problem: Problem, place: Place, reach: float, depth: float) -> Float
     return None if found is None else found.step
 
 
-def retreat(problem: Problem, x: Floats, depth: float, reach: float) -> Place | None:
+def retreat(
+    problem: CountedProblem, x: Floats, depth: float, reach: float
+) -> ConstraintPoint | None:
     """Design inside the feasible set, with every margin at ``depth`` or as near to it as it goes.
 
     The way is followed in small steps, so that it leads to the part of the set that ``x`` is in.
@@ -60,7 +64,7 @@ def retreat(problem: Problem, x: Floats, depth: float, reach: float) -> Place | 
     return place
 
 
-def feasible_start(problem: Problem, x: Floats, reach: float) -> Place:
+def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> ConstraintPoint:
     """As ``project``, allowing many rounds and ever longer steps.
 
     Raises:

@@ -20,8 +20,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from sim.arrays import Floats
-from sim.errors import SimulationError
+from sim.core import Floats, SimulationError
 from sim.optimise.problem import Evaluate
 
 log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from sim.arrays import Floats, Ints
+from sim.core import Floats, Ints
 from sim.optimise.qp import reachable, shortest_step
 
 MULTIPLIER = 1e-7

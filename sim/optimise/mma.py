@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from sim.arrays import Floats, Ints
-from sim.errors import SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.optimise.feasibility import feasible_start, project
-from sim.optimise.problem import Place, Point, Problem, Result
+from sim.optimise.mma_subproblem import Separable, UnsolvedError, minimise_separable
+from sim.optimise.problem import ConstraintPoint, CountedProblem, EvaluatedPoint, Result
 from sim.optimise.qp import reachable
-from sim.optimise.separable import Separable, UnsolvedError, minimise_separable
 
 SLOWER, FASTER = 0.7, 1.2
 """Factors of the distance to the poles after a variable has turned, or gone on."""
@@ -69,7 +68,7 @@ class Approximation:
         stiffness: (1 + m,) weight of the added convex term of each function.
     """
 
-    def __init__(self, point: Point, distance: Floats, stiffness: Floats) -> None:
+    def __init__(self, point: EvaluatedPoint, distance: Floats, stiffness: Floats) -> None:
         self.point = point
         self.distance = distance
         self.stiffness = stiffness
@@ -107,14 +106,14 @@ class Approximation:
 
 
 @dataclass(frozen=True)
-class Trial:
+class MmaTrial:
     """A feasible design that the replacements propose, with the loss that they promise there."""
 
-    place: Place
+    place: ConstraintPoint
     promised: float
 
 
-def mma(problem: Problem, x0: Floats, options: MmaOptions) -> Result:
+def mma(problem: CountedProblem, x0: Floats, options: MmaOptions) -> Result:
     """Runs the outer iterations: replace, solve and correct, move, adapt the poles."""
     place = feasible_start(problem, x0, options.span)
     point = problem.simulate(place)
@@ -130,7 +129,7 @@ def mma(problem: Problem, x0: Floats, options: MmaOptions) -> Result:
 class _Run:
     """State of one run: the current design, its poles and stiffnesses."""
 
-    def __init__(self, problem: Problem, point: Point, options: MmaOptions) -> None:
+    def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: MmaOptions) -> None:
         self.problem, self.options, self.point = problem, options, point
         width = problem.upper - problem.lower
         self.width = np.where(np.isfinite(width), width, options.span)
@@ -161,26 +160,26 @@ class _Run:
                 self.reason = "no further progress"
                 return
             outcome = self.problem.simulate(trial.place)
-            if isinstance(outcome, Point) and self._keeps(trial, outcome):
+            if isinstance(outcome, EvaluatedPoint) and self._keeps(trial, outcome):
                 self._move(trial, outcome)
                 return
             self.problem.record(
                 trial.place, outcome, False, float(self.distance.max()), self.residual
             )
-            if isinstance(outcome, Point):
+            if isinstance(outcome, EvaluatedPoint):
                 shortfall = np.array([outcome.loss - trial.promised])
                 model.correct(np.zeros(1, dtype=int), outcome.x, shortfall)
             else:
                 self.distance *= SLOWER**2
 
-    def _length(self, place: Place) -> float:
+    def _length(self, place: ConstraintPoint) -> float:
         return float(np.abs(place.x - self.point.x).max())
 
-    def _keeps(self, trial: Trial, outcome: Point) -> bool:
+    def _keeps(self, trial: MmaTrial, outcome: EvaluatedPoint) -> bool:
         expected = self.point.loss - trial.promised
         return self.point.loss - outcome.loss >= ENOUGH * expected > 0
 
-    def _move(self, trial: Trial, outcome: Point) -> None:
+    def _move(self, trial: MmaTrial, outcome: EvaluatedPoint) -> None:
         used = float(self.distance.max())
         step = outcome.x - self.point.x
         turned = step * self.last
@@ -193,7 +192,7 @@ class _Run:
             self.reason = "stationary"
         self.problem.record(trial.place, outcome, True, used, self.residual)
 
-    def _propose(self, model: Approximation) -> Trial | None:
+    def _propose(self, model: Approximation) -> MmaTrial | None:
         """Solves the replacements until those of the constraints are on the safe side."""
         problem, reach = self.problem, MOVE * float(self.distance.max())
         rows = 1 + reachable(self.point.values, self.point.jacobian, reach)
@@ -209,4 +208,4 @@ class _Run:
         feasible = project(problem, place.x, reach)
         if feasible is None:
             return None
-        return Trial(feasible, float(subproblem.values(feasible.x)[0]))
+        return MmaTrial(feasible, float(subproblem.values(feasible.x)[0]))

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from sim.arrays import Floats
-from sim.errors import SimulationError
+from sim.core import Floats, SimulationError
 from sim.optimise.kkt import Stationarity, stationarity
 
 Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
@@ -97,7 +96,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Place:
+class ConstraintPoint:
     """A design with its constraints, not yet simulated."""
 
     x: Floats
@@ -111,7 +110,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Point(Place):
+class EvaluatedPoint(ConstraintPoint):
     """A simulated design."""
 
     number: int
@@ -121,7 +120,7 @@ class Point(Place):
 
 
 @dataclass
-class Problem:
+class CountedProblem:
     """Counts and records the evaluations of one minimisation and remembers the best design.
 
     Attributes:
@@ -144,7 +143,7 @@ class Problem:
     callback: Callback | None = None
     confirm: Evaluate | None = None
     evaluations: list[Evaluation] = field(default_factory=list)
-    best: Point | None = None
+    best: EvaluatedPoint | None = None
     steepest: float | None = None
 
     @property
@@ -159,14 +158,14 @@ class Problem:
         """Number of evaluations that may follow."""
         return 0 if self.finished else self.budget - len(self.evaluations)
 
-    def place(self, x: Floats) -> Place:
+    def place(self, x: Floats) -> ConstraintPoint:
         """Evaluates the constraints."""
         if self.constrain is None:
-            return Place(x, np.zeros(0), sp.csr_array((0, len(x))))
+            return ConstraintPoint(x, np.zeros(0), sp.csr_array((0, len(x))))
         values, jacobian = self.constrain(x)
-        return Place(x, np.asarray(values, dtype=float), sp.csr_array(jacobian))
+        return ConstraintPoint(x, np.asarray(values, dtype=float), sp.csr_array(jacobian))
 
-    def simulate(self, place: Place) -> Point | SimulationError:
+    def simulate(self, place: ConstraintPoint) -> EvaluatedPoint | SimulationError:
         """Evaluates the loss; a failure is returned, for the method to step back from.
 
         A loss or gradient that is not finite counts as a failure.
@@ -179,7 +178,7 @@ class Problem:
         if not (np.isfinite(loss) and np.isfinite(gradient).all()):
             return SimulationError("the loss or its gradient is not finite")
         gradient, aux = np.array(gradient, dtype=float), np.array(aux, dtype=float)
-        point = Point(
+        point = EvaluatedPoint(
             place.x, place.values, place.jacobian, number, float(loss), gradient, aux.ravel()
         )
         if self.steepest is None:
@@ -193,8 +192,8 @@ class Problem:
 
     def record(
         self,
-        place: Place,
-        outcome: Point | SimulationError,
+        place: ConstraintPoint,
+        outcome: EvaluatedPoint | SimulationError,
         accepted: bool,
         radius: float,
         residual: float,
@@ -202,7 +201,7 @@ class Problem:
         """Appends the evaluation to the history and reports it."""
         loss, aux, failure = (
             (outcome.loss, outcome.aux, None)
-            if isinstance(outcome, Point)
+            if isinstance(outcome, EvaluatedPoint)
             else (np.nan, np.zeros(0), str(outcome))
         )
         self.evaluations.append(
@@ -221,7 +220,7 @@ class Problem:
         if self.callback is not None:
             self.callback(self.evaluations[-1])
 
-    def stationarity(self, point: Point) -> Stationarity:
+    def stationarity(self, point: EvaluatedPoint) -> Stationarity:
         """Optimality of a simulated design."""
         return stationarity(
             point.gradient,
@@ -248,7 +247,7 @@ class Problem:
             reason=reason,
         )
 
-    def _confirmed(self) -> Point:
+    def _confirmed(self) -> EvaluatedPoint:
         """The best design; with ``confirm``, the best whose loss is found again."""
         if self.best is None:
             raise RuntimeError("no evaluation succeeded")
@@ -263,7 +262,7 @@ class Problem:
                 continue
             if abs(loss - each.loss) <= CONFIRMED * abs(each.loss):
                 place = self.place(each.x)
-                return Point(
+                return EvaluatedPoint(
                     place.x, place.values, place.jacobian, each.number, each.loss, gradient, aux
                 )
             log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)

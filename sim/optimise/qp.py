@@ -8,7 +8,7 @@ import numpy as np
 import piqp
 import scipy.sparse as sp
 
-from sim.arrays import Floats
+from sim.core import Floats
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.arrays import Floats
+from sim.core import Floats
 
 DAMPING = 0.2
 """Smallest curvature along a step, relative to the model's, that an update may leave."""

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.arrays import Floats, Ints
-from sim.errors import SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.optimise.feasibility import feasible_start, project, retreat
-from sim.optimise.problem import Place, Point, Problem, Result
+from sim.optimise.problem import ConstraintPoint, CountedProblem, EvaluatedPoint, Result
 from sim.optimise.qp import dense_step, reachable
 from sim.optimise.quasi_newton import QuasiNewton
 
@@ -67,7 +66,7 @@ class SqpOptions:
 
 
 @dataclass(frozen=True)
-class Trial:
+class SqpTrial:
     """A feasible step that the model expects to pay.
 
     Attributes:
@@ -77,13 +76,13 @@ class Trial:
         multipliers: their multipliers.
     """
 
-    place: Place
+    place: ConstraintPoint
     predicted: float
     rows: Ints
     multipliers: Floats
 
 
-def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
+def sqp(problem: CountedProblem, x0: Floats, options: SqpOptions) -> Result:
     """Runs descents from the start and then from inside the feasible set around the best design.
 
     The optimum is nearly a vertex of the feasible set, and there are many: a descent that starts
@@ -108,14 +107,16 @@ def sqp(problem: Problem, x0: Floats, options: SqpOptions) -> Result:
     return problem.result(problem.finished or reason)
 
 
-def _polish(problem: Problem, options: SqpOptions) -> str:
+def _polish(problem: CountedProblem, options: SqpOptions) -> str:
     """Spends what is left of the evaluations on the best design."""
     assert problem.best is not None
     last = replace(options, caution=0.0, patience=options.evaluations)
     return Descent(problem, problem.best, last).run()
 
 
-def _retreat(problem: Problem, options: SqpOptions, random: np.random.Generator) -> Point | None:
+def _retreat(
+    problem: CountedProblem, options: SqpOptions, random: np.random.Generator
+) -> EvaluatedPoint | None:
     """Simulates a design well inside the constraints, near a kicked copy of the best one."""
     assert problem.best is not None
     shift = random.uniform(-options.kick, options.kick, problem.best.x.shape)
@@ -123,14 +124,14 @@ def _retreat(problem: Problem, options: SqpOptions, random: np.random.Generator)
     if place is None:
         return None
     outcome = problem.simulate(place)
-    problem.record(place, outcome, isinstance(outcome, Point), options.depth, np.nan)
-    return outcome if isinstance(outcome, Point) else None
+    problem.record(place, outcome, isinstance(outcome, EvaluatedPoint), options.depth, np.nan)
+    return outcome if isinstance(outcome, EvaluatedPoint) else None
 
 
 class Descent:
     """Steps downhill from one design until nothing more is gained."""
 
-    def __init__(self, problem: Problem, point: Point, options: SqpOptions) -> None:
+    def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: SqpOptions) -> None:
         self.problem = problem
         self.options = options
         self.point = point
@@ -177,7 +178,7 @@ class Descent:
         self.losses.append(self.point.loss)
         self.problem.record(trial.place, outcome, accepted, used, self.residual)
 
-    def _propose(self) -> Trial | None:
+    def _propose(self) -> SqpTrial | None:
         """Best step of the model within the radius, made feasible; None if there is none."""
         point, radius = self.point, self.radius
         spendable = (1 - self._kept()) * point.values
@@ -197,7 +198,7 @@ class Descent:
             return None
         # The model of the Lagrangian already counts what the projection will cost.
         predicted = self.model.reduction(point.gradient, found.step)
-        return Trial(place, predicted, rows, found.multipliers) if predicted > 0 else None
+        return SqpTrial(place, predicted, rows, found.multipliers) if predicted > 0 else None
 
     def _kept(self) -> float:
         """Share of every margin that the next step must leave.
@@ -206,7 +207,7 @@ class Descent:
         """
         return self.options.caution * CALM**self.steps
 
-    def _judge(self, trial: Trial, outcome: Point) -> bool:
+    def _judge(self, trial: SqpTrial, outcome: EvaluatedPoint) -> bool:
         """Learns from a simulated step, adapts the radius, and moves if the loss decreased."""
         step = outcome.x - self.point.x
         ratio = (self.point.loss - outcome.loss) / trial.predicted
@@ -223,7 +224,7 @@ class Descent:
             self.radius = min(2 * self.radius, self.options.radius_max)
         return self._move(outcome, ratio)
 
-    def _jumped(self, step: Floats, outcome: Point, predicted: float) -> bool:
+    def _jumped(self, step: Floats, outcome: EvaluatedPoint, predicted: float) -> bool:
         """Whether the loss is that of another branch of solutions, which tells nothing of this one.
 
         Along one branch the trapezoidal rule recovers the change of the loss from its slopes.
@@ -233,7 +234,7 @@ class Descent:
         unexplained = abs(change - explained)
         return unexplained > predicted and unexplained > JUMP * max(abs(change), abs(explained))
 
-    def _move(self, outcome: Point, ratio: float) -> bool:
+    def _move(self, outcome: EvaluatedPoint, ratio: float) -> bool:
         if ratio <= ACCEPT:
             return False
         self.point = outcome

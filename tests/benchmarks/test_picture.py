@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.picture import PAGE, Row, figure, tables
-from reports import style
+from benchmarks.picture import PAGE, TableRow, figure, tables
+from reports.base import style
 
 
 def test_the_tables_are_read_whole() -> None:
@@ -17,7 +17,7 @@ def test_the_tables_are_read_whole() -> None:
         "warm": 2,
         "static": 6,
     }
-    assert found["fig2"][0] == Row("ours", 0.443, 3.9e-05)
+    assert found["fig2"][0] == TableRow("ours", 0.443, 3.9e-05)
 
 
 def test_the_picture_shows_them() -> None:

@@ -12,10 +12,10 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
-from reports.build import publish
-from reports.style import MAGNITUDE
+from reports.base.style import MAGNITUDE
+from reports.figures.study_report import publish
 from tests.clients.conftest import Open
-from tests.reports import synthetic
+from tests.reports import shaken_study
 
 PICTURE = "return document.querySelectorAll('#player .stage canvas')[arguments[0]].toDataURL()"
 
@@ -23,7 +23,7 @@ PICTURE = "return document.querySelectorAll('#player .stage canvas')[arguments[0
 @pytest.fixture(scope="session")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    publish(synthetic.written(tmp_path_factory.mktemp("data")), folder)
+    publish(shaken_study.written(tmp_path_factory.mktemp("data")), folder)
     return folder / "index.html"
 
 
@@ -139,7 +139,7 @@ def test_keys_belong_to_the_menus_while_they_are_used(desktop: Chrome) -> None:
 
 
 def test_units_are_drawn_where_the_dataset_has_them(desktop: Chrome, tmp_path: Path) -> None:
-    study = synthetic.written(tmp_path)
+    study = shaken_study.written(tmp_path)
     scrub(desktop, 0.0625)
     choose(desktop, "field", "|U|")
     unit, structure, case, time = 112 + 3, 0, 1, 25  # beside the source, alpha = 45 deg

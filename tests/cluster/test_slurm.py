@@ -14,8 +14,8 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.leftovers import PREFIX
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
+from pipeline.workflow.stale_jobs import PREFIX
 from tests.e2e.checkout import Checkout, wait_until
 
 TARGET = "fig3@quick"
@@ -28,7 +28,7 @@ PAUSE = 0.2  # seconds between two looks at the cluster
 # ended: long enough for a job of these to end, and no longer.
 INTERVAL = 9
 SUBMIT = (
-    *(".venv/bin/python", "-m", "pipeline.run"),
+    *(".venv/bin/python", "-m", "pipeline.workflow.run"),
     *("--profile", "profiles/slurm", "--slurm-no-account", "--latency-wait", "5"),
     *("--slurm-status-command", "squeue"),
     *("--slurm-init-seconds-before-status-checks", str(INTERVAL), TARGET),

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 
 PAGES = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
 PLACE = re.compile(r"^  file:.*\n", re.MULTILINE)

@@ -11,12 +11,11 @@ from types import ModuleType
 import pytest
 import yaml
 
-from pipeline import failures, run
-from pipeline.errors import UserError
-from pipeline.locations import ROOT
-from pipeline.problem import load
-from pipeline.problem.loading import overlaid
-from pipeline.tracking import recognition
+from pipeline.posing import failures
+from pipeline.problem.reading import load, overlaid
+from pipeline.runtime import ROOT, UserError
+from pipeline.tracking.reference_frame import recognition
+from pipeline.workflow import run
 from tests.docs.pages import PLACE, Block, blocks, text
 from tests.docs.walk import LAID_OVER, check_recording, checked
 

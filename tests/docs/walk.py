@@ -10,10 +10,10 @@ from pathlib import Path
 
 import yaml
 
-from pipeline.locations import ROOT
-from pipeline.problem import load
-from pipeline.problem.loading import overlaid
-from pipeline.tracking import points, recording
+from pipeline.problem.reading import load, overlaid
+from pipeline.runtime import ROOT
+from pipeline.tracking.frames import recording
+from pipeline.tracking.output import dic_points
 from tests.docs.pages import Block, blocks, text
 from tests.e2e.checkout import Checkout, Ended
 
@@ -109,6 +109,6 @@ def check_recording(block: Block, folder: Path) -> None:
     path = folder / block.place
     path.write_text(block.text)
     if "points" in yaml.safe_load(block.text):
-        points.load(path)
+        dic_points.load(path)
     else:
         recording.load(path)

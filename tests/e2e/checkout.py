@@ -17,8 +17,7 @@ import numba.core.caching
 import psutil
 import yaml
 
-from pipeline.environment import RUN_MARK
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT, RUN_MARK
 
 STUDY = "tiny"
 SMALLER = {
@@ -148,7 +147,7 @@ class Checkout:
         }
 
     def stages(self, name: str) -> list[psutil.Process]:
-        """The running Python processes of a stage, e.g. `pipeline.design`."""
+        """The running Python processes of a stage, e.g. `pipeline.stages.design`."""
         return [process for process in self.jobs() if name in _words(process)[1:4]]
 
     def jobs(self) -> list[psutil.Process]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 from tests.e2e.checkout import Checkout
 
 

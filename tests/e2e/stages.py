@@ -7,8 +7,9 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline import datasets, design, reconsider, select, simulate, verify
-from pipeline.problem import load
+from pipeline import datasets
+from pipeline.problem.reading import load
+from pipeline.stages import design, redesign, select, simulate, verify
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def build_again(problem: Path, preset: str | None, folder: Path) -> Built:
     study = _options(problem, preset)
     first = ["--design", str(folder / "design.nc"), "--response", str(folder / "response.nc")]
     second, response = folder / "geometric_design.nc", folder / "geometric_response.nc"
-    assert reconsider.main([*study, *first, "--out", str(second)]) == 0
+    assert redesign.main([*study, *first, "--out", str(second)]) == 0
     moved = ["--design", str(second), "--geometric", "--out", str(response)]
     assert simulate.main([*study, *moved]) == 0
     return Built(datasets.read(second, "design"), datasets.read(response, "response"))

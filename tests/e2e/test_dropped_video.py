@@ -10,12 +10,12 @@ import pytest
 import xarray as xr
 import yaml
 
-from pipeline import datasets, problem, simulate, track
-from pipeline.locations import ROOT
-from pipeline.problem.loading import overlaid
-from pipeline.scenes import scene_of
-from pipeline.structures import network_variables
-from pipeline.tracking import importing
+from pipeline import datasets, problem
+from pipeline.posing import network_variables, scene_of
+from pipeline.problem.reading import overlaid
+from pipeline.runtime import ROOT
+from pipeline.stages import simulate, track
+from pipeline.tracking.frames import import_video
 from tests.e2e.checkout import Checkout
 
 CLIP = ROOT / "tests/data/tracking/b_harmonic.yaml"
@@ -53,7 +53,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 def _built(path: Path, results: Path) -> None:
     """Design and response of the study, whose cloak has kept the shape that was filmed."""
     asked = problem.load(path)
-    shape = importing.design(importing.description(CLIP))
+    shape = import_video.design(import_video.description(CLIP))
     design = shape.assign(network_variables(asked, scene_of(asked, path.parent)))
     origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
     made = str(results / "design.nc")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pipeline.problem import load, preset_names
+from pipeline.problem.reading import load, preset_names
 from tests.docs.pages import text
 from tests.docs.walk import Reader
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.locations import ROOT
-from pipeline.problem.loading import overlaid
+from pipeline.problem.reading import overlaid
+from pipeline.runtime import ROOT
 from tests.e2e.stages import Built, build
 
 UNCHANGED = 1e-3

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.locations import ROOT
-from reports import build as report
+from pipeline.runtime import ROOT
+from reports.figures import study_report as report
 from tests.e2e.stages import Built, build, build_verification
 
 PROBLEM = ROOT / "experiments/fig7/problem.yaml"

@@ -12,10 +12,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pipeline.locations import ROOT
-from pipeline.provenance import git_commit
-from pipeline.whole import whole
-from reports.survival import build
+from pipeline.datasets import git_commit
+from pipeline.runtime import ROOT, write_atomically
+from reports.products.survival import build
 from tests.e2e.checkout import Checkout
 from tests.hostile import inputs, kills, places
 
@@ -33,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     lost = 0
     for name in asked.parts or parts:
         made = {**parts[name](asked), "seed": asked.seed, "commit": git_commit()}
-        with whole(asked.out / f"{name}.json") as aside:
+        with write_atomically(asked.out / f"{name}.json") as aside:
             text = json.dumps(made, indent=1, ensure_ascii=False)
             aside.write_text(f"{text}\n", encoding="utf-8")
         lost += len(made["faults"])

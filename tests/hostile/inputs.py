@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 from tests.hostile.subjects import SUBJECTS
 
 ENDS = ("refused", "same", "changed", "wrong")

@@ -14,7 +14,7 @@ from random import Random
 
 import yaml
 
-from pipeline.problem.loading import overlaid
+from pipeline.problem.reading import overlaid
 from tests.e2e.checkout import Checkout
 
 RECORDING = {

@@ -14,22 +14,24 @@ import cv2
 import numpy as np
 import xarray as xr
 
-from pipeline import casebook, datasets, units
-from pipeline.calibration import readings
-from pipeline.calibration.description import Calibration
-from pipeline.casebook import Casebook, Found
-from pipeline.datasets import TABLES, Kind
-from pipeline.fabrication import manifest
-from pipeline.lab.encode import encode
-from pipeline.lab.setup import Codec
-from pipeline.locations import ROOT
-from pipeline.problem import canonical_json, joint, load
-from pipeline.problem.loading import section
-from pipeline.scenes import TIME_SERIES_COLUMNS, scene_of
-from pipeline.tracking import importing, loadcell, points, recording, video
+from pipeline import datasets
+from pipeline.calibration.inputs import Calibration, csv_readings
+from pipeline.datasets.tables import TABLES, Kind
+from pipeline.fabrication.papers import manifest
+from pipeline.posing import scene_of
+from pipeline.posing.to_scene import TIME_SERIES_COLUMNS
+from pipeline.problem import canonical_json
+from pipeline.problem.fields import units
+from pipeline.problem.reading import joint_figure, load, section
+from pipeline.problem.sections import Codec
+from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
+from pipeline.tracking.frames import import_video, load_cell, recording, video
+from pipeline.tracking.output import dic_points
+from pipeline.virtual_lab import encode
 from tests.hostile import damage, edits
 from tests.hostile.damage import Damage
-from tests.pipeline import static, test_lattices
+from tests.pipeline import static
+from tests.pipeline.problem import test_lattices
 from tests.pipeline.samples import sample
 
 Sort = Literal["YAML", "netCDF", "CSV", "image", "video", "other"]
@@ -190,12 +192,12 @@ def _cases(folder: Path) -> Path:
     path = folder / "part_0.csv"
     with Casebook(path, ["drive.frequency"]) as book:
         for number in range(40):
-            book.add([(number, [f"{number} Hz"], Found(number / 7, 1.0, -number / 9))])
+            book.add([(number, [f"{number} Hz"], SweepResult(number / 7, 1.0, -number / 9))])
     return path
 
 
 def _known(path: Path) -> Told:
-    return sorted(casebook.known(path.parent).items())
+    return sorted(case_log.known(path.parent).items())
 
 
 def _manifest(folder: Path) -> Path:
@@ -210,9 +212,9 @@ def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told])
 
 
 def _described(path: Path) -> Told:
-    described = importing.description(path)
-    text = importing.recording_text(described, path, "design.nc")
-    return [text, importing.design(described)["vertices"].values.tolist()]
+    described = import_video.description(path)
+    text = import_video.recording_text(described, path, "design.nc")
+    return [text, import_video.design(described)["vertices"].values.tolist()]
 
 
 def _sheet(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
@@ -224,17 +226,17 @@ def _image(name: str, make: Callable[[Path], Path]) -> Subject:
 
 
 def _forces(path: Path) -> Told:
-    log = loadcell.read(path, recording.LoadCell(file=path.name))
+    log = load_cell.read(path, recording.LoadCellLog(file=path.name))
     return [log.clock.tolist(), log.force.tolist()]
 
 
 def _cloud(path: Path) -> Told:
-    return [part.tolist() for part in points.cloud(path, points.Points(points=path.name))]
+    return [part.tolist() for part in dic_points.cloud(path, dic_points.Points(points=path.name))]
 
 
 def _readings(path: Path) -> Told:
     wanted = {"displacement": units.LENGTH, "force": units.FORCE}
-    return list(readings.read(path, wanted).tolist())
+    return list(csv_readings.read(path, wanted).tolist())
 
 
 def _from_study(name: str) -> Callable[[Path], Path]:
@@ -264,10 +266,10 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml(
         "points",
         partial(_text, "points.yaml", POINTS),
-        lambda p: [points.load(p).model_dump_json()],
+        lambda p: [dic_points.load(p).model_dump_json()],
     ),
     _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
-    _yaml("figure of several studies", _figure, lambda p: [joint.load(p).model_dump_json()]),
+    _yaml("figure of several studies", _figure, lambda p: [joint_figure.load(p).model_dump_json()]),
     *_dataset_subjects(),
     Subject(
         "lattice in netCDF",

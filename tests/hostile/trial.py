@@ -12,7 +12,7 @@ from pathlib import Path
 from random import Random
 from typing import Literal
 
-from pipeline.errors import UserError
+from pipeline.runtime import UserError
 from tests.hostile import damage, edits
 from tests.hostile.subjects import SUBJECTS, Subject, Told
 

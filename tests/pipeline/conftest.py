@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline import design, select
-from pipeline.errors import UserError
-from pipeline.problem import load
+from pipeline.problem.reading import load
+from pipeline.runtime import UserError
+from pipeline.stages import design, select
 from tests.pipeline.static import HOLE, write
 
 FIG2 = Path(__file__).parents[2] / "experiments/fig2/problem.yaml"

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets import TABLES, Kind, Variable
-from pipeline.datasets.tables import ATTRIBUTES
+from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
 
 SIZES = {
     "unit": 49,

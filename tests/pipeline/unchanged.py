@@ -7,11 +7,18 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline import datasets, problem, provenance
-from pipeline.datasets import TABLES
-from pipeline.responses import case_directions
-from pipeline.scenes import altered_lattice_of, lattice_of, scene_of
-from pipeline.structures import network_variables, spread, unit_coordinates
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.datasets.tables import TABLES
+from pipeline.posing import (
+    case_directions,
+    lattice_of,
+    network_variables,
+    scene_of,
+    spread,
+    unit_coordinates,
+)
+from pipeline.posing.to_scene import altered_lattice_of
 
 
 def write(path: Path) -> Path:

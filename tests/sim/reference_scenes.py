@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from sim.arrays import Floats, Ints
-from sim.lattice import Lattice, quads
-from sim.loads import Harmonic, LinearRamp, held_dofs
-from sim.material import Material, damping_of_ratio
+from sim.core import Floats, Ints
 from sim.scene import Scene
+from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.structure import Lattice, Material, damping_of_ratio, quads
 
 FOLDER = Path(__file__).parents[1] / "data/reference"
 BARRIER, CUTOFF = np.deg2rad(-15.0), np.deg2rad(-10.0)

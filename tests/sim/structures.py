@@ -12,26 +12,30 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.constants import BARRIER, CUTOFF, MATERIAL
-from sim.arrays import Floats, Ints
-from sim.design import DesignSpace, design_space
-from sim.dynamics import Drive, Solver, simulate
-from sim.geometry import shape
-from sim.lattice import Lattice, quads
-from sim.loads import Motion, held_dofs
-from sim.material import Material
-from sim.matrix import Matrix
-from sim.model import Parameters, parameters
-from sim.network import Network
-from sim.topology import Topology, topology
+from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from sim.core import Floats, Ints
+from sim.energy import Topology, topology
+from sim.energy.network_arrays import NetworkArrays
+from sim.linalg import Matrix
+from sim.solvers import MotionLaw, PrescribedMotion, Solver, held_dofs, simulate
+from sim.structure import (
+    DesignSpace,
+    Lattice,
+    Material,
+    Parameters,
+    design_space,
+    parameters,
+    quads,
+    shape,
+)
 
 NONE = np.array([], dtype=np.int64)
 
 
-def some_ligaments(net: Network, which: Ints) -> Network:
+def some_ligaments(net: NetworkArrays, which: Ints) -> NetworkArrays:
     """A network's ligaments ``which`` alone, without contact."""
     unit, arm, vector, void, law, contact, _ = net
-    return Network(
+    return NetworkArrays(
         unit[which], arm[which], vector[which], void[which], law[which], contact[which], NONE
     )
 
@@ -121,7 +125,7 @@ class Numbers(NamedTuple):
     contact: Array
     density: Array
     damping: Array
-    drive: Motion
+    drive: MotionLaw
 
 
 @dataclass(frozen=True)
@@ -138,7 +142,7 @@ class Rig:
     lattice: Lattice
     clamped: Ints
     driven: Ints
-    motion: Motion
+    motion: MotionLaw
     distance: float | None = None
 
     @cached_property
@@ -190,12 +194,12 @@ class Rig:
         return Parameters(*(np.asarray(part) for part in self.parameters(self.numbers)))
 
     @property
-    def drive(self) -> Drive:
-        return Drive(self.driven, self.motion)
+    def drive(self) -> PrescribedMotion:
+        return PrescribedMotion(self.driven, self.motion)
 
     def loss(self, solver: Solver, numbers: Numbers) -> Array:
         """A smooth function of displacement and velocity without any symmetry."""
-        drive = Drive(self.driven, numbers.drive)
+        drive = PrescribedMotion(self.driven, numbers.drive)
         response = simulate(solver, self.parameters(numbers), (drive,))
         return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
 

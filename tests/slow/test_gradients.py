@@ -13,14 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import contacts, problem
-from pipeline.locations import ROOT
-from pipeline.scenes import scene_of
-from sim.arrays import Floats
-from sim.evaluation import evaluator
-from sim.plan import make_plan
-from sim.scene import Scene
-from sim.statics import StaticSolver
+from pipeline import problem
+from pipeline.posing import law_comparison, scene_of
+from pipeline.runtime import ROOT
+from sim.core import Floats
+from sim.quasistatics import StaticSolver
+from sim.scene import Scene, evaluator, make_plan
 
 PROBLEMS = {path.parent.name: path for path in ROOT.glob("experiments/*/problem.yaml")}
 STATIC = sorted(name for name, path in PROBLEMS.items() if problem.load(path).static)
@@ -36,7 +34,7 @@ Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
 def posed(path: Path, law: str) -> tuple[Scene, Evaluate]:
     """A study's scene under a law of contact, its equilibria to almost all digits."""
     asked = problem.load(path)
-    scene = scene_of(contacts.geometric(asked) if law == "geometric" else asked, path.parent)
+    scene = scene_of(law_comparison.geometric(asked) if law == "geometric" else asked, path.parent)
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
     return scene, evaluator(scene, replace(plan, solver=replace(plan.solver, relative=1e-13)))

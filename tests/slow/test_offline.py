@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 
 
 def test_an_installation_without_a_network(tmp_path: Path) -> None:

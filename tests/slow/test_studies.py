@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from pipeline.locations import ROOT
-from pipeline.measuring import UNSTABLE
+from pipeline.posing import UNSTABLE
+from pipeline.runtime import ROOT
 from tests.e2e.stages import Built, build, build_again, build_verification
 
 EXPECTED = yaml.safe_load((ROOT / "tests/data/studies.yaml").read_text())

@@ -12,22 +12,22 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 
 STAGES = (
-    "pipeline/design",
-    "pipeline/select",
-    "pipeline/simulate",
-    "pipeline/specimen",
-    "pipeline/sweep",
-    "pipeline/scatter",
-    "pipeline/verify",
-    "pipeline/reconsider",
-    "pipeline/virtual_lab",
-    "pipeline/track",
-    "pipeline/compare",
-    "reports/build",
-    "reports/joint/build",
+    "pipeline/stages/design",
+    "pipeline/stages/select",
+    "pipeline/stages/simulate",
+    "pipeline/stages/virtual_specimen",
+    "pipeline/stages/sweep",
+    "pipeline/stages/monte_carlo",
+    "pipeline/stages/verify",
+    "pipeline/stages/redesign",
+    "pipeline/stages/film",
+    "pipeline/stages/track",
+    "pipeline/stages/compare",
+    "reports/figures/study_report",
+    "reports/figures/several_studies/build",
 )
 
 
@@ -57,7 +57,7 @@ class Sandbox:
         return self._ended(self.command(*words))
 
     def resume(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return self._ended([sys.executable, "-m", "pipeline.run", *words])
+        return self._ended([sys.executable, "-m", "pipeline.workflow.run", *words])
 
     def planned(self, *words: str) -> Counter[str]:
         """How often each rule would run."""
@@ -102,5 +102,5 @@ def _copied(root: Path) -> Sandbox:
         shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "Snakefile", root)
     for stage in STAGES:
-        shutil.copy(Path(__file__).with_name("stage.py"), root / f"{stage}.py")
+        shutil.copy(Path(__file__).with_name("toy_stage.py"), root / f"{stage}.py")
     return Sandbox(root)

@@ -22,5 +22,5 @@ def test_only_what_is_virtual_is_computed_first(sandbox: Sandbox) -> None:
     (folder / "mine.yaml").write_text(MEASURED)
     (folder / "decay.csv").write_text("time (s),angle (deg)\n")
     planned = sandbox.planned("calibrate")
-    assert planned["synthesise"] == virtual > 0
-    assert planned["calibration"] == planned["calibration_figure"] == virtual + 1
+    assert planned["calibrate_synthesise"] == virtual > 0
+    assert planned["calibrate_fit"] == planned["calibration_figure"] == virtual + 1

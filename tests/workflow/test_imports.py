@@ -6,7 +6,7 @@ import importlib
 
 import pytest
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)

@@ -18,14 +18,14 @@ def only(sandbox: Sandbox, text: str) -> None:
 def test_virtual_recordings_are_rendered_and_tracked(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig2_recordings")
     count = len(list((sandbox.root / "experiments/fig2/recordings").glob("*.yaml")))
-    assert planned["render"] == planned["track"] == planned["track_report"] == count > 0
-    assert planned["specimen"] == count
-    assert not {"simulate", "weigh"} & planned.keys()
+    assert planned["film_render"] == planned["track"] == planned["track_report"] == count > 0
+    assert planned["virtual_specimen"] == count
+    assert not {"simulate", "film_weigh"} & planned.keys()
 
 
 def test_a_virtual_load_cell_is_read_with_its_video(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig4_recordings")
-    assert planned["weigh"] == planned["specimen"] == planned["track"] == 2
+    assert planned["film_weigh"] == planned["virtual_specimen"] == planned["track"] == 2
 
 
 def test_a_video_that_is_dropped_in_is_tracked(sandbox: Sandbox) -> None:

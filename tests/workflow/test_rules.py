@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.locations import ROOT
-from pipeline.workflow import check_room
+from pipeline.runtime import ROOT
+from pipeline.workflow.rule_inputs import check_room
 from tests.workflow.conftest import Sandbox
 
 STUDY = {
@@ -18,9 +18,9 @@ STUDY = {
     "select": 1,
     "simulate": 1,
     "sweep": 4,
-    "gather_sweep": 1,
-    "specimen": 2,
-    "render": 2,
+    "sweep_gather": 1,
+    "virtual_specimen": 2,
+    "film_render": 2,
     "track": 2,
     "compare": 2,
     "report": 1,
@@ -44,7 +44,7 @@ def test_a_figure_of_several_studies(sandbox: Sandbox) -> None:
     planned = sandbox.planned("fig6@quick")
     assert planned["joint_report"] == 1
     assert planned["simulate"] == 4  # by the angle law, then with contact on distance
-    assert planned["reconsider"] == 2
+    assert planned["redesign"] == 2
     assert "report" not in planned
 
 
@@ -78,9 +78,9 @@ def test_datasets_are_those_that_the_problem_asks_for(sandbox: Sandbox) -> None:
         before + "\nrobustness:\n  samples: 5\n\n" + rest[rest.index("report:") :]
     )
     planned = sandbox.planned("fig2")
-    assert planned["scatter"] == 2
-    assert planned["gather_scatter"] == 1
-    assert not {"sweep", "gather_sweep"} & planned.keys()
+    assert planned["monte_carlo"] == 2
+    assert planned["monte_carlo_gather"] == 1
+    assert not {"sweep", "sweep_gather"} & planned.keys()
 
 
 def test_packages_need_the_design_and_nothing_else(sandbox: Sandbox) -> None:
@@ -121,11 +121,11 @@ def test_planning_imports_nothing_heavy() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "rerun"),
     [
-        ("points: 15", "points: 14", only("sweep", "gather_sweep", "report")),
+        ("points: 15", "points: 14", only("sweep", "sweep_gather", "report")),
         (
             "cycles: 4",
             "cycles: 3",
-            only("simulate", "specimen", "render", "track", "compare", "report"),
+            only("simulate", "virtual_specimen", "film_render", "track", "compare", "report"),
         ),
         ("title: Shielding", "title: Hiding", only("report")),
         ("evaluations: 60", "evaluations: 61", STUDY | {"design": 1}),
@@ -142,7 +142,7 @@ def test_edited_key_reruns_what_depends_on_it(
 
 
 def test_edited_source_reruns_what_imports_it(built: Sandbox) -> None:
-    module = built.root / "reports/build.py"
+    module = built.root / "reports/figures/study_report.py"
     module.write_text(module.read_text() + "\n")
     assert built.planned("fig2") == only("report")
 

@@ -12,7 +12,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from pipeline.locations import ROOT
+from pipeline.runtime import ROOT
 
 WHEEL = "nothing-1.0-py3-none-any.whl"
 FILES = {

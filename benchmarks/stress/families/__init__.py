@@ -1,1 +1,5 @@
-"""One file per family of cases; each has a function ``family`` that returns it."""
+"""Defines one family of stress cases a module."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -12,16 +12,25 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
 
-from benchmarks.constants import MATERIAL
-from benchmarks.stress.checks import Answer, apart, solved
-from benchmarks.stress.definition import balance, stiffness
-from benchmarks.stress.drawn import Draws
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import NONE, Posed, posed, squares
-from sim.arrays import Floats
-from sim.explicit import ExplicitSolver
-from sim.implicit import ImplicitSolver
-from sim.loads import LinearRamp, TimeSeries, held_values
+from benchmarks.scenes import MATERIAL
+from benchmarks.stress import (
+    NONE,
+    Answer,
+    Check,
+    RandomDesigns,
+    StressCase,
+    StressFamily,
+    StressScene,
+    apart,
+    balance,
+    posed,
+    solved,
+    squares,
+    stiffness,
+)
+from sim.core import Floats
+from sim.solvers import LinearRamp, TimeSeries, held_values
+from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 SIDE = 4
 DURATION = 0.006
@@ -29,9 +38,9 @@ KNOTS = np.linspace(0.0, DURATION, 13)
 LOADS = np.linspace(0.04, 1.0, 25)
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "agreement",
         f"random designs of {SIDE} x {SIDE} units with random constants, supports and drives:"
         " equilibria, motions by either integrator",
@@ -41,14 +50,14 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
-    draws = Draws(squares(SIDE), NONE, 2.0, 0.8)
+def _cases(small: bool) -> Iterator[StressCase]:
+    draws = RandomDesigns(squares(SIDE), NONE, 2.0, 0.8)
     for seed in range(1 if small else 12):
-        yield Case(f"scene {seed}, equilibria", partial(_equilibria, draws, seed))
-        yield Case(f"scene {seed}, motions", partial(_motions, draws, seed))
+        yield StressCase(f"scene {seed}, equilibria", partial(_equilibria, draws, seed))
+        yield StressCase(f"scene {seed}, motions", partial(_motions, draws, seed))
 
 
-def _scene(draws: Draws, seed: int, static: bool) -> Posed:
+def _scene(draws: RandomDesigns, seed: int, static: bool) -> StressScene:
     random = np.random.default_rng(1000 + seed)
     lattice = replace(squares(SIDE), vertices=draws(seed))
     clamped, driven = np.split(random.permutation(lattice.n_units)[:4], 2)
@@ -71,7 +80,7 @@ def _scene(draws: Draws, seed: int, static: bool) -> Posed:
     return posed(lattice, clamped, driven, series, duration=DURATION, material=material)
 
 
-def _equilibria(draws: Draws, seed: int) -> Sequence[Check]:
+def _equilibria(draws: RandomDesigns, seed: int) -> Sequence[Check]:
     case = _scene(draws, seed, static=True)
     answer = solved(case, case.solver(LOADS))
     free, held = case.topology.free_dofs, case.topology.held
@@ -95,19 +104,19 @@ def _equilibria(draws: Draws, seed: int) -> Sequence[Check]:
     return [Check("distance from SciPy's minima", apart(case, answer, other), 1e-6)]
 
 
-def _with(case: Posed, state: Floats, free: Floats) -> Floats:
+def _with(case: StressScene, state: Floats, free: Floats) -> Floats:
     whole = state.copy()
     whole[case.topology.free_dofs] = free
     return whole
 
 
-def _at(case: Posed, state: Floats, free: Floats) -> tuple[float, Floats]:
+def _at(case: StressScene, state: Floats, free: Floats) -> tuple[float, Floats]:
     """Energy and its gradient by the free dofs."""
     found = balance(case.structure, _with(case, state, free))
     return found.energy, -found.force[case.topology.free_dofs]
 
 
-def _motions(draws: Draws, seed: int) -> Sequence[Check]:
+def _motions(draws: RandomDesigns, seed: int) -> Sequence[Check]:
     case = _scene(draws, seed, static=False)
     top = case.topology
     exact = _by_scipy(case)
@@ -123,7 +132,7 @@ def _motions(draws: Draws, seed: int) -> Sequence[Check]:
     return checks
 
 
-def _by_scipy(case: Posed) -> Floats:
+def _by_scipy(case: StressScene) -> Floats:
     """Displacements (n_knots - 1, n_dofs)."""
     top, drive = case.topology, case.drive
     free, held, n = top.free_dofs, top.held, top.n_dofs

@@ -7,24 +7,34 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import Answer, admissible, energies, solved, work
-from benchmarks.stress.definition import balance
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import DISTANCE, Posed, posed, squares
-from sim.arrays import Floats
-from sim.explicit import ExplicitSolver
-from sim.geometry import shape
-from sim.implicit import ImplicitSolver
-from sim.loads import TimeSeries
+from benchmarks.stress import (
+    DISTANCE,
+    Answer,
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    admissible,
+    balance,
+    energies,
+    posed,
+    solved,
+    squares,
+    work,
+)
+from sim.core import Floats
+from sim.solvers import TimeSeries
+from sim.structure import shape
+from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 SIDE = 4
 PUSHED = 2e-3
 """The drive is over then, s."""
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "balances",
         "a unit pushed and turned once, then held: free or clamped lattices, undamped, damped, with"
         " and without contact, up to 100 000 explicit steps, implicit steps",
@@ -34,20 +44,22 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     for n_steps in (2_000,) if small else (2_000, 20_000, 100_000):
         for bias, kind in ((20.0, "without contact"), (46.0, "with contact")):
             attempt = partial(_kept, _pushed(bias), n_steps)
-            yield Case(f"undamped for {n_steps} steps, {kind}", attempt)
+            yield StressCase(f"undamped for {n_steps} steps, {kind}", attempt)
     touching = _pushed(46.0, contact_distance=DISTANCE)
-    yield Case("undamped, contact on distances", partial(_kept, touching, 2_000))
+    yield StressCase("undamped, contact on distances", partial(_kept, touching, 2_000))
     for bias in (46.0,) if small else (20.0, 46.0):
-        yield Case(f"damped, squares turned by {bias:g} deg", partial(_spent, _pushed(bias)))
-        yield Case(f"implicit, squares turned by {bias:g} deg", partial(_lost, _pushed(bias)))
-        yield Case(f"free, squares turned by {bias:g} deg", partial(_momentum, _pushed(bias, [])))
+        yield StressCase(f"damped, squares turned by {bias:g} deg", partial(_spent, _pushed(bias)))
+        yield StressCase(f"implicit, squares turned by {bias:g} deg", partial(_lost, _pushed(bias)))
+        yield StressCase(
+            f"free, squares turned by {bias:g} deg", partial(_momentum, _pushed(bias, []))
+        )
 
 
-def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> Posed:
+def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> StressScene:
     """Undamped squares, the middle one pushed and turned within PUSHED, then held."""
     times = np.linspace(0.0, PUSHED, 41)
     share = (1.0 - np.cos(np.pi * times / PUSHED)) / 2.0
@@ -56,12 +68,12 @@ def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> Posed:
     return made.with_material(damping_translation=0.0, damping_rotation=0.0)
 
 
-def _run(case: Posed, n_steps: int, asked: Floats) -> Answer:
+def _run(case: StressScene, n_steps: int, asked: Floats) -> Answer:
     """Explicit steps of 20 microseconds, less than half the limit."""
     return solved(case, ExplicitSolver(case.topology, float(asked[-1]), n_steps, asked))
 
 
-def _kept(case: Posed, n_steps: int) -> Sequence[Check]:
+def _kept(case: StressScene, n_steps: int) -> Sequence[Check]:
     asked = np.linspace(PUSHED, 2e-5 * n_steps, 100)
     answer = _run(case, n_steps, asked)
     energy = energies(case, answer)
@@ -69,7 +81,7 @@ def _kept(case: Posed, n_steps: int) -> Sequence[Check]:
     return [*admissible(case, answer.displacement), Check("drift of the energy", drift, 1e-2)]
 
 
-def _spent(case: Posed) -> Sequence[Check]:
+def _spent(case: StressScene) -> Sequence[Check]:
     damped = case.with_material(damping_translation=1e-4, damping_rotation=5e-3)
     asked = np.linspace(0.0, 0.01, 2001)
     answer = _run(damped, 500, asked)
@@ -79,7 +91,7 @@ def _spent(case: Posed) -> Sequence[Check]:
     return [Check("energy off work and damping", off, 1e-2)]
 
 
-def _lost(case: Posed) -> Sequence[Check]:
+def _lost(case: StressScene) -> Sequence[Check]:
     """An L-stable method may lose energy but never gain any."""
     asked = np.linspace(0.0, 0.01, 2001)
     solver = ImplicitSolver(case.topology, asked[::4], asked, tolerance=1e-6)
@@ -89,7 +101,7 @@ def _lost(case: Posed) -> Sequence[Check]:
     return [Check("energy gained by implicit steps", gained, 1e-2)]
 
 
-def _momentum(case: Posed) -> Sequence[Check]:
+def _momentum(case: StressScene) -> Sequence[Check]:
     """Impulse and angular impulse of the one held unit against the momentum of all others."""
     asked = np.linspace(0.0, 0.01, 2001)
     answer = _run(case, 500, asked)

@@ -7,17 +7,26 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import admissible, apart, balanced, solved
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import Posed, posed, squares
-from sim import statics
-from sim.lattice import quads
-from sim.loads import LinearRamp, TimeSeries
+from benchmarks.stress import (
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    admissible,
+    apart,
+    balanced,
+    posed,
+    solved,
+    squares,
+)
+from sim.quasistatics import static_solver
+from sim.solvers import LinearRamp, TimeSeries
+from sim.structure import quads
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "branches",
         "straight chains that buckle, bowed ones that snap through, thin lattices that fold: by few"
         " load steps and by many",
@@ -27,16 +36,16 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     lengths = (9,) if small else (5, 9, 21, 41)
     for length in lengths:
         for n_loads in (1,) if small else (1, 3, 10, 50):
             for name, case in _paths(length):
                 attempt = partial(_followed, case, n_loads)
-                yield Case(f"{name} of {length} units in {n_loads} loads", attempt)
+                yield StressCase(f"{name} of {length} units in {n_loads} loads", attempt)
 
 
-def _paths(length: int) -> Iterator[tuple[str, Posed]]:
+def _paths(length: int) -> Iterator[tuple[str, StressScene]]:
     chain = quads(length, 1, 15.0, 2.25, 0.0)
     push = LinearRamp(-0.6 * length, 1.0)
     yield "a straight chain", posed(chain, [0], [length - 1], push, static=True)
@@ -61,12 +70,12 @@ def _paths(length: int) -> Iterator[tuple[str, Posed]]:
     )
 
 
-def _followed(case: Posed, n_loads: int) -> Sequence[Check]:
+def _followed(case: StressScene, n_loads: int) -> Sequence[Check]:
     loads = np.arange(1, n_loads + 1) / n_loads
     answer = solved(case, case.solver(loads))
     checks = [*admissible(case, answer.displacement), *balanced(case, answer)]
     record = answer.record
-    assert isinstance(record, statics.Record)
+    assert isinstance(record, static_solver.StaticRecord)
     if record.jumped.any():
         return checks
     fine = solved(case, case.solver(np.arange(1, 10 * n_loads + 1) / (10 * n_loads)))

@@ -8,19 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.constants import MATERIAL
-from benchmarks.stress.checks import equilibria, motions_as_advised
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import Posed, pressed, shaken, squares
-from sim.loads import Harmonic
+from benchmarks.scenes import MATERIAL
+from benchmarks.stress import (
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    equilibria,
+    motions_as_advised,
+    pressed,
+    shaken,
+    squares,
+)
+from sim.solvers import Harmonic
 
 SIDE = 5
 LOADS = np.array([0.5, 1.0])
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "constants",
         "each stiffness, and that of an inclusion, 1e-3 to 1e6 times the paper's; no damping to 1e9"
         " times the paper's; masses even and spread over 6 decades: pressed, shaken at 2 and 60 Hz",
@@ -30,7 +38,7 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     for ratio in (1e3,) if small else 10.0 ** np.arange(-3, 7):
         for name, constants in _stiffness(float(ratio)):
             yield from _tried(f"{name} {ratio:.0e}", constants, stiff=True)
@@ -60,17 +68,17 @@ def _damping(factor: float) -> dict[str, Any]:
     return {name: getattr(MATERIAL, name) * factor for name in names}
 
 
-def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterator[Case]:
+def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterator[StressCase]:
     """A structure of these constants pressed, and shaken slowly and fast."""
     if stiff:
         plate = pressed(squares(SIDE), 0.08).with_material(**constants)
-        yield Case(f"{name}, pressed", partial(equilibria, plate, LOADS))
+        yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS))
     for frequency, duration in ((2.0, 0.25), (60.0, 0.02)):
         motion = Harmonic(2.0, frequency, 0.8)
         case = shaken(squares(SIDE), motion, duration=duration, frequency=frequency)
         made = case.with_material(**constants)
-        yield Case(f"{name}, shaken at {frequency:g} Hz", partial(_shaken, made))
+        yield StressCase(f"{name}, shaken at {frequency:g} Hz", partial(_shaken, made))
 
 
-def _shaken(case: Posed) -> Sequence[Check]:
+def _shaken(case: StressScene) -> Sequence[Check]:
     return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 26), 0.05)

@@ -8,11 +8,20 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import equilibria, motions_as_advised
-from benchmarks.stress.drawn import Draws
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import DISTANCE, Posed, pressed, shaken, squares
-from sim.loads import Harmonic
+from benchmarks.stress import (
+    DISTANCE,
+    Check,
+    RandomDesigns,
+    StressCase,
+    StressFamily,
+    StressScene,
+    equilibria,
+    motions_as_advised,
+    pressed,
+    shaken,
+    squares,
+)
+from sim.solvers import Harmonic
 
 LARGEST = 2.5
 KEEP = 0.8
@@ -20,9 +29,9 @@ SIDE = 9
 LOADS = np.array([0.5, 1.0])
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "designs",
         f"random designs of {SIDE} x {SIDE} units that can be made, shifts up to {LARGEST} mm: each"
         " pressed by 10 %, a third shaken slowly, a third fast, a third with contact on distances",
@@ -32,9 +41,9 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     lattice = squares(SIDE)
-    draws = Draws(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
+    draws = RandomDesigns(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
     plate = pressed(lattice, 0.1)
     touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
     slow = shaken(lattice, Harmonic(4.5, 2.0, 0.8), duration=0.25, frequency=2.0)
@@ -45,20 +54,22 @@ def _cases(small: bool) -> Iterator[Case]:
         partial(_motion, fast, 0.05),
     )
     for seed in range(6 if small else 1000):
-        yield Case(
+        yield StressCase(
             f"design {seed}", partial(_both, draws, seed, plate, attempts[seed % len(attempts)])
         )
 
 
-def _both(draws: Draws, seed: int, plate: Posed, more: partial[Sequence[Check]]) -> Sequence[Check]:
+def _both(
+    draws: RandomDesigns, seed: int, plate: StressScene, more: partial[Sequence[Check]]
+) -> Sequence[Check]:
     vertices = draws(seed)
     return [*_equilibria(plate, vertices), *more(vertices)]
 
 
-def _equilibria(case: Posed, vertices: np.ndarray) -> Sequence[Check]:
+def _equilibria(case: StressScene, vertices: np.ndarray) -> Sequence[Check]:
     return equilibria(replace(case, vertices=vertices), LOADS)
 
 
-def _motion(case: Posed, error: float, vertices: np.ndarray) -> Sequence[Check]:
+def _motion(case: StressScene, error: float, vertices: np.ndarray) -> Sequence[Check]:
     asked = np.linspace(0.0, case.scene.duration, 26)
     return motions_as_advised(replace(case, vertices=vertices), asked, error)

@@ -8,23 +8,33 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import equilibria, motions
-from benchmarks.stress.frame import Case, Check, Family, Wanted
-from benchmarks.stress.posed import NONE, Posed, posed, pressed, shaken, squares
-from sim.arrays import Ints
-from sim.evaluation import evaluator
-from sim.lattice import Lattice, quads
-from sim.loads import Harmonic, LinearRamp
-from sim.plan import make_plan
+from benchmarks.stress import (
+    NONE,
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    Wanted,
+    equilibria,
+    motions,
+    posed,
+    pressed,
+    shaken,
+    squares,
+)
+from sim.core import Ints
+from sim.scene import evaluator, make_plan
+from sim.solvers import Harmonic, LinearRamp
+from sim.structure import Lattice, quads
 
 LOADS = np.array([0.5, 1.0])
 SIDE = 5
 ASKED = np.linspace(0.0, 0.02, 21)
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "pieces",
         "floating units and halves, ends that hang on one ligament, supports along x alone, all"
         " units held, no ligament, a single unit; cloaks of one unit",
@@ -33,20 +43,20 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     for name, lattice, wanted in list(_structures())[:2] if small else _structures():
         plate = pressed(lattice, 0.04)
-        yield Case(f"{name}, pressed", partial(equilibria, plate, LOADS), wanted)
+        yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS), wanted)
         for integrator in ("implicit", "explicit"):
             case = shaken_ends(lattice, integrator)
             more: Wanted = "solution" if len(lattice.ligaments) else "refusal"
             attempt = partial(motions, case, ASKED, 0.15)
-            yield Case(f"{name}, shaken, {integrator}", attempt, more)
+            yield StressCase(f"{name}, shaken, {integrator}", attempt, more)
     yield from _odd()
     for unit in (6,) if small else (0, 6, 7, 12, 17):
         for static in (True, False):
             kind = "pressed" if static else "shaken"
-            yield Case(f"cloak of unit {unit}, {kind}", partial(_cloak, unit, static))
+            yield StressCase(f"cloak of unit {unit}, {kind}", partial(_cloak, unit, static))
 
 
 def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
@@ -67,30 +77,32 @@ def _cut(lattice: Lattice, units: Ints, keep: int = 0) -> Lattice:
     return replace(lattice, ligaments=np.delete(lattice.ligaments, crossing, axis=0))
 
 
-def shaken_ends(lattice: Lattice, integrator: str) -> Posed:
+def shaken_ends(lattice: Lattice, integrator: str) -> StressScene:
     """The left column clamped, the right one shaken."""
     left, right = (np.flatnonzero(lattice.index[:, 0] == end) for end in (0, SIDE - 1))
     motion = Harmonic(0.5, 60.0, 0.3)
     return posed(lattice, left, right, motion, duration=0.02, frequency=60.0, integrator=integrator)
 
 
-def _odd() -> Iterator[Case]:
+def _odd() -> Iterator[StressCase]:
     """What hardly is a lattice any more."""
     free = posed(squares(3), NONE, [4], LinearRamp(1.0, 1.0), static=True)
-    yield Case("held by nothing but the driven unit", partial(equilibria, free, LOADS))
+    yield StressCase("held by nothing but the driven unit", partial(equilibria, free, LOADS))
     chain = quads(2, 1, 15.0, 2.25, 0.3)
     held = posed(chain, [0], [1], LinearRamp(0.5, 1.0), static=True)
-    yield Case("all units held, static", partial(equilibria, held, LOADS), "refusal")
+    yield StressCase("all units held, static", partial(equilibria, held, LOADS), "refusal")
     for integrator in ("implicit", "explicit"):
         more = {"duration": 0.02, "frequency": 60.0, "integrator": integrator}
         moving = posed(chain, [0], [1], Harmonic(0.5, 60.0), **more)
         attempt = partial(motions, moving, ASKED, 0.05)
-        yield Case(f"all units held, {integrator}", attempt, "refusal")
+        yield StressCase(f"all units held, {integrator}", attempt, "refusal")
     sliding = pressed(squares(SIDE), 0.04)
     along = replace(sliding.scene, clamped=3 * 5 * np.arange(5))
-    yield Case("clamped along x alone", partial(equilibria, replace(sliding, scene=along), LOADS))
+    yield StressCase(
+        "clamped along x alone", partial(equilibria, replace(sliding, scene=along), LOADS)
+    )
     alone = posed(quads(1, 1, 15.0, 2.25, 0.3), NONE, [0], LinearRamp(1.0, 1.0), static=True)
-    yield Case("a single unit, driven", partial(equilibria, alone, LOADS), "refusal")
+    yield StressCase("a single unit, driven", partial(equilibria, alone, LOADS), "refusal")
 
 
 def _cloak(unit: int, static: bool) -> Sequence[Check]:

@@ -7,21 +7,30 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import equilibria, motions
-from benchmarks.stress.frame import Case, Check, Family, Wanted
-from benchmarks.stress.posed import DISTANCE, Posed, pressed, shaken, squares
-from sim.explicit import ExplicitSolver
-from sim.implicit import ImplicitSolver
-from sim.loads import Harmonic
+from benchmarks.stress import (
+    DISTANCE,
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    Wanted,
+    equilibria,
+    motions,
+    pressed,
+    shaken,
+    squares,
+)
+from sim.solvers import Harmonic
+from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 SIDES = (3, 4, 5, 8, 15, 30, 60, 120)
 TOUCHING = 30
 """Largest lattice that is also pressed with contact on distances."""
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "sizes",
         f"squares of {SIDES[0]} to {SIDES[-1]} units a side, and strips: pressed by 10 %, shaken by"
         " either integrator",
@@ -30,24 +39,28 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     shapes = [(side, side) for side in SIDES] + [(60, 2), (3, 40), (2, 2)]
     for columns, rows in [(3, 3), (8, 8)] if small else shapes:
         lattice, name = squares(columns, rows), f"{columns} x {rows}"
         loads = np.array([1.0])
         wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
-        yield Case(f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads), wanted)
+        yield StressCase(
+            f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads), wanted
+        )
         if max(columns, rows) <= TOUCHING:
             touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
             attempt = partial(equilibria, touching, loads)
-            yield Case(f"{name}, contact on distances", attempt, wanted)
+            yield StressCase(f"{name}, contact on distances", attempt, wanted)
         if min(columns, rows) > 2:
             case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
             for integrator in ("implicit", "explicit"):
-                yield Case(f"{name}, shaken, {integrator}", partial(_shaken, case, integrator))
+                yield StressCase(
+                    f"{name}, shaken, {integrator}", partial(_shaken, case, integrator)
+                )
 
 
-def _shaken(case: Posed, integrator: str) -> Sequence[Check]:
+def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
     duration, asked = case.scene.duration, np.linspace(0.0, case.scene.duration, 6)
     if integrator == "explicit":
         return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))

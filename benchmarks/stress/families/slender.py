@@ -8,11 +8,19 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import equilibria, motions_as_advised
-from benchmarks.stress.drawn import Draws
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import Posed, pressed, shaken, squares
-from sim.loads import Harmonic
+from benchmarks.stress import (
+    Check,
+    RandomDesigns,
+    StressCase,
+    StressFamily,
+    StressScene,
+    equilibria,
+    motions_as_advised,
+    pressed,
+    shaken,
+    squares,
+)
+from sim.solvers import Harmonic
 
 LARGEST = 7.0
 KEEP = 0.97
@@ -21,9 +29,9 @@ AT_BOUNDS = 0.3
 """Smallest margin of a design that counts as being at the bounds, mm."""
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "slender",
         f"designs of {SIDE} x {SIDE} units cut back from shifts of {LARGEST:g} mm until they just"
         " keep to edges of 3 mm, corners of 30 deg, gaps of 0.2 mm: pressed by 10 %, shaken",
@@ -32,18 +40,18 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     lattice = squares(SIDE)
-    draws = Draws(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
+    draws = RandomDesigns(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
     plate = pressed(lattice, 0.1)
     slow = shaken(lattice, Harmonic(4.5, 2.0, 0.8), duration=0.25, frequency=2.0)
     fast = shaken(lattice, Harmonic(2.0, 60.0, 0.8), duration=0.02, frequency=60.0)
     for seed in range(1 if small else 40):
         for case, name in ((plate, "pressed"), (slow, "slowly shaken"), (fast, "shaken")):
-            yield Case(f"design {seed}, {name}", partial(_attempt, draws, seed, case))
+            yield StressCase(f"design {seed}, {name}", partial(_attempt, draws, seed, case))
 
 
-def _attempt(draws: Draws, seed: int, case: Posed) -> Sequence[Check]:
+def _attempt(draws: RandomDesigns, seed: int, case: StressScene) -> Sequence[Check]:
     vertices = draws(seed)
     margin = Check("smallest margin, mm", draws.at_bounds(vertices), AT_BOUNDS)
     made = replace(case, vertices=vertices)

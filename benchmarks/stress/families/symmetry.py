@@ -9,17 +9,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.stress.checks import solved
-from benchmarks.stress.drawn import Draws
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import DISTANCE, Posed, posed, squares
-from sim.arrays import Floats, Ints
-from sim.dynamics import Solver
-from sim.explicit import ExplicitSolver
-from sim.implicit import ImplicitSolver
-from sim.lattice import Lattice, listed
-from sim.loads import TimeSeries
-from sim.statics import StaticSolver
+from benchmarks.stress import (
+    DISTANCE,
+    Check,
+    RandomDesigns,
+    StressCase,
+    StressFamily,
+    StressScene,
+    posed,
+    solved,
+    squares,
+)
+from sim.core import Floats, Ints
+from sim.quasistatics import StaticSolver
+from sim.solvers import Solver, TimeSeries
+from sim.structure import Lattice, listed
+from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 EXACT = 1e-10
 SIDE = 5
@@ -30,7 +35,7 @@ MOVED = np.array([-5.0, 2.0, 0.2])
 """Motion of the driven units at the end: closes voids to contact."""
 
 
-class Telling(NamedTuple):
+class EquivalentProblem(NamedTuple):
     """Another way to tell the same problem.
 
     Attributes:
@@ -46,9 +51,9 @@ class Telling(NamedTuple):
     exchanged: np.ndarray
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "symmetry",
         "random designs turned by any angle, mirrored, moved by 1 m, their units renumbered, the"
         " ends of their ligaments exchanged, all of these: statics and motions, both contacts",
@@ -57,19 +62,19 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
-    draws = Draws(squares(SIDE), np.zeros(0, dtype=np.int64), 2.0, 0.8)
+def _cases(small: bool) -> Iterator[StressCase]:
+    draws = RandomDesigns(squares(SIDE), np.zeros(0, dtype=np.int64), 2.0, 0.8)
     for seed in range(1 if small else 6):
         for kind in ("all",) if small else KINDS:
             for law, distance in (("angles", None), ("distances", DISTANCE)):
                 for solver in ("static", "implicit", "explicit"):
                     name = f"design {seed}, {kind}, {solver}, contact on {law}"
                     attempt = partial(_attempt, draws, seed, kind, solver, distance)
-                    yield Case(name, attempt)
+                    yield StressCase(name, attempt)
 
 
 def _attempt(
-    draws: Draws, seed: int, kind: str, solver: str, distance: float | None
+    draws: RandomDesigns, seed: int, kind: str, solver: str, distance: float | None
 ) -> Sequence[Check]:
     lattice = replace(squares(SIDE), vertices=draws(seed))
     telling = _telling(kind, lattice, np.random.default_rng(seed))
@@ -84,7 +89,7 @@ def _attempt(
     return [Check("difference from the same told otherwise", float(off), EXACT)]
 
 
-def _telling(kind: str, lattice: Lattice, random: np.random.Generator) -> Telling:
+def _telling(kind: str, lattice: Lattice, random: np.random.Generator) -> EquivalentProblem:
     told = _same(lattice)
     angle = random.uniform(0.2, 6.0)
     c, s = np.cos(angle), np.sin(angle)
@@ -101,8 +106,8 @@ def _telling(kind: str, lattice: Lattice, random: np.random.Generator) -> Tellin
     return told
 
 
-def _same(lattice: Lattice) -> Telling:
-    return Telling(
+def _same(lattice: Lattice) -> EquivalentProblem:
+    return EquivalentProblem(
         np.eye(2),
         np.zeros(2),
         np.arange(lattice.n_units),
@@ -110,7 +115,7 @@ def _same(lattice: Lattice) -> Telling:
     )
 
 
-def _told(lattice: Lattice, telling: Telling) -> Lattice:
+def _told(lattice: Lattice, telling: EquivalentProblem) -> Lattice:
     placed = lattice.vertices @ telling.turn.T + telling.shift
     rings = [placed[lattice.unit == unit].tolist() for unit in telling.order]
     ends = lattice.ligaments.copy()
@@ -118,7 +123,7 @@ def _told(lattice: Lattice, telling: Telling) -> Lattice:
     return listed(rings, placed[ends].tolist(), lattice.spacing)
 
 
-def _posed(lattice: Lattice, telling: Telling, distance: float | None) -> Posed:
+def _posed(lattice: Lattice, telling: EquivalentProblem, distance: float | None) -> StressScene:
     """The left column clamped, the right one pushed, turned and sheared."""
     column = telling.order % SIDE
     push = np.concatenate([telling.turn @ MOVED[:2], [np.linalg.det(telling.turn) * MOVED[2]]])
@@ -128,7 +133,7 @@ def _posed(lattice: Lattice, telling: Telling, distance: float | None) -> Posed:
     return posed(lattice, left, right, motion, duration=DURATION, contact_distance=distance)
 
 
-def _solver(case: Posed, name: str) -> Solver:
+def _solver(case: StressScene, name: str) -> Solver:
     top = case.topology
     if name == "static":
         return StaticSolver(top, TIMES[5::5], relative=1e-14)

@@ -7,19 +7,29 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.stress.checks import apart, equilibria, motions, solved
-from benchmarks.stress.frame import Case, Check, Family
-from benchmarks.stress.posed import NONE, Posed, posed, squares
-from sim.arrays import Floats
-from sim.lattice import quads
-from sim.loads import TimeSeries
+from benchmarks.stress import (
+    NONE,
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    apart,
+    equilibria,
+    motions,
+    posed,
+    solved,
+    squares,
+)
+from sim.core import Floats
+from sim.solvers import TimeSeries
+from sim.structure import quads
 
 PERIOD = 0.05
 
 
-def family() -> Family:
+def family() -> StressFamily:
     """The family."""
-    return Family(
+    return StressFamily(
         "windings",
         "a free lattice turned as a whole up to 100 times, a chain twisted and rolled up beyond two"
         " turns: equilibria and motions",
@@ -28,15 +38,15 @@ def family() -> Family:
     )
 
 
-def _cases(small: bool) -> Iterator[Case]:
+def _cases(small: bool) -> Iterator[StressCase]:
     for turns in (1.0,) if small else (0.5, 0.75, 1.0, 3.0, 100.0):
-        yield Case(f"a free lattice turned {turns:g} times", partial(_rigid, turns))
+        yield StressCase(f"a free lattice turned {turns:g} times", partial(_rigid, turns))
     for turns in () if small else (0.6, 1.1, 1.5, 2.2):
-        yield Case(f"a chain rolled up {turns:g} times", partial(_rolled, turns))
+        yield StressCase(f"a chain rolled up {turns:g} times", partial(_rolled, turns))
     for turns in (1.5,) if small else (0.6, 1.5, 2.2):
         for integrator in ("implicit", "explicit"):
             name = f"a lattice whirled {turns:g} times, {integrator}"
-            yield Case(name, partial(_whirled, turns, integrator))
+            yield StressCase(name, partial(_whirled, turns, integrator))
 
 
 def _turning(turns: float, n: int, duration: float) -> TimeSeries:
@@ -88,5 +98,5 @@ def _whirled(turns: float, integrator: str) -> Sequence[Check]:
     series = TimeSeries(
         PERIOD * share, np.column_stack([np.zeros((n, 2)), 2 * np.pi * turns * smooth])
     )
-    case: Posed = posed(squares(3), NONE, [4], series, duration=PERIOD, integrator=integrator)
+    case: StressScene = posed(squares(3), NONE, [4], series, duration=PERIOD, integrator=integrator)
     return motions(case, np.linspace(0.0, PERIOD, 26), 0.05)

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pipeline import calibrate
-from pipeline.calibration.description import Calibration
-from pipeline.problem.loading import section
+from pipeline.calibration.inputs import Calibration
+from pipeline.problem.reading import section
+from pipeline.stages import calibrate
 
 TRUTH = {
     "density": "6.18 kg/m^2",

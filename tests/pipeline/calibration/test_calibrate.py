@@ -9,12 +9,13 @@ import pytest
 import xarray as xr
 import yaml
 
-from pipeline import calibrate, datasets
-from pipeline.calibration.description import Calibration
-from pipeline.calibration.fitting import fitted
-from pipeline.calibration.uncertainty import gradient, uncertainty
-from pipeline.problem.loading import section
-from pipeline.problem.material import Material
+from pipeline import datasets
+from pipeline.calibration import fitted
+from pipeline.calibration.fit_uncertainty import gradient, uncertainty
+from pipeline.calibration.inputs import Calibration
+from pipeline.problem.reading import section
+from pipeline.problem.sections import MaterialConstants
+from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
     decay_set,
@@ -79,7 +80,7 @@ def test_the_peaks_tell_the_damping_too(found: xr.Dataset) -> None:
 def test_a_problem_file_takes_the_fragment(made: Path) -> None:
     text = (made / "found.yaml").read_text()
     assert text.startswith("# SYNTHETIC")
-    material = Material.model_validate(yaml.safe_load(text)["material"])
+    material = MaterialConstants.model_validate(yaml.safe_load(text)["material"])
     found = datasets.read(made / "found.nc", "calibration").set_index(parameter="parameter")
     assert material.shear_stiffness == pytest.approx(found["value"].values[1], rel=1e-5)
     assert material.damping_coefficients(15.0) == pytest.approx(found["value"].values[4:], rel=1e-5)

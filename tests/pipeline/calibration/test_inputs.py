@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline import calibrate, units
-from pipeline.calibration import readings
-from pipeline.calibration.experiment import Measured
-from pipeline.errors import UserError
+from pipeline.calibration.experiments.experiment import MeasuredValues
+from pipeline.calibration.inputs import csv_readings
+from pipeline.problem.fields import units
+from pipeline.runtime import UserError
+from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     START,
     STIFFNESS,
@@ -28,7 +29,7 @@ def refused(text: str, folder: Path) -> UserError:
     path = folder / "readings.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as caught:
-        readings.read(path, WANTED)
+        csv_readings.read(path, WANTED)
     assert caught.value.file == str(path)
     assert caught.value.remedy
     return caught.value
@@ -37,7 +38,7 @@ def refused(text: str, folder: Path) -> UserError:
 def test_units_of_columns_are_minded(tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
     path.write_text(f"# a comment\nforce [kN];displacement (cm)\n{ROWS.replace(',', ';')}\n")
-    found = readings.read(path, WANTED)
+    found = csv_readings.read(path, WANTED)
     np.testing.assert_allclose(found[0], [20.0, 1000.0])
 
 
@@ -129,7 +130,7 @@ def test_whitened_values_have_no_correlation_left() -> None:
     sigma, channel = random.uniform(0.5, 2.0, 12), np.repeat([0, 1, 4], 4)
     bias, causes = np.repeat([0.7, 2.0, 0.1], 4), random.normal(size=(12, 2))
     at = np.arange(12.0)
-    measured = Measured("a", "track", at, at, sigma, True, channel, bias).with_common(causes)
+    measured = MeasuredValues("a", "track", at, at, sigma, True, channel, bias).with_common(causes)
     covariance = np.diag(sigma**2) + causes @ causes.T
     covariance += np.where(channel[:, None] == channel, np.outer(bias, bias), 0.0)
     white = measured.whitened(np.eye(12))
@@ -142,7 +143,7 @@ def test_whitened_values_have_no_correlation_left() -> None:
 def test_an_unknown_bias_leaves_nothing_of_the_means() -> None:
     channel = np.repeat([0, 1], 5)
     at = np.arange(10.0)
-    measured = Measured("a", "track", at, at, np.ones(10), True, channel, np.full(10, np.inf))
+    measured = MeasuredValues("a", "track", at, at, np.ones(10), True, channel, np.full(10, np.inf))
     shifted = at + np.where(channel == 0, 3.0, -8.0)
     np.testing.assert_allclose(measured.whitened(shifted), measured.whitened(at), atol=1e-12)
     assert measured.unbiased == 2

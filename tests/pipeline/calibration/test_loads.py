@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import calibrate, datasets
-from pipeline.calibration.readings import read
-from pipeline.locations import ROOT
-from pipeline.units import FORCE, LENGTH
+from pipeline import datasets
+from pipeline.calibration.inputs.csv_readings import read
+from pipeline.problem.fields.units import FORCE, LENGTH
+from pipeline.runtime import ROOT
+from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     TRUTH,
     described,

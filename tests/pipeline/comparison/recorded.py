@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.comparison.nominal import nominal
-from pipeline.tracking.dataset import labelled
-from pipeline.tracking.specimen import as_built
+from pipeline.comparison import nominal
+from pipeline.tracking.geometry import as_built
+from pipeline.tracking.output import labelled
 
 SIGMA = np.array([0.004, 0.004, 0.0008])
 PIXEL = 0.25

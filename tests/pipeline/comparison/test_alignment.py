@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from pipeline.comparison.alignment import (
     LOADING,
     UNLOADING,
-    Course,
+    SampledMotion,
     branches,
     find_lag,
     load_time,
     turn,
 )
-from pipeline.errors import UserError
+from pipeline.runtime import UserError
 
 RATE = 60.0
 TIMES = np.linspace(0.0, 2.0, 401)
@@ -28,13 +28,13 @@ def sine(time: np.ndarray) -> np.ndarray:
     return wave[:, None] * np.array([0.8, 0.6])
 
 
-NOMINAL = Course(TIMES, sine(TIMES))
+NOMINAL = SampledMotion(TIMES, sine(TIMES))
 
 
-def filmed(lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0) -> Course:
+def filmed(lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0) -> SampledMotion:
     time = np.arange(frames) / RATE
     drawn = np.random.default_rng(seed).normal(0.0, noise, (frames, 2))
-    return Course(time, sine(time - lag) + drawn)
+    return SampledMotion(time, sine(time - lag) + drawn)
 
 
 @settings(max_examples=25, deadline=None)
@@ -60,14 +60,14 @@ def test_frames_without_the_drive_are_left_out() -> None:
 
 def test_a_gain_is_told_and_not_taken_for_a_lag() -> None:
     course = filmed(0.1)
-    found = find_lag(Course(course.time, 1.3 * course.value), NOMINAL)
+    found = find_lag(SampledMotion(course.time, 1.3 * course.value), NOMINAL)
     assert found.gain == pytest.approx(1.3, abs=2e-3)
     assert found.value == pytest.approx(0.1, abs=0.01 / RATE)
 
 
 def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
     time = np.arange(60) / RATE
-    steady = Course(time, sine(time + 0.5 - 0.02))
+    steady = SampledMotion(time, sine(time + 0.5 - 0.02))
     found = find_lag(steady, NOMINAL)
     assert found.ambiguous
     assert np.angle(np.exp(4j * np.pi * (found.value - 0.02))) == pytest.approx(0.0, abs=0.01)
@@ -76,7 +76,7 @@ def test_a_steady_vibration_is_said_to_be_ambiguous() -> None:
 
 def test_a_drive_of_another_frequency_cannot_be_aligned() -> None:
     time = np.arange(90) / RATE
-    other = Course(time, sine(2.7 * time))
+    other = SampledMotion(time, sine(2.7 * time))
     with pytest.raises(UserError, match="cannot be aligned") as caught:
         find_lag(other, NOMINAL)
     assert "correlation" in str(caught.value)
@@ -86,11 +86,11 @@ def test_too_few_frames_are_refused() -> None:
     with pytest.raises(UserError, match="too few frames"):
         find_lag(filmed(0.0, frames=7), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
-        load_time(np.full(20, np.nan), Course(TIMES, TIMES[:, None]))
+        load_time(np.full(20, np.nan), SampledMotion(TIMES, TIMES[:, None]))
 
 
 def test_equal_displacement_is_equal_load_on_both_branches() -> None:
-    path = Course(TIMES, 15 * (1 + np.tanh(3 * (TIMES - 1)))[:, None])
+    path = SampledMotion(TIMES, 15 * (1 + np.tanh(3 * (TIMES - 1)))[:, None])
     there = np.concatenate([np.linspace(path.value[0, 0], 20, 50), np.linspace(20, 5, 30)])
     found = load_time(there, path)
     np.testing.assert_allclose(path.at(found)[:, 0], there, atol=1e-4)
@@ -99,7 +99,7 @@ def test_equal_displacement_is_equal_load_on_both_branches() -> None:
 
 
 def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
-    ramp = Course(TIMES, 10 * TIMES[:, None])
+    ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     found = load_time(np.linspace(-0.01, 25.0, 26), ramp)
     assert found[0] == 0.0
     assert np.isfinite(found[:20]).all()
@@ -112,11 +112,11 @@ def test_a_rest_belongs_to_the_way_before_it() -> None:
 
 
 def test_a_drive_that_does_not_move_along_is_refused() -> None:
-    ramp = Course(TIMES, 10 * TIMES[:, None])
+    ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     with pytest.raises(UserError, match="cannot be aligned"):
         load_time(np.linspace(0.0, -15.0, 30), ramp)
     with pytest.raises(UserError, match="to and fro"):
-        load_time(np.linspace(0.0, 1.0, 30), Course(TIMES, np.sin(TIMES * 4)[:, None]))
+        load_time(np.linspace(0.0, 1.0, 30), SampledMotion(TIMES, np.sin(TIMES * 4)[:, None]))
 
 
 def test_the_direction_of_a_drive_is_told() -> None:

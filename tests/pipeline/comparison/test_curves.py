@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.comparison.compared_quantities import Quantity, nearing, rotation, size
 from pipeline.comparison.curves import Sides, curve, peak_to_peak, peaks, usual_coverage
-from pipeline.comparison.quantities import Quantity, nearing, rotation, size
 
 FRAMES, UNITS, NOISE = 60, 40, 0.02
 TIME = np.arange(FRAMES) / 30

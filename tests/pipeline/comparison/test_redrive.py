@@ -10,12 +10,10 @@ import xarray as xr
 
 from pipeline import problem
 from pipeline.comparison.redrive import filtered, held_motion, redriven
-from pipeline.errors import UserError
-from pipeline.measuring import Structure
-from pipeline.scenes import scene_of
-from sim.dynamics import solve_case
-from sim.plan import concrete_parameters, make_plan
-from sim.scene import Scene
+from pipeline.posing import PosedStructure, scene_of
+from pipeline.runtime import UserError
+from sim.scene import Scene, concrete_parameters, make_plan
+from sim.solvers import solve_case
 from tests.pipeline import static
 
 SIGMA = np.array([0.004, 0.004, 0.0006])
@@ -54,7 +52,7 @@ def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
     assert held.driven.sum() == 5
     assert not held.assumed.any()
     np.testing.assert_allclose(held.noise.mean(axis=0), SIGMA, rtol=0.15)
-    structure = Structure(pressed, pressed.lattice.vertices)
+    structure = PosedStructure(pressed, pressed.lattice.vertices)
     made = redriven(structure, held, track["time"].values)
     assert made.failure is None
     assert np.sqrt(np.mean((made.displacement - motion) ** 2)) < 0.5 * SIGMA[0]
@@ -65,7 +63,9 @@ def test_a_motion_in_time_is_found_again() -> None:
     scene = scene_of(problem.load(FIG2 / "problem.yaml", "quick"), FIG2)
     track, motion = tracked(scene, 0.5, 61)
     made = redriven(
-        Structure(scene, scene.lattice.vertices), held_motion(track, scene), track["time"].values
+        PosedStructure(scene, scene.lattice.vertices),
+        held_motion(track, scene),
+        track["time"].values,
     )
     share = np.sqrt(np.mean((made.displacement - motion) ** 2) / np.mean(motion**2))
     assert share < 0.02
@@ -110,7 +110,7 @@ def test_the_filter_departs_by_the_uncertainty_and_keeps_a_jump_of_speed() -> No
 def test_a_path_that_cannot_be_followed_is_kept_so_far(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 20)
     track["displacement"][:, pressed.driven[0], 2] += np.linspace(0, 3, 20)  # into its neighbour
-    structure = Structure(pressed, pressed.lattice.vertices)
+    structure = PosedStructure(pressed, pressed.lattice.vertices)
     made = redriven(structure, held_motion(track, pressed), track["time"].values)
     assert "no equilibrium" in (made.failure or "")
     there = np.isfinite(made.displacement).all(axis=(1, 2))

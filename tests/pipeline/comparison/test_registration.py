@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.comparison.registration import pixel_size, register
+from pipeline.comparison import pixel_size, register
 from tests.pipeline.samples import sample
 
 GRID = 15.0 * np.stack(np.meshgrid(np.arange(7.0), np.arange(7.0)), axis=-1).reshape(-1, 2)

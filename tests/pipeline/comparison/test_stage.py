@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import compare, datasets, simulate
-from pipeline.comparison.measurement import measurement
-from pipeline.comparison.registration import pixel_size
+from pipeline import datasets
+from pipeline.comparison import measurement, pixel_size
+from pipeline.stages import compare, simulate
 from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
 Change = Callable[[xr.Dataset], xr.Dataset]

@@ -9,12 +9,14 @@ import numpy as np
 import xarray as xr
 
 from pipeline import problem
-from pipeline.fabrication import assembly, bom, manifest, package, units
-from pipeline.fabrication.network import network
-from pipeline.fabrication.parts import Specimen
+from pipeline.fabrication import papers
+from pipeline.fabrication.files import package_folder
+from pipeline.fabrication.papers import bill_of_materials, manifest
+from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.units import network, specimen_units
 from pipeline.problem import Problem
-from pipeline.problem.fabrication import Fabrication
-from pipeline.problem.quantities import SIM_UNITS
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
 from tests.pipeline.fabrication import handmade
 
 PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
@@ -49,10 +51,10 @@ def _flags(values: np.ndarray, meanings: str) -> tuple[str, np.ndarray, dict[str
     return ("unit", values, {"flag_values": numbers, "flag_meanings": meanings})
 
 
-def specimen(asked: Problem) -> Specimen:
+def specimen(asked: Problem) -> BuiltSpecimen:
     """The six squares as the exporters cut them."""
     net = network(design(), "cloaked")
-    return units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
+    return specimen_units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
 
 
 def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Problem:
@@ -66,10 +68,10 @@ def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Probl
     asked = problem.load(PROBLEM).model_copy(update={"fabrication": wanted})
     made = specimen(asked)
     folder.mkdir(parents=True)
-    filled = package.Package(folder, made, asked, str(PROBLEM))
-    package.write(filled)
-    assembly.write(folder / "assembly.pdf", made, asked.fabrication)
+    filled = package_folder.PackageFolder(folder, made, asked, str(PROBLEM))
+    package_folder.write(filled)
+    papers.write(folder / "assembly.pdf", made, asked.fabrication)
     density = asked.material.density
-    bom.write(folder / "bom.csv", made, asked.fabrication, density, filled.contents)
+    bill_of_materials.write(folder / "bom.csv", made, asked.fabrication, density, filled.contents)
     manifest.write(folder, made, asked, PROBLEM)
     return asked

@@ -11,7 +11,7 @@ import numpy as np
 from ezdxf.filemanagement import new
 from numpy.typing import NDArray
 
-from pipeline.fabrication.checks.drawings import Curve
+from pipeline.fabrication.readback import Curve
 
 Floats = NDArray[np.float64]
 Triangles = NDArray[np.int64]

@@ -7,9 +7,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from pipeline.fabrication.naming import labels
-from pipeline.fabrication.parts import Circle, Ligament, Shim, Slot, Specimen, Unit
-from pipeline.problem.fabrication import Fabrication
+from pipeline.fabrication.parts import BuiltSpecimen, Circle, Ligament, Shim, Slot, Unit, labels
+from pipeline.problem.sections import Fabrication
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +54,7 @@ def slotted(corners: Floats, vertex: int, depth: float) -> tuple[Polygon, Polygo
     return slot, tip, inwards
 
 
-def specimen(depth: float = 3.0) -> Specimen:
+def specimen(depth: float = 3.0) -> BuiltSpecimen:
     """Three columns and two rows, a slot of `depth` at every ligament's end."""
     indices = [(i, j) for j in range(ROWS) for i in range(COLUMNS)]
     names = labels(indices)
@@ -72,7 +71,7 @@ def specimen(depth: float = 3.0) -> Specimen:
     ]
     length = 2.25 + 2 * depth
     shim = Shim(f"S{length:.2f}", length, ASKED.thickness, tuple(range(len(ligaments))), 1)
-    return Specimen("toy", "cloaked", tuple(units), tuple(ligaments), (shim,), ("A1", "C2"))
+    return BuiltSpecimen("toy", "cloaked", tuple(units), tuple(ligaments), (shim,), ("A1", "C2"))
 
 
 def _unit(

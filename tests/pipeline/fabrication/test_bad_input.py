@@ -9,7 +9,8 @@ import pytest
 import xarray as xr
 import yaml
 
-from pipeline import datasets, fabricate
+from pipeline import datasets
+from pipeline.stages import fabricate
 from tests.pipeline.fabrication import built
 
 Edit = Callable[[Path], None]

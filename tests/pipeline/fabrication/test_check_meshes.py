@@ -11,11 +11,13 @@ import trimesh
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from pipeline.errors import UserError
-from pipeline.fabrication.checks import corners, plates, solids
-from pipeline.fabrication.checks.corners import Shape
+from pipeline.fabrication.checks import plate_checks
+from pipeline.fabrication.checks import slot_checks as corners
+from pipeline.fabrication.checks.slot_checks import MadeOutline
 from pipeline.fabrication.parts import Unit
-from pipeline.problem.fabrication import Print
+from pipeline.fabrication.readback import read_meshes
+from pipeline.problem.sections import Print
+from pipeline.runtime import UserError
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.files import write_3mf, write_stl
 from tests.pipeline.fabrication.handmade import ASKED
@@ -82,7 +84,7 @@ DAMAGES: dict[str, tuple[Callable[[Mesh], Mesh], str]] = {
 
 
 def told(mesh: Mesh, path: Path) -> list[str]:
-    return [fault.what for fault in solids.check(solids.read_stl(write_stl(path, *mesh)))]
+    return [fault.what for fault in read_meshes.check(read_meshes.read_stl(write_stl(path, *mesh)))]
 
 
 def test_a_right_mesh_passes(tmp_path: Path) -> None:
@@ -101,14 +103,14 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path, content: bytes | None) -> No
     path = write_stl(tmp_path / "B1.stl", *prism(unit().outline))
     path.write_bytes(path.read_bytes()[:999] if content is None else content)
     with pytest.raises(UserError, match="cannot be read back"):
-        solids.read_stl(path)
+        read_meshes.read_stl(path)
 
 
 def test_volume_is_area_times_height(tmp_path: Path) -> None:
-    solid = solids.read_stl(write_stl(tmp_path / "B1.stl", *prism(unit().outline)))
-    assert list(solids.volume(solid, [0.0, 4.0, 8.1])) == []
+    solid = read_meshes.read_stl(write_stl(tmp_path / "B1.stl", *prism(unit().outline)))
+    assert list(read_meshes.volume(solid, [0.0, 4.0, 8.1])) == []
     assert solid.mesh.volume == pytest.approx(unit().outline.area * 8.1, rel=1e-5)
-    (fault,) = solids.volume(solid, [0.0, 8.0])
+    (fault,) = read_meshes.volume(solid, [0.0, 8.0])
     assert "area times height" in fault.what
 
 
@@ -170,7 +172,7 @@ OUTLINES: dict[str, tuple[Callable[[Polygon], Polygon], str]] = {
 def faults_of(made: Polygon) -> list[str]:
     one = unit()
     ligaments = sorted(slot.vertex for slot in one.slots)
-    shape = Shape(one.label, Path("B1.stl"), one.design, made, ligaments)
+    shape = MadeOutline(one.label, Path("B1.stl"), one.design, made, ligaments)
     return [f"{fault.part}: {fault.what}" for fault in corners.check(shape, ASKED)]
 
 
@@ -193,7 +195,8 @@ def plate() -> tuple[dict[str, Mesh], dict[str, tuple[float, float]]]:
 
 def plate_faults(path: Path) -> list[str]:
     return [
-        f"{fault.part}: {fault.what}" for fault in plates.check_plate(solids.read_3mf(path), PRINT)
+        f"{fault.part}: {fault.what}"
+        for fault in plate_checks.check_plate(read_meshes.read_3mf(path), PRINT)
     ]
 
 
@@ -233,11 +236,11 @@ def test_a_broken_object_is_caught_on_its_plate(tmp_path: Path) -> None:
 def test_other_units_than_millimetres_are_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate(), unit="inch")
     with pytest.raises(UserError, match="not millimeter"):
-        solids.read_3mf(path)
+        read_meshes.read_3mf(path)
 
 
 def test_half_a_3mf_is_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate())
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(UserError, match="cannot be read back"):
-        solids.read_3mf(path)
+        read_meshes.read_3mf(path)

@@ -10,8 +10,9 @@ import pytest
 from PIL import Image
 from shapely import LineString, Point, box
 
-from pipeline.errors import UserError
-from pipeline.fabrication.checks.faults import PICTURES, Fault, stop
+from pipeline.fabrication.readback import Fault, stop
+from pipeline.fabrication.readback.faults import PICTURES
+from pipeline.runtime import UserError
 
 THIN = Fault(
     "unit C7",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.fabrication.checks.package import check_package
+from pipeline.fabrication.checks import check_package
 from tests.pipeline.fabrication import built
 
 OPTIONS: dict[str, dict[str, object]] = {

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapely import STRtree, box
 
-from pipeline.fabrication.packing import TooLargeError, pack
+from pipeline.fabrication.plates import TooLargeError, pack
 
 SHEET, MARGIN, GAP = (100.0, 60.0), 5.0, 2.0
 lengths = st.floats(0.5, 50.0)

@@ -11,17 +11,15 @@ import numpy as np
 import pytest
 from shapely import MultiPolygon, Polygon
 
-from pipeline.fabrication.candidates import Corner
-from pipeline.fabrication.checks import corners, placed
-from pipeline.fabrication.checks.corners import Shape
-from pipeline.fabrication.checks.reading import read
-from pipeline.fabrication.checks.wanted import Wanted
-from pipeline.fabrication.naming import LETTERS
-from pipeline.fabrication.network import Network
-from pipeline.fabrication.parts import Unit
-from pipeline.fabrication.units import unit
-from pipeline.fabrication.unmade import UnmadeError
-from pipeline.problem.fabrication import Fabrication
+from pipeline.fabrication.checks import assembled_specimen, slot_checks
+from pipeline.fabrication.checks.expected_parts import Wanted
+from pipeline.fabrication.checks.slot_checks import MadeOutline
+from pipeline.fabrication.engraving.read_strokes import read
+from pipeline.fabrication.parts import LETTERS, Unit, UnmadeError
+from pipeline.fabrication.units.slot_candidates import Corner
+from pipeline.fabrication.units.specimen_units import unit
+from pipeline.fabrication.units.unit_network import UnitNetwork
+from pipeline.problem.sections import Fabrication
 
 FILE = Path(__file__).parents[2] / "data/slender_units.json"
 SLENDER = json.loads(FILE.read_text(encoding="utf-8"))
@@ -31,7 +29,7 @@ ASKED = Fabrication()
 
 def made(found: dict[str, Any], letters: str = LETTERS) -> Unit:
     """The unit beside its neighbours, some of which have grown."""
-    net = Network(
+    net = UnitNetwork(
         (0,), {0: Polygon(found["corners"])}, {0: found["label"]}, {0: (0, 0)}, (), (), ()
     )
     slotted = [
@@ -46,8 +44,8 @@ def made(found: dict[str, Any], letters: str = LETTERS) -> Unit:
 def test_a_slender_unit_is_made_without_a_fault(found: dict[str, Any]) -> None:
     one = made(found)
     vertices = [vertex for vertex, *_ in found["slots"]]
-    shape = Shape(one.label, FILE, one.design, one.outline, vertices)
-    assert [fault.what for fault in corners.check(shape, ASKED)] == []
+    shape = MadeOutline(one.label, FILE, one.design, one.outline, vertices)
+    assert [fault.what for fault in slot_checks.check(shape, ASKED)] == []
     gaps = [one.outline.distance(Polygon(ring)) for ring in found["neighbours"]]
     assert min(gaps, default=1.0) >= ASKED.minimum_gap - 1e-4
 
@@ -57,7 +55,7 @@ def test_a_unit_that_grew_to_twice_its_size_is_found_in_its_place() -> None:
     thin, beside = Polygon([(0, 0), (9, 0), (9, 1), (0, 1)]), Polygon([(0, 4), (9, 4), (9, 9)])
     grown = thin.buffer(1.0, join_style="mitre")
     solid = SimpleNamespace(section=lambda _height: MultiPolygon([beside, grown]))
-    found = placed.shapes(solid, Wanted({"A1": thin, "A2": beside}, {}, ()), ASKED)  # type: ignore[arg-type]
+    found = assembled_specimen.shapes(solid, Wanted({"A1": thin, "A2": beside}, {}, ()), ASKED)  # type: ignore[arg-type]
     assert found["A1"].equals(grown)
     assert found["A2"].equals(beside)
 

@@ -7,12 +7,12 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Polygon
 
-from pipeline.fabrication.candidates import Corner, side_truncations
-from pipeline.fabrication.outlines import cut, filleted, lugs, room_to_grow
 from pipeline.fabrication.parts import Slot
-from pipeline.fabrication.slots import NoRoomError, place
-from pipeline.problem.fabrication import Fabrication
-from pipeline.problem.quantities import SIM_UNITS
+from pipeline.fabrication.units.slot_candidates import Corner, side_truncations
+from pipeline.fabrication.units.slots import NoRoomError, place
+from pipeline.fabrication.units.unit_outlines import cut, filleted, lugs, room_to_grow
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
 
 ASKED = Fabrication()
 HAIR = 1e-4

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pipeline.tracking import importing
-from pipeline.tracking.follow import Track, follow
-from pipeline.tracking.specimen import Specimen, of_design
-from pipeline.tracking.video import frames
+from pipeline.tracking.frames import frames, import_video
+from pipeline.tracking.geometry import SpecimenOutlines, of_design
+from pipeline.tracking.motion import Track, follow
 
 CLIPS = Path(__file__).parents[2] / "data/tracking"
 
@@ -19,7 +18,7 @@ CLIPS = Path(__file__).parents[2] / "data/tracking"
 class Tracked(NamedTuple):
     """A clip, tracked, with the errors in px, px and deg."""
 
-    specimen: Specimen
+    specimen: SpecimenOutlines
     track: Track
     error: np.ndarray
 
@@ -30,9 +29,9 @@ def tracked() -> Callable[[str], Tracked]:
 
     @cache
     def of(name: str) -> Tracked:
-        described = importing.description(CLIPS / f"{name}.yaml")
-        specimen = of_design(importing.design(described))
-        video = importing.video_of(CLIPS / f"{name}.yaml")
+        described = import_video.description(CLIPS / f"{name}.yaml")
+        specimen = of_design(import_video.design(described))
+        video = import_video.video_of(CLIPS / f"{name}.yaml")
         track = follow(frames(video), specimen, described["approx_px_per_mm"])
         truth = np.load(CLIPS / f"{name}_truth.npz")["displacement"]
         scale = np.array([1 / track.calibration.pixel] * 2 + [180 / np.pi])

@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.tracking import importing
-from pipeline.tracking.video import frames
+from pipeline.tracking.frames import frames, import_video
 from tests.pipeline.tracking.conftest import CLIPS, Tracked
 
 Clips = Callable[[str], Tracked]
@@ -48,7 +47,7 @@ def test_the_uncertainty_is_of_the_size_of_the_error(tracked: Clips) -> None:
 def test_speckled_units_agree_with_an_independent_correlation(tracked: Clips) -> None:
     """OpenCV's ECC on a crop about each of some units, as a Euclidean motion of the image."""
     found = tracked("e_speckle")
-    video = importing.video_of(CLIPS / "e_speckle.yaml")
+    video = import_video.video_of(CLIPS / "e_speckle.yaml")
     images = [frame.image for frame in frames(video)]
     camera, last = found.track.calibration.camera, len(images) - 1
     everywhere = np.full_like(images[0], 255)

@@ -10,20 +10,19 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.errors import UserError
-from pipeline.tracking import importing
-from pipeline.tracking.find import placed
-from pipeline.tracking.follow import follow
-from pipeline.tracking.specimen import Specimen, of_design
-from pipeline.tracking.video import BrokenOffError, Frame, frames
+from pipeline.runtime import UserError
+from pipeline.tracking.detect import placed
+from pipeline.tracking.frames import BrokenOffError, Frame, frames, import_video
+from pipeline.tracking.geometry import SpecimenOutlines, of_design
+from pipeline.tracking.motion import follow
 from tests.pipeline.tracking.conftest import CLIPS
 
 SCALE = 2.74
 
 
 @pytest.fixture(scope="module")
-def specimen() -> Specimen:
-    return of_design(importing.design(importing.description(CLIPS / "f_silhouette.yaml")))
+def specimen() -> SpecimenOutlines:
+    return of_design(import_video.design(import_video.description(CLIPS / "f_silhouette.yaml")))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ def timed(images: list[np.ndarray]) -> list[Frame]:
 
 
 def test_units_are_found_again_after_a_black_frame(
-    specimen: Specimen, clip: list[np.ndarray]
+    specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
     shown = timed([*clip[:2], np.zeros_like(clip[0]), *clip[2:]])
     track = follow(iter(shown), specimen, SCALE)
@@ -46,7 +45,7 @@ def test_units_are_found_again_after_a_black_frame(
 
 
 def test_a_video_from_behind_has_the_same_motions(
-    specimen: Specimen, clip: list[np.ndarray]
+    specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
     plain = follow(iter(timed(clip)), specimen, SCALE)
     mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in clip]
@@ -109,7 +108,7 @@ def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])
 def test_what_was_tracked_before_an_end_is_kept(
-    specimen: Specimen, clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
+    specimen: SpecimenOutlines, clip: list[np.ndarray], error: BrokenOffError | KeyboardInterrupt
 ) -> None:
     def shown() -> Iterator[Frame]:
         yield from timed(clip[:2])
@@ -120,7 +119,9 @@ def test_what_was_tracked_before_an_end_is_kept(
     assert track.displacement.shape[0] == len(track.time) == len(track.quality) == 2
 
 
-def test_a_specimen_that_jumped_is_found_again(specimen: Specimen, clip: list[np.ndarray]) -> None:
+def test_a_specimen_that_jumped_is_found_again(
+    specimen: SpecimenOutlines, clip: list[np.ndarray]
+) -> None:
     """By half the distance of two units, where a neighbour is as near as the unit itself."""
     moved = cv2.getRotationMatrix2D((384, 384), 21.0, 1.0) + np.array([[0, 0, -9.0], [0, 0, 17.0]])
     jumped = cv2.warpAffine(clip[0], moved, (768, 768), borderValue=205)

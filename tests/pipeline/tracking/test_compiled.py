@@ -11,7 +11,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 MODULES = ("blocks", "cells", "dense", "patch", "spline")
-NAMES = [*(f"pipeline.tracking.{name}" for name in MODULES), "pipeline.lab.coverage"]
+NAMES = [*(f"pipeline.tracking.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
 
 
 def loops(module: ModuleType) -> Iterator[CPUDispatcher]:
@@ -32,5 +32,5 @@ def test_a_compiled_loop_calls_inlined_ones_only(name: str) -> None:
 
 
 def test_there_are_such_calls() -> None:
-    patch = importlib.import_module("pipeline.tracking.patch")
+    patch = importlib.import_module("pipeline.tracking.fit.patch_correlation")
     assert len(list(called(patch.fit))) > 2

@@ -6,30 +6,28 @@ import numpy as np
 import pytest
 import shapely
 
-from pipeline.lab import sensor
-from pipeline.lab.faces import marks
-from pipeline.lab.scene import Scene
-from pipeline.lab.setup import Virtual
-from pipeline.lab.viewpoint import viewpoint
-from pipeline.tracking import importing
-from pipeline.tracking.calibrate import Setup
-from pipeline.tracking.depth import Depth, depth_of
-from pipeline.tracking.follow import follow
-from pipeline.tracking.specimen import of_design
-from pipeline.tracking.video import Frame
-from tests.pipeline.lab.conftest import GRID
+from pipeline.problem.sections import VirtualRecording
+from pipeline.tracking.frames import Frame, import_video
+from pipeline.tracking.geometry import Depth, depth_of, of_design
+from pipeline.tracking.motion import follow
+from pipeline.tracking.reference_frame import Setup
+from pipeline.virtual_lab import sensor
+from pipeline.virtual_lab.camera_pose import viewpoint
+from pipeline.virtual_lab.face_marks import marks
+from pipeline.virtual_lab.film_scene import FilmScene
+from tests.pipeline.virtual_lab.conftest import GRID
 
-ASKED = Virtual.model_validate(
+ASKED = VirtualRecording.model_validate(
     {"camera": {"image": [320, 320], "tilt": ["2 deg", "-1 deg"], "distortion": [0.01, 0.0]}}
 )
 MIDDLE = np.array([48.0, 40.0])  # that the camera looks at; the specimen is off axis
 
 
-def filmed(frames: int) -> tuple[Scene, list[np.ndarray], list[Frame]]:
-    specimen = of_design(importing.design({**GRID, "grid": [5, 5]}))
+def filmed(frames: int) -> tuple[FilmScene, list[np.ndarray], list[Frame]]:
+    specimen = of_design(import_video.design({**GRID, "grid": [5, 5]}))
     view = viewpoint(ASKED.camera, MIDDLE)
     none = np.empty((0, 2, 2), int)
-    scene = Scene(specimen, none, marks(specimen, "bare", ASKED.look, 0), ASKED.look, view)
+    scene = FilmScene(specimen, none, marks(specimen, "bare", ASKED.look, 0), ASKED.look, view)
     place = np.round(specimen.centre / 15)
     sign = np.where(place.sum(axis=1) % 2 == 0, -0.3, 0.3)
     full = np.column_stack([-0.04 * specimen.centre[:, 0], 0.02 * specimen.centre[:, 1], sign])

@@ -4,9 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.tracking import camera as cameras
-from pipeline.tracking.camera import Camera
-from pipeline.tracking.rigid import rigid_motion, robust_motion
+from pipeline.tracking.geometry import Camera, rigid_motion, robust_motion
+from pipeline.tracking.geometry import camera as cameras
 
 seeds = st.integers(0, 2**32 - 1)
 

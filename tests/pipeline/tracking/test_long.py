@@ -7,11 +7,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from pipeline.tracking import importing
-from pipeline.tracking.follow import follow
-from pipeline.tracking.specimen import of_design
-from pipeline.tracking.tracker import Found, Tracker
-from pipeline.tracking.video import Frame, frames
+from pipeline.tracking.frames import Frame, frames, import_video
+from pipeline.tracking.geometry import of_design
+from pipeline.tracking.motion import follow
+from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
 from tests.pipeline.tracking.conftest import CLIPS
 
 _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
@@ -19,12 +18,12 @@ _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
 
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:
     """Bytes that the frames of a clip take at most, which is looped; each is fitted once."""
-    described = importing.description(CLIPS / "f_silhouette.yaml")
+    described = import_video.description(CLIPS / "f_silhouette.yaml")
     images = [frame.image for frame in frames(CLIPS / "f_silhouette.mp4")][:3]
-    fitted: list[Found] = []
+    fitted: list[TrackedFrame] = []
     step, count = Tracker.step, iter(range(length))
 
-    def once(self: Tracker, image: np.ndarray) -> Found:
+    def once(self: Tracker, image: np.ndarray) -> TrackedFrame:
         place = next(count) % len(images)
         if place == len(fitted):
             fitted.append(step(self, image))
@@ -37,7 +36,7 @@ def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:
         if not tracemalloc.is_tracing():
             tracemalloc.start()
 
-    made = follow(shown, of_design(importing.design(described)), 2.7, tell)
+    made = follow(shown, of_design(import_video.design(described)), 2.7, tell)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     monkeypatch.undo()

@@ -1,4 +1,4 @@
-"""The first look at a video, by `pipeline.track init`."""
+"""The first look at a video, by `pipeline.stages.track init`."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline import datasets, track
-from pipeline.tracking import importing, proposal, recording
-from pipeline.tracking.find import placed
-from pipeline.tracking.video import frames
+from pipeline import datasets
+from pipeline.stages import track
+from pipeline.tracking.detect import placed
+from pipeline.tracking.frames import frames, import_video, recording
+from pipeline.tracking.reference_frame import proposal
 from tests.pipeline.tracking.conftest import CLIPS
 
 
 def first(name: str) -> np.ndarray:
-    return next(frames(importing.video_of(CLIPS / f"{name}.yaml"))).image
+    return next(frames(import_video.video_of(CLIPS / f"{name}.yaml"))).image
 
 
 @pytest.mark.parametrize(
@@ -24,8 +25,8 @@ def first(name: str) -> np.ndarray:
     [("b_harmonic", "dots"), ("e_speckle", "speckle"), ("f_silhouette", "bare")],
 )
 def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
-    described = importing.description(CLIPS / f"{name}.yaml")
-    found = proposal.propose(first(name), importing.design(described))
+    described = import_video.description(CLIPS / f"{name}.yaml")
+    found = proposal.propose(first(name), import_video.design(described))
     assert found.kind == kind
     assert len(found.sighting.unit) > 0.98 * found.specimen.count
     assert found.pixel_size == pytest.approx(1 / described["approx_px_per_mm"], rel=0.01)
@@ -33,7 +34,7 @@ def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
 
 
 def test_a_mirrored_video_is_seen_as_such() -> None:
-    design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
+    design = import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))
     found = proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
     assert "mirrored" in placed(found.sighting.camera)
 
@@ -59,7 +60,7 @@ def test_a_proposal_is_a_recording_and_a_picture(
 
 def test_a_turned_video_is_seen_as_such() -> None:
     """The top row is left out of the picture, so that up and down can be told apart."""
-    design = importing.design(importing.description(CLIPS / "f_silhouette.yaml"))
+    design = import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))
     image = first("f_silhouette")
     found = proposal.propose(image, design, 2.74)
     height = found.specimen.centre[:, 1]

@@ -5,17 +5,18 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.tracking import importing
-from pipeline.tracking.find import blobs, placed, sight
-from pipeline.tracking.specimen import Specimen, of_design
-from tests.pipeline.lab.conftest import GRID
+from pipeline.tracking.detect import placed, sight
+from pipeline.tracking.detect.blobs import blobs
+from pipeline.tracking.frames import import_video
+from pipeline.tracking.geometry import SpecimenOutlines, of_design
 from tests.pipeline.tracking.conftest import CLIPS
+from tests.pipeline.virtual_lab.conftest import GRID
 
 PIXEL = 0.365 / 0.66  # mm: of the camera, and of the picture made smaller
 
 
-def specimen() -> Specimen:
-    return of_design(importing.design({**GRID, "grid": [24, 16]}))
+def specimen() -> SpecimenOutlines:
+    return of_design(import_video.design({**GRID, "grid": [24, 16]}))
 
 
 def picture(name: str) -> np.ndarray:

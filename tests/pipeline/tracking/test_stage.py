@@ -6,7 +6,8 @@ import av
 import numpy as np
 import pytest
 
-from pipeline import datasets, track
+from pipeline import datasets
+from pipeline.stages import track
 from tests.pipeline.tracking.conftest import CLIPS
 
 
@@ -183,7 +184,7 @@ def test_a_track_is_kept_where_its_log_is_of_another_time(
         (["frobnicate", "a.mp4"], "no such command"),
         (["init", "a.mp4"], "--design is wanted"),
         (["a.yaml"], "--out is wanted"),
-        (["a.mp4", "--out", "a.nc"], "pipeline.track init a.mp4"),
+        (["a.mp4", "--out", "a.nc"], "pipeline.stages.track init a.mp4"),
     ],
 )
 def test_a_command_that_lacks_something_is_told_what(

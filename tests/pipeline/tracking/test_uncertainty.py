@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.tracking import uncertainty
-from pipeline.tracking.arrays import Floats
+from pipeline.runtime import Floats
+from pipeline.tracking.motion import uncertainty
 
 SIDE = 15
 PLACES = [(10.0 * i, 10.0 * j) for j in range(SIDE) for i in range(SIDE)]

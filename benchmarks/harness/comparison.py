@@ -1,0 +1,101 @@
+"""A benchmark beside the last one that was stored: ratios to a yardstick, never seconds.
+
+The yardstick is a fixed job of LAPACK and of the interpreter, timed on the same core just before,
+so that another machine, or the same one with other company, is compared fairly.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cho_factor
+
+from benchmarks.harness.records import BenchmarkReport, CandidateResult
+from benchmarks.harness.storage import ROOT
+from benchmarks.harness.text_table import error_columns
+from pipeline.runtime import write_atomically
+
+STORED = ROOT / "tests/data/benchmarks.json"
+WORSE = 1.15
+"""Ratio from which a change is told."""
+ROUNDING = 1e-10
+"""Errors below are rounding: how they change tells nothing."""
+_ROUNDS, _SIZE, _LOOPS = 5, 400, 100_000
+
+Record = dict[str, Any]
+
+
+def yardstick() -> float:
+    """Processor time of the fixed job, the least of some runs, s."""
+    square = np.random.default_rng(0).normal(size=(_SIZE, _SIZE))
+    matrix = square @ square.T + _SIZE * np.eye(_SIZE)
+
+    def job() -> float:
+        start = time.process_time()
+        for _ in range(5):
+            cho_factor(matrix)
+        sum(n % 7 for n in range(_LOOPS))
+        return time.process_time() - start
+
+    return min(job() for _ in range(_ROUNDS))
+
+
+def record(report: BenchmarkReport, yard: float) -> Record:
+    """What is kept of a report: times in yardsticks, errors, machine and commit."""
+    made = report.machine
+    kinds = error_columns(report.outcomes)
+    return {
+        **{key: made[key] for key in ("processor", "commit", "date")},
+        "candidates": {
+            one.name: {"time": one.seconds / yard, "errors": _errors(one, kinds)}
+            for one in report.outcomes
+            if one.cpu_s and not one.stored
+        },
+    }
+
+
+def _errors(one: CandidateResult, kinds: list[str]) -> dict[str, float]:
+    return {kind: one.error(kind) for kind in kinds if np.isfinite(one.error(kind))}
+
+
+def stored(path: Path = STORED) -> dict[str, Record]:
+    """The records kept, by benchmark."""
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+
+
+def keep(name: str, made: Record, path: Path = STORED) -> None:
+    """Stores the record of a benchmark beside those of the others."""
+    records = dict(sorted({**stored(path), name: made}.items()))
+    with write_atomically(path) as aside:
+        aside.write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
+
+
+def worse(now: Record, before: Mapping[str, Any]) -> list[str]:
+    """What got slower or less accurate by more than 15 %, a line each."""
+    lines = []
+    for name, found in now["candidates"].items():
+        known = before["candidates"].get(name)
+        if known is None:
+            continue
+        if found["time"] > WORSE * known["time"]:
+            lines.append(f"{name}: slower, {found['time'] / known['time']:.2f} times the time")
+        for kind, error in found["errors"].items():
+            was = max(known["errors"].get(kind, np.inf), ROUNDING)
+            if error > WORSE * was:
+                lines.append(f"{name}: {kind} less accurate, {error / was:.2f} times the error")
+    return lines
+
+
+def told(name: str, now: Record, path: Path = STORED) -> str:
+    """The comparison with what is stored, in words."""
+    before = stored(path).get(name)
+    if before is None:
+        return "  nothing stored to compare with: --keep stores this"
+    origin = f"{before['date'][:10]}, {before['processor']}, commit {before['commit'][:10]}"
+    lines = worse(now, before) or ["nothing got slower or less accurate by more than 15 %"]
+    return "\n".join(f"  {line} (against {origin})" for line in lines)

@@ -1,0 +1,5 @@
+"""Holds the methods compared: own solvers, SciPy, diffrax."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,2 @@
+from . import jax_baseline as jax_baseline
+from . import selection as selection

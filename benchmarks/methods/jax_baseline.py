@@ -1,0 +1,179 @@
+"""What one would write otherwise: the law in JAX, explicit Runge-Kutta by diffrax and its adjoint.
+
+It is the same law (``sim.energy.ligament``), vectorised over ligaments and assembled by segment
+sums; driven
+and clamped dofs are prescribed by elimination. Statics are done as the authors do them: as damped
+dynamics of a scene whose mass is scaled up, slow enough to end near the equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from benchmarks.harness import Run, Sample
+from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
+from sim.scene import Objective, Scene, structure
+from sim.solvers import PrescribedMotion, held_values
+from sim.structure import Parameters
+
+Force = Callable[[Parameters, Array], Array]
+Floats = NDArray[np.float64]
+Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
+"""Loss of a design vector, and the solver's counts."""
+
+
+@dataclass(frozen=True)
+class RungeKutta:
+    """Settings of the baseline.
+
+    Attributes:
+        rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike).
+        max_steps: bound on the steps; the adjoint keeps about its square root in checkpoints.
+        solver: name of a method of diffrax.
+        adjoint: of diffrax, for the gradient.
+    """
+
+    rtol: float | Array = 1e-8
+    atol: float | Array = 1e-4
+    max_steps: int = 2**17
+    solver: str = "Dopri5"
+    adjoint: str = "RecursiveCheckpointAdjoint"
+
+
+def force(scene: Scene) -> Force:
+    """Function (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
+    pairs = scene.lattice.ligament_units
+
+    def energy(ends: Array, values: tuple[Array, ...]) -> Array:
+        arm, vector, void, law, contact = values
+        strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
+        angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
+        return strain + jnp.sum(
+            contact_energy(angles, ContactLaw(contact, scene.barrier, scene.cutoff))
+        )
+
+    of_ends = jax.vmap(jax.grad(energy))
+
+    def assembled(values: Parameters, motion: Array) -> Array:
+        parts = (values.arm, values.vector, values.void, values.law, values.contact)
+        each = of_ends(motion[pairs], parts)
+        return jax.ops.segment_sum(each.reshape(-1, 3), pairs.ravel(), scene.lattice.n_units)
+
+    return assembled
+
+
+def field(
+    scene: Scene, drive: PrescribedMotion
+) -> tuple[Callable[..., Any], Callable[[Array, Array], Array]]:
+    """Right-hand side for the free dofs, and the map from a time and free dofs to all motion."""
+    top = scene.topology
+    gradient, free = force(scene), np.sort(top.free_dofs)
+
+    def motion(time: Array, displacement: Array) -> Array:
+        held = held_values(top.held, drive.units, drive.motion, time[None])[0]
+        rest = jnp.zeros(top.n_dofs)
+        return rest.at[top.held].set(held).at[free].set(displacement).reshape(-1, 3)
+
+    def rates(time: Array, state: tuple[Array, Array], values: Parameters) -> tuple[Array, Array]:
+        displacement, velocity = state
+        pull = gradient(values, motion(time, displacement)).ravel()[free]
+        resistance = values.damping.ravel()[free] * velocity
+        return velocity, -(pull + resistance) / values.mass.ravel()[free]
+
+    return rates, motion
+
+
+def respond(
+    scene: Scene, drive: PrescribedMotion, method: RungeKutta, times: Array
+) -> Callable[[Parameters], tuple[Array, dict[str, Array]]]:
+    """Function from parameters to the motion (n_times, n_units, 3) and the solver's counts."""
+    rates, motion = field(scene, drive)
+    n_free = scene.topology.n_free
+    zero = (jnp.zeros(n_free), jnp.zeros(n_free))
+
+    def of_parameters(values: Parameters) -> tuple[Array, dict[str, Array]]:
+        solution = diffrax.diffeqsolve(
+            diffrax.ODETerm(rates),
+            getattr(diffrax, method.solver)(),
+            t0=0.0,
+            t1=scene.duration,
+            dt0=None,
+            y0=zero,
+            args=values,
+            saveat=diffrax.SaveAt(ts=times),
+            stepsize_controller=diffrax.PIDController(rtol=method.rtol, atol=method.atol),
+            adjoint=getattr(diffrax, method.adjoint)(),
+            max_steps=method.max_steps,
+        )
+        counts = {
+            "steps": solution.stats["num_accepted_steps"],
+            "rejected": solution.stats["num_rejected_steps"],
+        }
+        return jax.vmap(motion)(times, solution.ys[0]), counts
+
+    return of_parameters
+
+
+def loss(
+    scene: Scene,
+    case: int,
+    method: RungeKutta,
+    times: Floats,
+    measure: Objective,
+) -> Loss:
+    """Map from a design vector to the loss of one load case, differentiable, and counts.
+
+    Args:
+        scene: the scene.
+        case: number of the load case.
+        method: settings.
+        times: (n_times,) of the saved samples, s.
+        measure: the loss (1,) of motions (1, n_times, n_units, 3).
+    """
+    of_design = structure(scene)
+    of_parameters = respond(scene, scene.drives[case], method, jnp.asarray(times))
+
+    def of_case(design: Array) -> tuple[Array, dict[str, Array]]:
+        values = of_design(design)
+        motion, counts = of_parameters(values)
+        return measure(motion[None], values)[0], counts
+
+    return of_case
+
+
+def prepare_loss(of_case: Loss, n_variables: int) -> Run:
+    """Compiled run of the loss alone at the initial design."""
+    start = jnp.zeros(n_variables)
+    compiled = jax.jit(of_case).lower(start).compile()
+
+    def run() -> Sample:
+        value, counts = compiled(start)
+        return Sample({"loss": np.asarray(value)}, _numbers(counts))
+
+    return run
+
+
+def prepare_gradient(of_case: Loss, n_variables: int) -> Run:
+    """Compiled run of loss and gradient at the initial design."""
+    start = jnp.zeros(n_variables)
+    compiled = jax.jit(jax.value_and_grad(of_case, has_aux=True)).lower(start).compile()
+
+    def run() -> Sample:
+        (value, counts), gradient = compiled(start)
+        values = {"loss": np.asarray(value), "gradient": np.asarray(gradient)}
+        return Sample(values, _numbers(counts))
+
+    return run
+
+
+def _numbers(counts: dict[str, Array]) -> dict[str, int]:
+    return {name: int(count) for name, count in counts.items()}

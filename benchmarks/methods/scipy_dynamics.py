@@ -1,0 +1,158 @@
+"""scipy's integrators as ladders, and the reference solution by one of them.
+
+The right-hand side is the project's compiled force, called from Python at every stage.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse as sp
+from scipy.integrate import solve_ivp
+
+from benchmarks.harness import Floats, Run, Sample, SettingLadder, Task
+from benchmarks.methods.own_solvers import gradient_of
+from benchmarks.scenes import LoadCase, case
+from sim.energy import gradient, system_of
+from sim.scene import structure
+from sim.solvers import Harmonic
+from sim.structure import ConcreteParameters
+from sim.vibration import linearised
+
+IMPLICIT = ("Radau", "BDF")
+REFERENCE, TIGHT = "DOP853", 1e-11
+APART = 3e-4
+"""Distance in the design (mm) of the two runs whose difference is the reference slope."""
+
+
+class FirstOrderSystem:
+    """The free dofs of a case in time, y = (u, v), for scipy.
+
+    Args:
+        posed: the case; its drive must be harmonic.
+        values: parameters of the structure.
+    """
+
+    def __init__(self, posed: LoadCase, values: ConcreteParameters) -> None:
+        scene = posed.scene
+        (drive,) = scene.motions
+        assert isinstance(drive, Harmonic)
+        self.topology, self.values, self.drive = scene.topology, values, drive
+        self.free = np.sort(self.topology.free_dofs)
+        driven = 3 * scene.driven
+        self._along_x, self._along_y = driven, driven + 1
+        self._system = system_of(self.topology, values)
+        self._turn = np.empty((self.topology.n_units, 4))
+        self._force = np.empty(self.topology.n_dofs)
+        self.mass = values.mass.ravel()[self.free]
+        self.damping = values.damping.ravel()[self.free]
+
+    def whole(self, time: float, free: Floats) -> Floats:
+        """All dofs (n_dofs,) at a time."""
+        motion = np.zeros(self.topology.n_dofs)
+        motion[self.free] = free
+        moved = _harmonic(self.drive, time)
+        motion[self._along_x] = moved * np.cos(self.drive.direction)
+        motion[self._along_y] = moved * np.sin(self.drive.direction)
+        return motion
+
+    def rates(self, time: float, state: Floats) -> Floats:
+        """Velocities and accelerations (2 n_free,)."""
+        u, v = np.split(state, 2)
+        gradient(self.whole(time, u), self._system, self._turn, self._force)
+        return np.concatenate([v, -(self._force[self.free] + self.damping * v) / self.mass])
+
+    def jacobian(self, time: float, state: Floats) -> sp.csc_array:
+        """Derivative (2 n_free, 2 n_free) of the rates."""
+        motion = self.whole(time, np.split(state, 2)[0]).reshape(-1, 3)
+        stiffness = linearised(self.topology, self.values, motion).stiffness
+        slow, one = sp.diags_array(-self.damping / self.mass), sp.eye_array(len(self.free))
+        return sp.csc_array(
+            sp.block_array([[None, one], [-sp.diags_array(1 / self.mass) @ stiffness, slow]])
+        )
+
+
+def _harmonic(drive: Harmonic, time: float) -> float:
+    shifted = time - drive.delay
+    wave = drive.amplitude * np.sin(2 * np.pi * drive.frequency * shifted)
+    rising = 1.0 if drive.rise is None else (1 + np.tanh(shifted / drive.rise)) / 2
+    return float(wave * rising)
+
+
+def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
+    """The explicit method and the two implicit ones; they have no gradient."""
+    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
+    return tuple(
+        SettingLadder(f"scipy {method}", partial(_prepare, name, method), rungs, tasks=("loss",))
+        for method in (REFERENCE, *IMPLICIT)
+    )
+
+
+def _prepare(name: str, method: str, tolerance: float, task: Task) -> Run:
+    del task
+    posed = case(name)
+
+    def run() -> Sample:
+        motion, work = _solve(posed, posed.values, method, tolerance)
+        return Sample(posed.results(*posed.measured(motion, posed.values)), work)
+
+    _warm(posed)
+    return run
+
+
+def _warm(posed: LoadCase) -> None:
+    rest = np.zeros(2 * posed.scene.topology.n_free)
+    motion = FirstOrderSystem(posed, posed.values)
+    motion.rates(0.0, rest)
+    motion.jacobian(0.0, rest)
+
+
+def _solve(
+    posed: LoadCase, values: ConcreteParameters, method: str, tolerance: float
+) -> tuple[Floats, dict[str, int]]:
+    """Motion (1, n_times, n_units, 3), and counts.
+
+    Raises:
+        ArithmeticError: scipy gave up.
+    """
+    motion = FirstOrderSystem(posed, values)
+    more = {"jac": motion.jacobian} if method in IMPLICIT else {}
+    found = solve_ivp(
+        motion.rates,
+        (0.0, posed.scene.duration),
+        np.zeros(2 * len(motion.free)),
+        method=method,
+        t_eval=posed.times,
+        rtol=tolerance,
+        atol=tolerance,
+        **more,
+    )
+    if not found.success:
+        raise ArithmeticError(found.message)
+    states = [
+        motion.whole(t, y[: len(motion.free)]) for t, y in zip(found.t, found.y.T, strict=True)
+    ]
+    work = {"forces": int(found.nfev), "factorisations": int(found.nlu)}
+    return np.stack(states).reshape(1, len(states), -1, 3), work
+
+
+def reference(name: str) -> Run:
+    """Motion, loss and slope by DOP853 at 1e-11; the whole gradient by our tightest adjoint."""
+    posed = case(name)
+    of_design = structure(posed.scene)
+
+    def loss(design: Floats) -> tuple[Floats, Floats]:
+        values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))
+        motion, _ = _solve(posed, values, REFERENCE, TIGHT)
+        return np.asarray(posed.objective(motion, values)[0]), motion
+
+    def run() -> Sample:
+        centre, motion = loss(0 * posed.direction)
+        ahead, behind = (loss(sign * APART * posed.direction)[0] for sign in (1, -1))
+        found = posed.results(centre, motion)
+        slope = (ahead - behind) / (2 * APART)
+        return Sample(found | {"slope": slope, "gradient": gradient_of(posed)}, {})
+
+    return run

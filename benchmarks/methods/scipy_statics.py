@@ -1,0 +1,181 @@
+"""scipy's ways to an equilibrium as ladders, and the reference by one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse.linalg as spla
+from jax import Array
+from scipy.optimize import NoConvergence, newton_krylov
+
+from benchmarks.harness import Floats, Run, Sample, SettingLadder, Task
+from benchmarks.methods.jax_baseline import force
+from benchmarks.scenes import LoadCase, case
+from sim.core import Ints
+from sim.energy import gradient, system_of
+from sim.scene import structure
+from sim.vibration import Linear, linearised
+
+TIGHT = 1e-11
+MAX_ITERATIONS, MAX_CUTS, PARTS = 12, 12, 10
+GROWTH = 1.5
+KRYLOV_ITERATIONS = 60
+
+
+class EquilibriumProblem:
+    """Forces on the free dofs of a case, and how often they were asked for."""
+
+    def __init__(self, posed: LoadCase) -> None:
+        scene = posed.scene
+        self.topology, self.values = scene.topology, posed.values
+        self.work = {"forces": 0, "factorisations": 0}
+        self.free, self.held = np.sort(self.topology.free_dofs), self.topology.held
+        self._system = system_of(self.topology, self.values)
+        self._turn = np.empty((self.topology.n_units, 4))
+        self._force = np.empty(self.topology.n_dofs)
+
+    def residual(self, state: Floats) -> tuple[Floats, float]:
+        """Force on the free dofs (n_free,), and the largest reaction; N and N mm.
+
+        Raises:
+            ArithmeticError: a void is closed beyond its barrier.
+        """
+        self.work["forces"] += 1
+        void = self.topology.smallest_void_angle(self.values.void, state.reshape(-1, 3))
+        if void <= self.topology.barrier:
+            raise ArithmeticError("units passed through each other")
+        gradient(state, self._system, self._turn, self._force)
+        return self._force[self.free], float(np.abs(self._force[self.held]).max())
+
+    def tangent(self, state: Floats) -> tuple[Linear, spla.SuperLU]:
+        """The linearised structure and the factor of its stiffness."""
+        self.work["factorisations"] += 1
+        made = linearised(self.topology, self.values, state.reshape(-1, 3))
+        return made, spla.splu(made.stiffness)
+
+
+def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
+    """Newton's method with SuperLU, and without a tangent; neither has a gradient."""
+    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
+    return (
+        SettingLadder(
+            "Newton, scipy splu", partial(_prepare, name, _newton), rungs, tasks=("loss",)
+        ),
+        SettingLadder(
+            "scipy newton_krylov", partial(_prepare, name, _krylov), rungs, tasks=("loss",)
+        ),
+    )
+
+
+def _prepare(name: str, method: Callable[..., Floats], tolerance: float, task: Task) -> Run:
+    del task
+    posed = case(name)
+    EquilibriumProblem(posed).tangent(np.zeros(posed.scene.topology.n_dofs))
+
+    def run() -> Sample:
+        balance = EquilibriumProblem(posed)
+        motion = _path(posed, partial(method, balance, tolerance))
+        return Sample(posed.results(*posed.measured(motion, posed.values)), balance.work)
+
+    return run
+
+
+def _path(posed: LoadCase, solve: partial[Floats]) -> Floats:
+    """States (1, n_times, n_units, 3) along the loads; increments are cut where they fail.
+
+    Raises:
+        ArithmeticError: not even small increments succeed.
+    """
+    (drive,), top = posed.scene.drives, posed.scene.topology
+    held = drive.values(top.held, np.concatenate([[0.0], posed.times]))
+    states = [np.zeros(top.n_dofs)]
+    for before, after in pairwise(held):
+        states.append(_between(states[-1], before, after, top.held, solve))
+    return np.stack(states[1:]).reshape(1, len(posed.times), -1, 3)
+
+
+def _between(
+    state: Floats, before: Floats, after: Floats, held: Ints, solve: partial[Floats]
+) -> Floats:
+    reached, part, cuts = 0.0, 1.0, 0
+    while reached < 1.0:
+        part = min(part, 1.0 - reached)
+        moved = np.zeros_like(state)
+        moved[held] = part * (after - before)
+        try:
+            state = solve(state, moved)
+        except (ArithmeticError, NoConvergence) as failed:
+            cuts, part = cuts + 1, part / 2
+            if cuts > MAX_CUTS:
+                why = "no convergence" if isinstance(failed, NoConvergence) else failed
+                raise ArithmeticError(f"gave up after {cuts} cut increments: {why}") from failed
+            continue
+        reached, part = reached + part, GROWTH * part
+    return state
+
+
+def _newton(balance: EquilibriumProblem, tolerance: float, state: Floats, moved: Floats) -> Floats:
+    """Full Newton steps, the first along the path's tangent.
+
+    Raises:
+        ArithmeticError: no convergence.
+    """
+    made, factor = balance.tangent(state)
+    force_, _ = balance.residual(state)
+    new = state + moved
+    new[balance.free] -= factor.solve(force_ + made.coupling @ moved[balance.held])
+    for _ in range(MAX_ITERATIONS):
+        force_, reaction = balance.residual(new)
+        if np.abs(force_).max() <= tolerance * max(reaction, 1e-3):
+            return new
+        new[balance.free] -= balance.tangent(new)[1].solve(force_)
+    raise ArithmeticError("no convergence")
+
+
+def _krylov(balance: EquilibriumProblem, tolerance: float, state: Floats, moved: Floats) -> Floats:
+    """Without a tangent, from the last state with the held dofs moved on."""
+
+    def unbalanced(free: Floats) -> Floats:
+        new = state + moved
+        new[balance.free] = free
+        return balance.residual(new)[0].copy()
+
+    reaction = max(balance.residual(state)[1], 1e-3)
+    new = state + moved
+    new[balance.free] = newton_krylov(
+        unbalanced, state[balance.free], f_tol=tolerance * reaction, maxiter=KRYLOV_ITERATIONS
+    )
+    return new
+
+
+def reference(name: str) -> Run:
+    """States by Newton with SuperLU to 1e-11; the gradient by JAX's derivatives of the law."""
+    posed = case(name)
+    balance = EquilibriumProblem(posed)
+    of_design, forces = structure(posed.scene), jax.vmap(force(posed.scene), in_axes=(None, 0))
+
+    def run() -> Sample:
+        motion = _path(posed, partial(_newton, balance, TIGHT))
+        measured = jax.value_and_grad(lambda moved: posed.objective(moved, posed.values)[0])
+        loss, bar = measured(jnp.asarray(motion))
+        pulls = np.zeros_like(motion[0]).reshape(len(posed.times), -1)
+        for pull, state, by_state in zip(
+            pulls, motion[0], np.asarray(bar)[0].reshape(pulls.shape), strict=True
+        ):
+            factor = balance.tangent(state.ravel())[1]
+            pull[balance.free] = factor.solve(by_state[balance.free])
+
+        def lagrangian(design: Array) -> Array:
+            values = of_design(design)
+            balanced = forces(values, jnp.asarray(motion[0])).reshape(pulls.shape)
+            return posed.objective(motion, values)[0] - jnp.vdot(pulls, balanced)
+
+        gradient_ = jax.grad(lagrangian)(jnp.zeros(posed.scene.space.n_variables))
+        return Sample(posed.results(loss, motion, gradient_), {})
+
+    return run

@@ -1,0 +1,13 @@
+from . import load_cases as load_cases
+from . import paper_scenes as paper_scenes
+from .load_cases import LoadCase as LoadCase
+from .load_cases import case as case
+from .load_cases import scene as scene
+from .paper_constants import BARRIER as BARRIER
+from .paper_constants import BIAS as BIAS
+from .paper_constants import CUTOFF as CUTOFF
+from .paper_constants import LIGAMENT as LIGAMENT
+from .paper_constants import MATERIAL as MATERIAL
+from .paper_constants import SPACING as SPACING
+from .paper_scenes import counted as counted
+from .paper_scenes import work_of as work_of

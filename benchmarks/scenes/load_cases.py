@@ -1,0 +1,160 @@
+"""The scenes that methods are compared on, each with one load case, at its initial design."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from pathlib import Path
+
+import jax
+import numpy as np
+from jax import Array
+
+from benchmarks.harness import Floats
+from benchmarks.scenes import paper_scenes
+from pipeline.posing import limits_of, scene_of
+from pipeline.problem.reading import load
+from sim.constraints import Limits
+from sim.scene import Objective, Scene, concrete_parameters, objective, sample_times, target_motion
+from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.structure import ConcreteParameters, Parameters, quads
+
+DIRECTION_SEED = 0
+CLOAK, REGION = np.array([7, 11, 13, 17]), np.array([6, 8, 16, 18])
+"""Of the small lattices: the units beside the middle one, and those at its corners."""
+STUDIES = {"fig2": "fig2", "fig4": "fig4", "fig5": "fig5", "fig6": "fig6_heart", "fig7": "fig7"}
+TITLES = {
+    "fig2": "Figure 2: 15 × 15 units shaken at 45° and 2 Hz for 1 s",
+    "fig4": "Figure 4: 15 × 15 units pushed by 15 mm in 10 load steps",
+    "fig5": "Figure 5: 15 × 15 units with a void, pushed by 15 mm in 20 load steps",
+    "fig6": "Figure 6: 30 × 30 units with a heart-shaped void, pushed by 30 mm in 20 load steps",
+    "fig7": "Figure 7: 24 × 24 units with a void, shaken at 30 Hz for 0.3 s",
+    "small_wave": "5 × 5 units shaken at 20 Hz for 0.05 s",
+    "small_push": "5 × 5 units pushed by 4 mm in 4 load steps",
+}
+
+
+@dataclass(frozen=True)
+class LoadCase:
+    """A scene with what is asked of it.
+
+    Attributes:
+        scene: with one load case.
+        target: (1, n_times, n_region, 3) motion to mimic, if there is one.
+    """
+
+    scene: Scene
+    target: Floats | None
+
+    @cached_property
+    def times(self) -> Floats:
+        """Times (n_times,) of the samples or load steps, s."""
+        return sample_times(self.scene)
+
+    @cached_property
+    def values(self) -> ConcreteParameters:
+        """Parameters of the initial structure."""
+        return concrete_parameters(self.scene, self.scene.lattice.vertices)
+
+    @cached_property
+    def objective(self) -> Objective:
+        """The loss (1,) of motions (1, n_times, n_units, 3)."""
+        return objective(self.scene, self.target)
+
+    @cached_property
+    def direction(self) -> Floats:
+        """Random signs (n_variables,): the direction in which slopes are compared."""
+        rng = np.random.default_rng(DIRECTION_SEED)
+        return rng.choice([-1.0, 1.0], self.scene.space.n_variables)
+
+    def measure(self, motion: Array, values: Parameters[Array]) -> tuple[Array, Array]:
+        """Loss of motions (1, n_times, n_units, 3), and the motions."""
+        return self.objective(motion, values)[0], motion
+
+    @cached_property
+    def measured(self) -> Callable[..., tuple[Array, Array]]:
+        """The same, compiled."""
+        return jax.jit(self.measure)
+
+    def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
+        """What is compared: region's motion by spacings, loss, gradient and its slope."""
+        spacing = self.scene.lattice.spacing
+        moved = np.asarray(motion)[0][:, self.scene.region]
+        found = {
+            "displacement": moved / np.array([spacing, spacing, 1.0]),
+            "loss": np.asarray(loss),
+        }
+        if gradient is not None:
+            gradient = np.asarray(gradient)
+            found |= {"gradient": gradient, "slope": np.asarray(gradient @ self.direction)}
+        return found
+
+
+@cache
+def case(name: str) -> LoadCase:
+    """The case of that name (a key of TITLES)."""
+    posed = scene(name)
+    return LoadCase(posed, None if posed.reference is None else target_motion(posed))
+
+
+def scene(name: str) -> Scene:
+    """Its scene."""
+    if name.startswith("small"):
+        return _small_wave() if name == "small_wave" else _small_push()
+    whole = replace(scene_of(load(_file(name)), _file(name).parent), symmetry="none")
+    return paper_scenes.one_case(whole, 45.0) if name == "fig2" else whole
+
+
+def symmetric(name: str) -> Scene:
+    """A scene in time with load cases that quarter turns take into one another."""
+    if name == "fig2":
+        return paper_scenes.fig2(symmetry="C4")
+    turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
+    return replace(scene(name), symmetry="C4", motions=turns, weights=np.full(2, 0.5))
+
+
+def designed(name: str) -> tuple[Scene, Limits]:
+    """A scene as it is designed, all load cases and symmetries, and what a design must keep to."""
+    if name.startswith("small"):
+        return scene(name), Limits(edge_length=5.0, block_angle=np.deg2rad(30.0), void_angle=0.0)
+    problem = load(_file(name))
+    return scene_of(problem, _file(name).parent), limits_of(problem)
+
+
+def _file(name: str) -> Path:
+    return paper_scenes.ROOT / f"experiments/{STUDIES[name]}/problem.yaml"
+
+
+def _small_wave() -> Scene:
+    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
+    corners = np.array([0, 4, 20, 24])
+    return replace(
+        paper_scenes.fig2(),
+        lattice=lattice,
+        clamped=held_dofs(corners, np.array([], dtype=np.int64)),
+        driven=np.array([12]),
+        motions=(Harmonic(1.0, 20.0, 0.3),),
+        weights=np.ones(1),
+        duration=0.05,
+        frequency=20.0,
+        cloak=CLOAK,
+        region=REGION,
+        samples=41,
+    )
+
+
+def _small_push() -> Scene:
+    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
+    left = 5 * np.arange(5)
+    return replace(
+        paper_scenes.fig4(),
+        lattice=lattice,
+        material=paper_scenes.fig2().material,
+        clamped=held_dofs(left, np.array([], dtype=np.int64)),
+        driven=left + 4,
+        motions=(LinearRamp(-4.0, 1.0),),
+        steps=4,
+        cloak=CLOAK,
+        region=REGION,
+    )

@@ -1,0 +1,132 @@
+"""The scenes that are measured, at their initial designs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.posing import scene_of
+from pipeline.problem.reading import load
+from sim.quasistatics import static_solver
+from sim.scene import Scene, StrainEnergyMimicking, concrete_parameters
+from sim.solvers import Harmonic, LinearRamp, Solver, TanhRamp, held_dofs, solve_case
+from sim.structure import Material, damping_of_ratio, quads
+from sim.time_integration import explicit, implicit
+
+Floats = NDArray[np.float64]
+ROOT = Path(__file__).resolve().parents[2]
+PUSH = 14.999907837380967
+"""Final displacement of the driven column, mm: the last value of the authors' ramp to 15 mm."""
+
+
+def fig2(**changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
+    """Figure 2 as the authors ran it, four load angles, without symmetry unless asked for."""
+    problem = ROOT / "experiments/fig2/problem.yaml"
+    scene = scene_of(load(problem), problem.parent)
+    plain: dict[str, Any] = {"symmetry": "none", "accuracy": "default", "integrator": "auto"}
+    return replace(scene, **{**plain, **changes})
+
+
+def one_case(scene: Scene, degrees: float) -> Scene:
+    """The scene with its load case of that direction alone."""
+    motions = [motion for motion in scene.motions if isinstance(motion, Harmonic)]
+    wanted = next(m for m in motions if np.isclose(float(m.direction), np.deg2rad(degrees)))
+    return replace(scene, motions=(wanted,), weights=np.ones(1))
+
+
+@cache
+def fig4() -> Scene:
+    """Figure 4's setting: pushed by a column, the region around the middle to be spared of strain.
+
+    Radii as in the paper's text: region 3 spacings, cloak up to 5. One load: the final one.
+    """
+    lattice = quads(15, 15, 15.0, 2.25, np.deg2rad(20.0))
+    distance = np.linalg.norm(lattice.site - lattice.site[112], axis=1)
+    left = 15 * np.arange(15)
+    return Scene(
+        lattice=lattice,
+        material=Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0),
+        barrier=float(np.deg2rad(-15.0)),
+        cutoff=float(np.deg2rad(-10.0)),
+        clamped=held_dofs(left, np.array([], dtype=np.int64)),
+        driven=left + 14,
+        motions=(LinearRamp(-PUSH, 1.0),),
+        weights=np.ones(1),
+        duration=1.0,
+        frequency=None,
+        static=True,
+        cloak=np.flatnonzero((distance > 45.0 + 1e-9) & (distance <= 75.0 + 1e-9)),
+        region=np.flatnonzero(distance <= 45.0 + 1e-9),
+        objective="strain_energy",
+    )
+
+
+def fig4_as_dynamics() -> Scene:
+    """The same as the authors solve it: density 1 tonne/mm^2, damped, pushed slowly over 3500 s."""
+    scene, duration = fig4(), 3500.0
+    damping = damping_of_ratio(0.0186, 1.0, 15.0, 1.19, 1.5)
+    return replace(
+        scene,
+        material=Material(1.0, 120.0, 1.19, 1.5, 1.5, *damping),
+        motions=(TanhRamp(-15.0, duration),),
+        duration=duration,
+        static=False,
+    )
+
+
+def final_energy(scene: Scene) -> StrainEnergyMimicking:
+    """Strain energy of the region in the last state, N mm."""
+    ligaments = scene.region_ligaments
+    units = scene.lattice.ligament_units[ligaments]
+    return StrainEnergyMimicking(ligaments, units, np.ones(1))
+
+
+def counted(scene: Scene, solver: Solver, cases: list[int]) -> dict[str, int]:
+    """Work of the forward solves of some load cases at the initial design."""
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    records = [solve_case(solver, values, scene.drives[case])[2] for case in cases]
+    total: dict[str, int] = {}
+    for record in records:
+        for what, count in work_of(record).items():
+            total[what] = total.get(what, 0) + count
+    return total
+
+
+def work_of(record: object) -> dict[str, int]:
+    """What the forward solve of one case did."""
+    match record:
+        case explicit.ExplicitRecord():
+            n_steps, n_kicks, _ = record.steps.drive.shape
+            return {"steps": n_steps, "forces": n_steps * n_kicks}
+        case static_solver.StaticRecord():
+            forces, factorisations, _, increments = (int(count) for count in record.counts)
+            return {"increments": increments, "forces": forces, "factorisations": factorisations}
+        case implicit.ImplicitRecord():
+            forces, factorisations, _ = (int(count) for count in record.counts)
+            n_steps = len(record.times) - 1
+            return {"steps": n_steps, "forces": forces, "factorisations": factorisations}
+    raise TypeError(f"a solver's record, not {type(record).__name__}")
+
+
+def by_variable(scene: Scene, stored: dict[str, Floats]) -> Floats:
+    """The authors' gradient (n_variables,), stored by shifts of horizontal and vertical ligaments.
+
+    Shift (i, j) of the horizontal ones moves the ligament between units (i - 1, j) and (i, j), of
+    the vertical ones that between (i, j - 1) and (i, j).
+    """
+    lattice = scene.lattice
+    right, top, left, bottom = lattice.group.reshape(15, 15, 4).transpose(2, 1, 0)
+    groups = {
+        "horizontal": np.concatenate([left, right[-1:]], axis=0),
+        "vertical": np.concatenate([bottom, top[:, -1:]], axis=1),
+    }
+    gradient = np.full((lattice.n_groups, 2), np.nan)
+    for kind, of_shift in groups.items():
+        free = stored[f"mask_{kind}_design"].astype(bool)
+        gradient[of_shift[free]] = stored[f"grad_{kind}_shifts_rk4_discrete"]
+    return gradient[scene.space.groups].ravel()

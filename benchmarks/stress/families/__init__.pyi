@@ -1,0 +1,13 @@
+from . import agreement as agreement
+from . import balances as balances
+from . import barrier as barrier
+from . import branches as branches
+from . import constants as constants
+from . import designs as designs
+from . import inputs as inputs
+from . import pieces as pieces
+from . import sizes as sizes
+from . import slender as slender
+from . import symmetry as symmetry
+from . import times as times
+from . import windings as windings

@@ -1,0 +1,121 @@
+"""Scenes of the stress cases: lattices of the paper's constants under whatever is asked of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from benchmarks.scenes import BARRIER, BIAS, CUTOFF, LIGAMENT, MATERIAL, SPACING
+from benchmarks.stress.reference_energy import ReferenceStructure
+from sim.core import Floats, Ints
+from sim.energy import Topology
+from sim.scene import Scene, concrete_parameters, make_plan
+from sim.solvers import LinearRamp, MotionLaw, PrescribedMotion, Solver, held_dofs
+from sim.structure import ConcreteParameters, Lattice, quads
+
+DISTANCE = LIGAMENT / 12
+"""Activation distance of contact between units, mm."""
+NONE = np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class StressScene:
+    """A structure under one drive.
+
+    Attributes:
+        scene: with a single load case.
+        vertices: (n_vertices, 2) of the structure, mm.
+    """
+
+    scene: Scene
+    vertices: Floats
+
+    @property
+    def topology(self) -> Topology:
+        """Of the scene."""
+        return self.scene.topology
+
+    @property
+    def drive(self) -> PrescribedMotion:
+        """Of its load case."""
+        return self.scene.drives[0]
+
+    @cached_property
+    def values(self) -> ConcreteParameters:
+        """Parameters of the structure."""
+        return concrete_parameters(self.scene, self.vertices)
+
+    @property
+    def structure(self) -> ReferenceStructure:
+        """As the definition takes it."""
+        scene = self.scene
+        limits = (scene.barrier, scene.cutoff, scene.contact_distance)
+        return ReferenceStructure(scene.lattice, self.vertices, self.values, *limits)
+
+    def solver(self, asked: Floats) -> Solver:
+        """What the plan chooses for output at these times."""
+        return make_plan(self.scene, self.vertices, asked, every_case=True).solver
+
+    def with_material(self, **constants: Any) -> StressScene:  # noqa: ANN401  (numbers or arrays)
+        """The same of other constants."""
+        material = self.scene.material._replace(**constants)
+        return replace(self, scene=replace(self.scene, material=material))
+
+
+def squares(columns: int, rows: int | None = None, bias: float = BIAS) -> Lattice:
+    """The paper's lattice, its squares turned by ``bias`` (deg)."""
+    return quads(columns, rows or columns, SPACING, LIGAMENT, np.deg2rad(bias))
+
+
+def posed(
+    lattice: Lattice,
+    clamped: Sequence[int] | Ints,
+    driven: Sequence[int] | Ints,
+    motion: MotionLaw,
+    **more: Any,  # noqa: ANN401
+) -> StressScene:
+    """Units clamped and driven, in time unless the scene is said to be static.
+
+    Args:
+        lattice: at rest.
+        clamped: units that rest.
+        driven: units that follow the motion.
+        motion: of these.
+        **more: further fields of the scene; by default it lasts 1 s and the drive has no frequency.
+    """
+    every = np.arange(lattice.n_units)
+    fields: dict[str, Any] = {
+        "material": MATERIAL,
+        "barrier": BARRIER,
+        "cutoff": CUTOFF,
+        "clamped": held_dofs(np.asarray(clamped, dtype=np.int64), NONE),
+        "driven": np.asarray(driven, dtype=np.int64),
+        "motions": (motion,),
+        "weights": np.ones(1),
+        "duration": 1.0,
+        "frequency": None,
+        "static": False,
+        "cloak": every,
+        "region": every,
+    }
+    return StressScene(Scene(lattice=lattice, **(fields | more)), lattice.vertices)
+
+
+def pressed(lattice: Lattice, share: float, **more: Any) -> StressScene:  # noqa: ANN401
+    """Between plates, the left one clamped, the right one pushed in by a share of the width."""
+    left = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].min())
+    right = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].max())
+    depth = share * (1 + np.ptp(lattice.index[:, 0])) * lattice.spacing
+    return posed(lattice, left, right, LinearRamp(-depth, 1.0), static=True, **more)
+
+
+def shaken(lattice: Lattice, motion: MotionLaw, **more: Any) -> StressScene:  # noqa: ANN401
+    """Clamped at its four corners, the middle unit driven."""
+    columns, rows = np.ptp(lattice.index, axis=0) + 1
+    corners = np.array([0, columns - 1, columns * (rows - 1), columns * rows - 1])
+    middle = columns * (rows // 2) + columns // 2
+    return posed(lattice, corners, np.array([middle]), motion, **more)

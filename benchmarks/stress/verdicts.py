@@ -1,0 +1,144 @@
+"""What a stress case is, and what comes out of it: plain records.
+
+A case is attempted. It is solved if everything that is checked of its answer keeps within its
+limit, refused if it ends in an error that says what to do, and wrong otherwise.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple
+
+from sim.core import SimulationError
+
+Verdict = Literal["solved", "refused", "wrong"]
+Wanted = Literal["solution", "either", "refusal"]
+
+REMEDIES = ("; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make ")
+"""How the messages of actionable refusals begin to say what to do."""
+
+
+class Check(NamedTuple):
+    """One number of an answer that an independent calculation found.
+
+    Attributes:
+        name: with the number's unit.
+        value: the number.
+        limit: the largest that passes; NaN does not.
+        stated: whether the result itself tells that number, as an estimate of its error.
+    """
+
+    name: str
+    value: float
+    limit: float
+    stated: bool = False
+
+    @property
+    def kept(self) -> bool:
+        """Whether the number is within its limit."""
+        return self.value <= self.limit
+
+    @property
+    def share(self) -> float:
+        """The number over its limit; where that is zero, the number."""
+        return self.value / self.limit if self.limit else self.value
+
+
+@dataclass(frozen=True)
+class StressCase:
+    """One attempt.
+
+    Attributes:
+        name: what is tried.
+        attempt: solves and returns what it checked of the answer.
+        wanted: a solution, as a study may ask for it and a refusal counts against the solver; a
+            refusal, as there is no answer and any would be wrong; or either, and then an answer
+            may also be one whose own estimate of error says that it is none.
+    """
+
+    name: str
+    attempt: Callable[[], Sequence[Check]]
+    wanted: Wanted = "solution"
+
+
+class StressOutcome(NamedTuple):
+    """What came out of one attempt: verdict, why, and what was checked."""
+
+    case: StressCase
+    verdict: Verdict
+    message: str
+    checks: tuple[Check, ...]
+
+
+@dataclass(frozen=True)
+class StressFamily:
+    """Cases of one kind.
+
+    Attributes:
+        name: short.
+        tried: a line that says what is tried.
+        judged: a line that says how an answer is judged.
+        cases: makes them; few ones if asked for a small suite.
+    """
+
+    name: str
+    tried: str
+    judged: str
+    cases: Callable[[bool], Iterable[StressCase]]
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Outcomes of one family."""
+
+    family: StressFamily
+    outcomes: tuple[StressOutcome, ...]
+
+    @cached_property
+    def counts(self) -> Counter[Verdict]:
+        """Number of outcomes of each verdict."""
+        return Counter(outcome.verdict for outcome in self.outcomes)
+
+    @property
+    def in_range(self) -> tuple[int, int]:
+        """Numbers of cases that a study may ask for: tried, and solved."""
+        asked = [outcome for outcome in self.outcomes if outcome.case.wanted == "solution"]
+        return len(asked), sum(outcome.verdict == "solved" for outcome in asked)
+
+    @property
+    def worst(self) -> list[Check]:
+        """Of all solved cases, the check of each name that came closest to its limit."""
+        found: dict[str, Check] = {}
+        for outcome in self.outcomes:
+            for check in outcome.checks if outcome.verdict == "solved" else ():
+                known = found.get(check.name)
+                if known is None or check.share > known.share:
+                    found[check.name] = check
+        return list(found.values())
+
+
+def attempted(case: StressCase) -> StressOutcome:
+    """Runs a case and gives the verdict."""
+    try:
+        checks = tuple(case.attempt())
+    except SimulationError as error:
+        return _refusal(case, str(error))
+    except Exception:  # noqa: BLE001  (whatever else a solver raises is no answer to a user)
+        *_, last = traceback.format_exc().strip().splitlines()
+        return StressOutcome(case, "wrong", f"raised {last}", ())
+    if case.wanted == "refusal":
+        return StressOutcome(case, "wrong", "it has no answer, and was given one", checks)
+    missed = [check for check in checks if not check.kept]
+    said = "; ".join(f"{miss.name}: {miss.value:.3g}, limit {miss.limit:.3g}" for miss in missed)
+    if case.wanted == "either" and any(miss.stated for miss in missed):
+        return StressOutcome(case, "refused", f"by its own estimate of error: {said}", checks)
+    return StressOutcome(case, "wrong" if missed else "solved", said, checks)
+
+
+def _refusal(case: StressCase, message: str) -> StressOutcome:
+    actionable = any(remedy in message for remedy in REMEDIES)
+    return StressOutcome(case, "refused" if actionable else "wrong", message, ())

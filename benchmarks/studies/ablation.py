@@ -1,0 +1,213 @@
+"""What a plan can skip, each with and without: the same result for less time.
+
+A skip is prepared with the scene it stands on and whether it is made; its run gives results that
+must not depend on that beyond the tolerance stated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from benchmarks.harness import (
+    MeasuringLimits,
+    Run,
+    Sample,
+    SettingLadder,
+    Task,
+    Tell,
+    Worker,
+    WorkPrecisionPoint,
+    climb,
+)
+from benchmarks.scenes import load_cases
+from benchmarks.studies import fresh_process
+from benchmarks.studies.scene_loss import loss_by_solver, loss_of_case, warmed_up
+from benchmarks.suites import warm
+from sim.core import Ints
+from sim.energy import observe
+from sim.quasistatics import StaticSolver
+from sim.scene import evaluator, make_plan, structure, value_and_gradient
+from sim.solvers import Harmonic, LinearRamp, Solver, base
+from sim.time_integration import ImplicitSolver
+
+EXACT = 1e-12
+DONE, SKIPPED = "done", "skipped"
+SLOWLY = 20.0
+"""Periods of a static scene's load when its inertia is not left out, s."""
+
+
+@dataclass(frozen=True)
+class Skip:
+    """Something left out.
+
+    Attributes:
+        name: what.
+        prepare: for a scene's name, and whether it is skipped.
+        wave: whether it stands on the scene in time, or on the static one.
+        tolerance: relative change of the results that it may make.
+        why: why it may be left out.
+        repeats: at most so many runs; the first one alone if that is what is measured.
+    """
+
+    name: str
+    prepare: Callable[[str, float, Task], Run]
+    wave: bool
+    tolerance: float
+    why: str
+    repeats: int | None = None
+
+
+def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
+    """The region is compared with the unloaded lattice at rest, or with its simulation."""
+    posed = load_cases.case(name)
+    run, solver = loss_by_solver(name, make_plan(posed.scene).solver), make_plan(posed.scene).solver
+    still = replace(posed.scene, motions=tuple(_still(motion) for motion in posed.scene.motions))
+
+    def simulated() -> Sample:
+        rest, *_ = base.forward(solver, posed.values, still.drives)
+        moved, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
+
+    del task
+    return run if skipped else warmed_up(simulated)
+
+
+def _still(motion: object) -> Harmonic | LinearRamp:
+    assert isinstance(motion, Harmonic | LinearRamp)
+    return motion._replace(amplitude=0.0)
+
+
+def distant_contact(name: str, skipped: float, task: Task) -> Run:
+    """Contact in ligaments whose voids are wide open, checked after the run."""
+    del task
+    solver = make_plan(load_cases.scene(name)).solver
+    assert isinstance(solver, ImplicitSolver)
+    return loss_by_solver(name, solver if skipped else replace(solver, turn_allowance=np.inf))
+
+
+def inertia(name: str, skipped: float, task: Task) -> Run:
+    """A slow load as equilibria, or as the motion that it is."""
+    del task
+    scene = load_cases.scene(name)
+    (ramp,) = scene.motions
+    assert isinstance(ramp, LinearRamp)
+    slow = replace(
+        scene,
+        static=False,
+        motions=(ramp._replace(duration=SLOWLY),),
+        duration=SLOWLY,
+        integrator="implicit",
+    )
+    plan = make_plan(scene if skipped else slow)
+    posed = load_cases.LoadCase(scene if skipped else slow, load_cases.case(name).target)
+    return loss_of_case(posed, plan.solver)
+
+
+def other_outputs(name: str, skipped: float, task: Task) -> Run:
+    """Energies, reactions and void angles at every sample, which the loss does not ask for."""
+    del task
+    posed = load_cases.case(name)
+    solver = make_plan(posed.scene).solver
+
+    def run() -> Sample:
+        motion, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        if not skipped:
+            observe(posed.scene.topology, posed.values, motion[0])
+        return Sample(posed.results(*posed.measured(motion, posed.values)), {})
+
+    return warmed_up(run)
+
+
+def far_derivatives(name: str, skipped: float, task: Task) -> Run:
+    """Derivatives by the parameters of ligaments that the design does not move."""
+    del task
+    posed = load_cases.case(name)
+    solver = make_plan(posed.scene).solver
+    if not skipped:
+        every = np.arange(posed.scene.lattice.n_ligaments, dtype=np.int64)
+        solver = _on(solver, designed=every)
+    of_design = structure(posed.scene)
+    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.drives)
+    start = np.zeros(posed.scene.space.n_variables)
+
+    def run() -> Sample:
+        loss_by_solver, gradient, motion = evaluate(start)
+        return Sample(posed.results(loss_by_solver, motion, gradient), {})
+
+    return warmed_up(run)
+
+
+def _on(solver: Solver, designed: Ints) -> Solver:
+    assert isinstance(solver, ImplicitSolver | StaticSolver)
+    return replace(solver, topology=replace(solver.topology, designed=designed))
+
+
+def equal_cases(name: str, skipped: float, task: Task) -> Run:
+    """Load cases that are copies of others, turned by a quarter."""
+    del task
+    scene = load_cases.symmetric(name)
+    evaluate = evaluator(scene, make_plan(scene, every_case=not skipped))
+    start = np.zeros(scene.space.n_variables)
+
+    def run() -> Sample:
+        loss_by_solver, gradient, _ = evaluate(start)
+        return Sample({"loss": np.asarray(loss_by_solver), "gradient": gradient}, {})
+
+    return warmed_up(run)
+
+
+def cold_start(name: str, skipped: float, task: Task) -> Run:
+    """Paths followed from rest for every design, or from the last design's."""
+    del task
+    return warm.walk(load_cases.scene(name), 1e-10, warm=bool(skipped))
+
+
+SKIPS = (
+    Skip("unloaded reference", unloaded_reference, True, EXACT, "it is zero"),
+    Skip("contact of open voids", distant_contact, True, EXACT, "checked after each solve"),
+    Skip("inertia", inertia, False, 1e-2, "a slow load is a row of equilibria"),
+    Skip("outputs not asked for", other_outputs, True, EXACT, "the loss needs motions alone"),
+    Skip("far derivatives", far_derivatives, True, EXACT, "the design moves no ligament there"),
+    Skip("equal load cases", equal_cases, True, 1e-6, "the symmetry turns one into the other"),
+    Skip("paths from rest", cold_start, False, 1e-9, "a similar design's path is near"),
+    Skip(
+        "compilation",
+        fresh_process.compilation,
+        True,
+        EXACT,
+        "loops compiled before are on the disk",
+        1,
+    ),
+    Skip(
+        "fresh factors",
+        fresh_process.factors,
+        True,
+        1e-4,
+        "stages are solved to a tolerance anyway",
+    ),
+)
+
+
+def measure(
+    waves: str, pushes: str, rules: MeasuringLimits, tell: Tell
+) -> list[WorkPrecisionPoint]:
+    """Every skip on its scene, made and not made, each in a process of its own.
+
+    Errors are what the results change by if it is not skipped.
+    """
+    points: list[WorkPrecisionPoint] = []
+    for skip in SKIPS:
+        name = waves if skip.wave else pushes
+        units = load_cases.scene(name).lattice.n_units
+        prepare = partial(skip.prepare, name)
+        with Worker(prepare) as worker:
+            worker.prepare(1.0, "loss")
+            reference = worker.run().sample.values
+        for rung in ((DONE, 0.0), (SKIPPED, 1.0)):
+            ladder = SettingLadder(skip.name, prepare, (rung,), True, ("loss",), skip.repeats)
+            points += climb(ladder, reference, rules, units, tell)
+    return points

@@ -1,0 +1,269 @@
+"""Optimisers on the same problems: every evaluation counted, timed and judged alike."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Literal, NamedTuple
+
+import nlopt
+import numpy as np
+import xarray as xr
+from scipy.optimize import BFGS, NonlinearConstraint, minimize
+
+from benchmarks.harness import CandidateError, Floats, Run, Sample, Tell, Worker, padded
+from benchmarks.scenes import load_cases
+from sim.constraints import ConstraintVector
+from sim.core import SimulationError
+from sim.optimise import MmaOptions, SqpOptions, minimise, stationarity
+from sim.scene import evaluator, make_plan
+
+REACH = 3.0
+"""Bound of every variable, mm."""
+FEASIBLE = 1e-3
+"""Largest violation of a design that counts, mm: below what can be made."""
+WORSE = 10.0
+"""Loss over the first that stands for a design whose simulation fails."""
+
+
+class BudgetSpentError(Exception):
+    """The evaluations or the time are used up."""
+
+
+@dataclass
+class BudgetedProblem:
+    """A problem that counts what is asked of it.
+
+    Attributes:
+        evaluate: loss, gradient and more of a design.
+        constraints: values >= 0 and Jacobian of a design.
+        n_variables: of the design.
+        evaluations, seconds: that may be used.
+        designs, losses, clock: of every evaluation; NaN where it failed.
+    """
+
+    evaluate: Callable[[Floats], tuple[float, Floats, Floats]]
+    constraints: ConstraintVector
+    n_variables: int
+    evaluations: int
+    seconds: float
+    designs: list[Floats] = field(default_factory=list)
+    losses: list[float] = field(default_factory=list)
+    clock: list[float] = field(default_factory=list)
+    _start: float = field(default_factory=time.process_time)
+    _known: tuple[float, Floats] | None = None
+
+    def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
+        """Loss, gradient and more; the last design again is no new evaluation.
+
+        Raises:
+            SpentError: no more may be asked for.
+            SimulationError: the simulation failed.
+        """
+        if len(self.losses) >= self.evaluations:
+            raise BudgetSpentError("evaluations used up")
+        if time.process_time() - self._start > self.seconds:
+            raise BudgetSpentError("time used up")
+        self.designs.append(np.array(design))
+        self.losses.append(np.nan)
+        self.clock.append(time.process_time() - self._start)
+        found = self.evaluate(self.designs[-1])
+        self.losses[-1] = found[0]
+        self.clock[-1] = time.process_time() - self._start
+        return found
+
+    def plain(self, design: Floats) -> tuple[float, Floats]:
+        """Loss and gradient for those who know of no failures: one is a bad loss."""
+        if self.designs and np.array_equal(design, self.designs[-1]) and self._known:
+            return self._known
+        try:
+            loss, gradient, _ = self(design)
+        except SimulationError:
+            loss, gradient = WORSE * self.losses[0], np.zeros(self.n_variables)
+        self._known = loss, np.array(gradient)
+        return self._known
+
+
+class OptimiserHistory(NamedTuple):
+    """What came of an optimiser, evaluation by evaluation.
+
+    Attributes:
+        loss, violation, clock: as evaluated: loss, mm, s of processor time since the start.
+        best, residual: loss of the best feasible design so far, and its KKT residual (mm).
+        final: loss of the best feasible design, evaluated afresh.
+    """
+
+    loss: Floats
+    violation: Floats
+    clock: Floats
+    best: Floats
+    residual: Floats
+    final: Floats
+
+
+def judged(
+    asked: BudgetedProblem, afresh: Callable[[Floats], tuple[float, Floats, Floats]]
+) -> OptimiserHistory:
+    """The course of a contest that is over; ``afresh`` is the loss and gradient to judge by."""
+    losses = np.array(asked.losses)
+    places = [asked.constraints(design) for design in asked.designs]
+    violation = np.array([max(0.0, -float(values.min())) for values, _ in places])
+    best, residual = np.full((2, len(losses)), np.nan)
+    steepest = float(np.abs(afresh(asked.designs[0])[1]).max())
+    bound = np.full(asked.n_variables, REACH)
+    champion, final = np.inf, np.nan
+    for number, design in enumerate(asked.designs):
+        if violation[number] <= FEASIBLE and losses[number] < champion:
+            champion = losses[number]
+            final, gradient, _ = afresh(design)
+            judge = stationarity(gradient, *places[number], design, -bound, bound, steepest)
+            residual[number:] = judge.residual
+        best[number] = champion if np.isfinite(champion) else np.nan
+    return OptimiserHistory(
+        losses, violation, np.array(asked.clock), best, residual, np.array(final)
+    )
+
+
+def _own_sqp(asked: BudgetedProblem) -> None:
+    _own(asked, "sqp")
+
+
+def _own_mma(asked: BudgetedProblem) -> None:
+    _own(asked, "mma")
+
+
+def _own(asked: BudgetedProblem, method: Literal["sqp", "mma"]) -> None:
+    options = {"sqp": SqpOptions, "mma": MmaOptions}[method](evaluations=asked.evaluations)
+    start = np.zeros(asked.n_variables)
+    minimise(method, asked, asked.constraints, start, (-REACH, REACH), options)
+
+
+def _scipy(
+    asked: BudgetedProblem, method: str, constraints: object, options: dict[str, float]
+) -> None:
+    minimize(
+        asked.plain,
+        np.zeros(asked.n_variables),
+        jac=True,
+        method=method,
+        bounds=[(-REACH, REACH)] * asked.n_variables,
+        constraints=constraints,
+        options=options,
+    )
+
+
+def _slsqp(asked: BudgetedProblem) -> None:
+    of = asked.constraints
+    limits = {"type": "ineq", "fun": of.values, "jac": lambda x: of(x)[1].toarray()}
+    _scipy(asked, "SLSQP", limits, {"maxiter": asked.evaluations, "ftol": 1e-9})
+
+
+def _interior_point(asked: BudgetedProblem) -> None:
+    of = asked.constraints
+    limits = NonlinearConstraint(of.values, 0.0, np.inf, jac=lambda x: of(x)[1], hess=BFGS())
+    _scipy(asked, "trust-constr", limits, {"maxiter": asked.evaluations})
+
+
+def _nlopt(algorithm: str, asked: BudgetedProblem) -> None:
+    def loss(design: Floats, slope: Floats) -> float:
+        value, gradient = asked.plain(design)
+        if slope.size:
+            slope[:] = gradient
+        return value
+
+    def limits(result: Floats, design: Floats, slope: Floats) -> None:
+        values, jacobian = asked.constraints(design)
+        result[:] = -values
+        if slope.size:
+            slope[:] = -jacobian.toarray()
+
+    made = nlopt.opt(getattr(nlopt, algorithm), asked.n_variables)
+    made.set_min_objective(loss)
+    made.add_inequality_mconstraint(limits, np.full(asked.constraints.n_constraints, 1e-8))
+    made.set_lower_bounds(-REACH)
+    made.set_upper_bounds(REACH)
+    if algorithm == "LD_AUGLAG":
+        within = nlopt.opt(nlopt.LD_CCSAQ, asked.n_variables)  # its L-BFGS fails here
+        within.set_ftol_rel(1e-3)
+        made.set_local_optimizer(within)
+    made.optimize(np.zeros(asked.n_variables))
+
+
+OPTIMISERS: dict[str, Callable[[BudgetedProblem], None]] = {
+    "own sqp": _own_sqp,
+    "own mma": _own_mma,
+    "scipy SLSQP": _slsqp,
+    "scipy trust-constr": _interior_point,
+    "nlopt MMA": partial(_nlopt, "LD_MMA"),
+    "nlopt CCSAQ": partial(_nlopt, "LD_CCSAQ"),
+    "nlopt SLSQP": partial(_nlopt, "LD_SLSQP"),
+    "nlopt AUGLAG": partial(_nlopt, "LD_AUGLAG"),
+}
+"""trust-constr is an interior-point method here, AUGLAG an augmented Lagrangian over CCSAQ."""
+
+
+@dataclass(frozen=True)
+class OptimiserBudget:
+    """What each optimiser gets: evaluations, and processor time in s."""
+
+    evaluations: int = 60
+    seconds: float = 120.0
+
+
+def prepare(name: str, terms: OptimiserBudget, optimiser: str) -> Run:
+    """Run of one optimiser on a scene's design problem, judged."""
+    scene, limits = load_cases.designed(name)
+    plan = make_plan(scene)
+    evaluate = evaluator(scene, plan)
+    constraints = ConstraintVector(scene.space, limits)
+    start = np.zeros(scene.space.n_variables)
+    evaluate(start)
+    constraints(start)
+
+    def run() -> Sample:
+        asked = BudgetedProblem(evaluate, constraints, len(start), terms.evaluations, terms.seconds)
+        with suppress(BudgetSpentError):
+            OPTIMISERS[optimiser](asked)
+        return Sample(judged(asked, evaluate)._asdict(), {})
+
+    return run
+
+
+def measure(name: str, terms: OptimiserBudget, tell: Tell) -> xr.Dataset:
+    """The dataset ``contest`` of a scene, without its attributes."""
+    courses: list[OptimiserHistory] = []
+    outcomes: list[str] = []
+    for optimiser in OPTIMISERS:
+        with Worker(partial(prepare, name, terms), 3 * terms.seconds) as worker:
+            try:
+                worker.prepare(optimiser)
+                courses.append(OptimiserHistory(**worker.run().sample.values))
+                outcomes.append("measured")
+            except CandidateError as failed:
+                nothing = np.zeros(0)
+                courses.append(
+                    OptimiserHistory(nothing, nothing, nothing, nothing, nothing, np.array(np.nan))
+                )
+                outcomes.append(str(failed))
+        tell(f"{name}, {optimiser}: {courses[-1].final:.4g} ({outcomes[-1]})")
+    return _dataset(courses, outcomes)
+
+
+def _dataset(courses: list[OptimiserHistory], outcomes: list[str]) -> xr.Dataset:
+    dims = ("optimiser", "evaluation")
+    names = {"loss": "loss", "violation": "violation", "clock": "cpu_time", "best": "best_loss"}
+    names["residual"] = "kkt_residual"
+    return xr.Dataset(
+        {
+            **{
+                name: (dims, padded([getattr(c, key) for c in courses]))
+                for key, name in names.items()
+            },
+            "final_loss": ("optimiser", np.array([float(c.final) for c in courses])),
+            "outcome": ("optimiser", outcomes),
+        },
+        {"optimiser": list(OPTIMISERS)},
+    )

@@ -1,0 +1,78 @@
+"""Growth of a sweep with the number of its cases, each a problem of its own on Figure 2's units."""
+
+from __future__ import annotations
+
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.harness import (
+    MeasuringLimits,
+    Run,
+    Sample,
+    SettingLadder,
+    Tell,
+    Worker,
+    WorkPrecisionPoint,
+    climb,
+    dataset,
+)
+from pipeline.posing import lattice_of, setting_losses
+from pipeline.problem import Problem
+from pipeline.problem.reading import load
+from pipeline.problem.sections import Sweep, sweep_cases
+
+COUNTS = (1, 10, 100, 400)
+PROBLEM = Path(__file__).resolve().parents[2] / "experiments/fig2/problem.yaml"
+SWEEP = {
+    "random": {
+        "drive.directions": {"from": "0 deg", "to": "180 deg"},
+        "drive.frequency": {"from": "2 Hz", "to": "16 Hz"},
+        "material.bending_stiffness": {"mean": "1.5 N mm/rad", "deviation": "0.15 N mm/rad"},
+    },
+    "samples": COUNTS[-1],
+}
+"""One load case each, of the altered structure and of the design, which is unchanged."""
+
+
+def measure(
+    counts: tuple[int, ...], preset: str | None, rules: MeasuringLimits, tell: Tell
+) -> xr.Dataset:
+    """Time and memory of so many cases, each number of them in a process of its own."""
+    units = load(PROBLEM, preset).lattice.n_units
+    with Worker(partial(cases, preset, 1)) as worker:
+        worker.prepare()
+        reference = worker.run().sample.values
+    found: list[WorkPrecisionPoint] = []
+    for count in counts:
+        rung = (f"{count} cases", float(count))
+        ladder = SettingLadder("sweep", partial(cases, preset), (rung,), True, ("loss",), 1)
+        found += climb(ladder, reference, rules, units, tell)
+    return dataset(found)
+
+
+def cases(preset: str | None, count: float, task: str = "loss") -> Run:
+    """Run of the first ``count`` cases, after one that compiles."""
+    del task
+    asked, wanted = load(PROBLEM, preset), Sweep.model_validate(SWEEP)
+    vertices = _unchanged(asked)
+    every = list(islice(sweep_cases.settings(wanted), int(count)))
+    of_case = partial(
+        setting_losses.results, asked, folder=PROBLEM.parent, vertices=vertices, threads=1
+    )
+    of_case(every[0])
+
+    def run() -> Sample:
+        losses = [of_case(setting)[0].loss for setting in every]
+        return Sample({"loss": np.array(losses[:1])}, {"cases": len(losses)})
+
+    return run
+
+
+def _unchanged(asked: Problem) -> xr.DataArray:
+    """The initial structure as a design has it."""
+    lattice = lattice_of(asked)
+    return xr.DataArray(lattice.padded(lattice.vertices), dims=("unit", "vertex", "xy"))

@@ -1,0 +1,2 @@
+from . import static as static
+from . import warm as warm

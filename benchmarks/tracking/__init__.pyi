@@ -1,0 +1,1 @@
+from . import frame_rates as frame_rates

@@ -1,0 +1,125 @@
+"""The dataset `calibration`, and the lines that a problem file takes from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from pipeline.calibration.estimates import UNDETERMINED, Estimate, estimate, quality, warnings
+from pipeline.calibration.experiments import Decay, Experiment
+from pipeline.calibration.fit_uncertainty import uncertainty
+from pipeline.calibration.inputs import UNITS, WRITTEN, Constants, Name
+from pipeline.calibration.least_squares import Fit
+from sim.core import Floats
+
+
+def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
+    """The dataset of a fit, and the values in it.
+
+    Raises:
+        SimulationError: an equilibrium on the way is not stable.
+    """
+    known = uncertainty(fit)
+    found, told = estimate(fit, known), quality(fit)
+    experiments, names = fit.model.experiments, list(found.names)
+    begin = [fit.model.begin.value(name) for name in found.names]
+    fitted = np.arange(len(names)) >= found.wanted
+    peaks = np.array([_by_peaks(each) for each in experiments])
+    variables = {
+        "origin": ("parameter", fitted.astype(np.int8)),
+        "status": ("parameter", found.status.astype(np.int8)),
+        "start": ("parameter", np.array(begin)),
+        "value": ("parameter", found.value),
+        "lower": ("parameter", found.low),
+        "upper": ("parameter", found.high),
+        "standard_error": ("parameter", found.error),
+        "bound": ("parameter", found.bound),
+        "covariance": (("parameter", "with_parameter"), found.covariance),
+        "correlation": (("parameter", "with_parameter"), found.correlation),
+        "condition": ((), found.condition),
+        "newton_step": ((), known.newton),
+        **{field: ("set", values) for field, values in told._asdict().items()},
+        "peak_ratio": ("set", peaks[:, 0]),
+        "peak_ratio_error": ("set", peaks[:, 1]),
+        **_points(fit),
+    }
+    labels = {
+        "parameter": names,
+        "parameter_units": ("parameter", [UNITS[name] for name in found.names]),
+        "with_parameter": names,
+        "set": [each.measured.name for each in experiments],
+        "kind": ("set", [each.measured.kind for each in experiments]),
+    }
+    advice = warnings(fit, found, told, known.newton)
+    made = xr.Dataset(variables, labels)
+    return made.assign_attrs(warnings="\n".join(advice)), found
+
+
+def _by_peaks(each: Experiment) -> tuple[float, float]:
+    return (each.peaks.ratio, each.peaks.error) if isinstance(each, Decay) else (np.nan, np.nan)
+
+
+def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
+    """All measured values with what the fit makes of them."""
+    every = [each.measured for each in fit.model.experiments]
+    return {
+        "set_of_point": ("point", fit.model.set_of_row),
+        "channel": ("point", _joined([each.channels for each in every])),
+        "abscissa": ("point", _joined([each.abscissa for each in every])),
+        "measured": ("point", _joined([each.values for each in every])),
+        "fitted": ("point", _joined(fit.model.predictions(fit.unknowns))),
+        "sigma": (
+            "point",
+            _joined([each.sigma for each in every]) * fit.level[fit.model.set_of_row],
+        ),
+        "residual": ("point", fit.residual),
+    }
+
+
+def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts)
+
+
+def fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
+    """The lines `material:` of a problem file, the interval of each fitted value beside it."""
+    here = fit.model.constants(fit.unknowns)
+    told = {
+        name: "  # not determined by the data"
+        if status == UNDETERMINED
+        else f"  # 95 %: {_words(name, low)} to {_words(name, high)}"
+        for name, low, high, status in zip(
+            found.names, found.low, found.high, found.status, strict=True
+        )
+    }
+    lines = [
+        *(["# SYNTHETIC: found from computed data, not from a specimen."] if synthetic else []),
+        f"# {title or 'Calibration'}: lay it over the keys of a problem file.",
+        "material:",
+        f"  density: {here.material.density * 1e9:.6g} kg/m^2",
+        *(_line(here, name, told) for name in _STIFFNESS),
+        "  damping:",
+        *(f"  {_line(here, name, told)}".replace("damping_", "") for name in _damping(here)),
+    ]
+    if here.cutoff is not None:
+        angle = _line(here, "contact_cutoff", told).replace("contact_cutoff", "cutoff_angle")
+        lines += ["contact:", angle]
+    return "\n".join(lines) + "\n"
+
+
+_STIFFNESS: tuple[Name, ...] = ("axial_stiffness", "shear_stiffness", "bending_stiffness")
+
+
+def _damping(here: Constants) -> tuple[Name, ...]:
+    by_ratio = here.material.damping.ratio is not None
+    return ("damping_ratio",) if by_ratio else ("damping_translation", "damping_rotation")
+
+
+def _line(here: Constants, name: Name, told: dict[Name, str]) -> str:
+    return f"  {name}: {_words(name, here.value(name))}{told.get(name, '')}"
+
+
+def _words(name: Name, value: float) -> str:
+    unit, factor = WRITTEN[name]
+    return f"{value * factor:.6g} {unit}".rstrip()

@@ -1,0 +1,116 @@
+"""Computed measurements: what sets would be if the constants were known, with noise."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from pipeline import datasets
+from pipeline.calibration import computed_track
+from pipeline.calibration.experiments import force_displacement, free_decay
+from pipeline.calibration.inputs import (
+    Calibration,
+    Constants,
+    ForceDisplacement,
+    FreeDecay,
+    Set,
+    start,
+)
+from pipeline.datasets import provenance
+from pipeline.problem.reading import yaml_file
+from pipeline.problem.sections import UNROTATED_MOMENT
+from pipeline.runtime import write_atomically
+from sim.core import Floats
+
+LABEL = "SYNTHETIC: computed, not measured"
+YAML = "calibration.yaml"
+
+
+def truth(asked: Calibration) -> Constants:
+    """The constants that computed data are made with."""
+    assert asked.virtual is not None
+    return start(asked)._replace(material=asked.virtual.truth, cutoff=asked.virtual.cutoff_angle)
+
+
+def forces_of(
+    asked: ForceDisplacement, true: Constants, random: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Displacements in mm and noisy forces in N."""
+    assert asked.virtual is not None
+    displacement = np.linspace(0.0, asked.virtual.end, asked.virtual.points + 1)[1:]
+    force = force_displacement.simulation(asked, true, displacement).predict(true)
+    return displacement, force + asked.virtual.noise * random.normal(size=len(force))
+
+
+def decay_of(
+    asked: FreeDecay, true: Constants, random: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Times in s and noisy angles in rad, of the oscillation about one hinge."""
+    given = asked.virtual
+    assert given is not None
+    inertia = UNROTATED_MOMENT * true.material.density * true.spacing**4
+    frequency = float(np.sqrt(true.material.bending_stiffness / inertia))
+    time = np.arange(int(given.duration * given.rate)) / given.rate
+    course = free_decay.terms(time, true.ratio, frequency) @ [0.0, 0.0, given.amplitude, 0.0]
+    return time, course + given.noise * random.normal(size=len(time))
+
+
+def write(asked: Calibration, path: Path, folder: Path) -> None:
+    """Writes the computed sets, and a calibration that names their files.
+
+    Args:
+        asked: the calibration.
+        path: its YAML.
+        folder: of the files.
+
+    Raises:
+        UserError: the folder cannot be written to.
+    """
+    assert asked.virtual is not None
+    data = dict(yaml_file.read(path).data)
+    sets = [dict(each) for each in data.pop("data")]
+    data.pop("virtual")
+    true = truth(asked)
+    for number, (each, raw) in enumerate(zip(asked.data, sets, strict=True)):
+        if "problem" in raw:
+            raw["problem"] = os.path.relpath(path.parent / raw["problem"], folder)
+        if each.virtual is None:
+            raw["file"] = os.path.relpath(path.parent / raw["file"], folder)
+        else:
+            del raw["virtual"]
+            random = np.random.default_rng([asked.virtual.seed, number])
+            raw["file"] = _written(each, path, true, random, folder)
+    with write_atomically(folder / YAML) as aside:
+        text = yaml.safe_dump(
+            {**data, "synthetic": True, "data": sets}, sort_keys=False, allow_unicode=True
+        )
+        aside.write_text(f"# {LABEL}\n{text}", encoding="utf-8")
+
+
+def _written(
+    each: Set, path: Path, true: Constants, random: np.random.Generator, folder: Path
+) -> str:
+    """The name of the file that a set was written to; `path` is the calibration's."""
+    name = f"{each.name}.csv"
+    if isinstance(each, ForceDisplacement):
+        columns = (f"{each.columns.displacement} (mm)", f"{each.columns.force} (N)")
+        _table(folder / name, columns, *forces_of(each, true, random))
+        return name
+    if isinstance(each, FreeDecay):
+        columns = (f"{each.columns.time} (s)", f"{each.columns.angle} (rad)")
+        _table(folder / name, columns, *decay_of(each, true, random))
+        return name
+    origin = provenance.recorded(each.model_dump_json(), {}, synthetic=True)
+    track = computed_track.track_of(each, path.parent, true, random)
+    datasets.write(track, folder / f"{each.name}.nc", "track", origin)
+    return f"{each.name}.nc"
+
+
+def _table(path: Path, heading: tuple[str, ...], *columns: Floats) -> None:
+    rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
+    with write_atomically(path) as aside:
+        text = "\n".join([f"# {LABEL}", ",".join(heading), *rows])
+        aside.write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,121 @@
+"""A computed track: a study's structure under its own drive, seen with noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline.calibration.experiments import TrackedSpecimen, specimen, three
+from pipeline.calibration.inputs import Constants, TrackedMotion
+from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
+from pipeline.runtime import UserError
+from pipeline.tracking.output import absent, labelled
+from sim.core import Floats
+from sim.energy import observe
+from sim.scene import Scene, concrete_parameters, make_plan
+from sim.solvers import solve_case
+from sim.structure import Material
+
+
+def track_of(
+    asked: TrackedMotion, folder: Path, true: Constants, random: np.random.Generator
+) -> xr.Dataset:
+    """The dataset `track` of the initial structure of a study, made of the true constants.
+
+    Raises:
+        UserError: the problem is wrong.
+    """
+    assert asked.virtual is not None
+    made = specimen(asked, folder)
+    count = 1 + int(made.scene.duration * asked.virtual.rate * (1 + 1e-9))
+    time = np.arange(count) / asked.virtual.rate
+    posed = _posed(made, true)
+    motion = _motion(posed, asked.case, time)
+    force = np.full(count, np.nan)
+    if asked.virtual.load is not None:
+        clean = _force(made, posed, asked, motion, folder)
+        force = clean + asked.virtual.load * random.normal(size=count)
+    noise = three(asked.virtual.noise)
+    bias = np.zeros(3) if asked.virtual.bias is None else three(asked.virtual.bias)
+    shape = motion.shape
+    motion = motion + noise * random.normal(size=shape) + bias * random.normal(size=shape[1:])
+    return _dataset(made, time, motion, np.broadcast_to(noise, shape), force)
+
+
+def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
+    """The scene made of the true constants, to be simulated much finer than a fit would."""
+    scene = made.scene
+    axial, shear, bending, translation, rotation = true.numbers
+    constants = Material(
+        true.material.density,
+        made.stiffer * axial,
+        made.stiffer * shear,
+        made.stiffer * bending,
+        scene.material.contact,
+        translation,
+        rotation,
+    )
+    cutoff = scene.cutoff if true.cutoff is None else true.cutoff
+    return replace(scene, material=constants, cutoff=cutoff, reference=None, accuracy="tight")
+
+
+def _motion(posed: Scene, case: int, time: Floats) -> Floats:
+    """Motion (n_times, n_units, 3) without noise."""
+    plan = make_plan(posed, posed.lattice.vertices, time, every_case=True)
+    values, drive = concrete_parameters(posed, posed.lattice.vertices), posed.drives[case]
+    _, _, record = solve_case(plan.solver, values, drive)
+    finer = solve_case(plan.solver.refined(record), values, drive)[0]
+    return finer.reshape(len(time), posed.lattice.n_units, 3)
+
+
+def _force(
+    made: TrackedSpecimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
+) -> Floats:
+    """Force (n_times,) of the drive along its direction, N.
+
+    Raises:
+        UserError: it has no direction.
+    """
+    towards = made.towards(asked.case)
+    if towards is None:
+        what = "a drive by a time series does not tell the direction of a load cell"
+        remedy = "leave out load, or name a problem whose drive has directions"
+        raise UserError(what, file=folder / asked.problem, key="load", remedy=remedy)
+    values = concrete_parameters(posed, posed.lattice.vertices)
+    reaction = observe(posed.topology, values, motion).reaction
+    return np.asarray(reaction[:, posed.driven].sum(axis=1) @ towards)
+
+
+def _dataset(
+    made: TrackedSpecimen, time: Floats, motion: Floats, sigma: Floats, force: Floats
+) -> xr.Dataset:
+    intact, lattice = lattice_of(made.problem), made.scene.lattice
+    network = network_variables(made.problem, made.scene)
+    vertices = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
+    design = xr.Dataset(
+        {"support": network["support"], "vertices": (("unit", "vertex", "xy"), vertices)},
+        unit_coordinates(intact),
+    )
+    moved, told = (
+        spread(part, lattice, intact.n_units, axis=1).astype(np.float32) for part in (motion, sigma)
+    )
+    there = np.isin(intact.id, lattice.id)
+    quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))
+    variables = {
+        "displacement": (("time", "unit", "dof"), moved),
+        "sigma": (("time", "unit", "dof"), told),
+        "quality": (("time", "unit"), quality.astype(np.int8)),
+        "timing": (("time",), np.zeros(len(time), np.int8)),
+        "frame": (("time",), np.arange(len(time))),
+        "load_force": (("time",), force),
+        "camera_homography": (("row", "column"), np.full((3, 3), np.nan)),
+        "camera_centre": (("xy",), np.full(2, np.nan)),
+        "camera_radial": (("power",), np.full(2, np.nan)),
+        "camera_residual": (("unit", "xy"), np.full((intact.n_units, 2), np.nan)),
+        "image_size": (("xy",), np.zeros(2, np.int64)),
+        "blur": ((), np.nan),
+    }
+    return labelled(design, time, variables)

@@ -1,0 +1,184 @@
+"""From a fit to values with intervals, and to what a reader should be warned of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from pipeline.calibration.fit_uncertainty import Uncertainty, slopes
+from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.least_squares import Fit
+from sim.core import Floats, Ints
+
+DETERMINED, WEAK, UNDETERMINED, AT_BOUND = range(4)
+WEAK_FROM, NOTHING_FROM = 0.1, 1.0
+"""Standard errors of logarithms from which a constant counts as weakly determined, and as not."""
+TOLD_APART = 30.0
+"""Condition number from which constants are hardly told apart."""
+CONVERGED = 0.05
+DERIVED: tuple[Name, ...] = ("damping_translation", "damping_rotation")
+"""What follows from a damping ratio by the authors' law."""
+
+
+class Estimate(NamedTuple):
+    """Values of the constants, the wanted ones before those that follow from them.
+
+    Attributes:
+        names: of the constants.
+        wanted: how many of them were fitted.
+        value: (n,) in working units.
+        error: (n,) standard errors of their logarithms.
+        bound: (n,) of Cramer and Rao, of the standard errors.
+        low, high: (n,) ends of the 95 % intervals.
+        covariance: (n, n) of the logarithms.
+        status: (n,) how well each is determined.
+        condition: ratio of the longest to the shortest axis of the wanted constants' ellipsoid,
+            each counted in its own standard errors.
+    """
+
+    names: tuple[Name, ...]
+    wanted: int
+    value: Floats
+    error: Floats
+    bound: Floats
+    low: Floats
+    high: Floats
+    covariance: Floats
+    status: Ints
+    condition: float
+
+    @property
+    def correlation(self) -> Floats:
+        """(n, n) of the logarithms."""
+        return self.covariance / np.outer(self.error, self.error)
+
+
+class Quality(NamedTuple):
+    """How well the fit explains each set.
+
+    Attributes:
+        points, freedom: (n_sets,) measured values, and what the fit leaves of their freedom.
+        chi_square: (n_sets,) sum of squares in units of the stated, or the estimated, noise.
+        level: (n_sets,) estimated factor on the stated noise; 1 where the noise is known.
+        autocorrelation: (n_sets,) of whitened residuals that follow one another in a course.
+    """
+
+    points: Ints
+    freedom: Floats
+    chi_square: Floats
+    level: Floats
+    autocorrelation: Floats
+
+
+def estimate(fit: Fit, known: Uncertainty) -> Estimate:
+    """Values with their 95 % intervals, which are symmetric in the logarithm."""
+    names = fit.model.names
+    follows = DERIVED if "damping_ratio" in names else ()
+    every = (*names, *follows)
+    logs = fit.unknowns[: len(names)]
+    turn = slopes(fit.model.begin, names, logs, lambda each: each.logs(every))
+    covariance = turn @ known.covariance @ turn.T
+    error, bound = (np.sqrt(np.diag(each)) for each in (covariance, turn @ known.least @ turn.T))
+    here = fit.model.constants(fit.unknowns)
+    reach = _quantile(fit) * error
+    low, high = (_values(here, every, here.logs(every) + sign * reach) for sign in (-1, 1))
+    values = np.array([here.value(name) for name in every])
+    status = np.where(error > WEAK_FROM, WEAK, DETERMINED)
+    near = np.abs(fit.unknowns[:, None] - fit.bounds)[: len(names)].min(axis=1) < 1e-3
+    status[: len(names)][near] = AT_BOUND
+    status[error > NOTHING_FROM] = UNDETERMINED
+    scaled = known.covariance / np.outer(error[: len(names)], error[: len(names)])
+    axes = np.linalg.eigvalsh(scaled)
+    condition = float(np.sqrt(axes[-1] / max(axes[0], 1e-16)))
+    return Estimate(
+        every, len(names), values, error, bound, low, high, covariance, status, condition
+    )
+
+
+def _values(here: Constants, names: Sequence[Name], logs: Floats) -> Floats:
+    """Constants in working units, each from its own logarithm."""
+    barrier = np.array([here.angles[0] if name == "contact_cutoff" else 0.0 for name in names])
+    return barrier + np.exp(np.minimum(logs, 300.0))
+
+
+def _quantile(fit: Fit) -> float:
+    """Of the 95 % intervals: Student's, where the noise was estimated from the same data."""
+    experiments = fit.model.experiments
+    if all(each.measured.known for each in experiments):
+        return float(student.ppf(0.975, np.inf))
+    unbiased = sum(each.measured.unbiased for each in experiments)
+    return float(student.ppf(0.975, max(len(fit.residual) - len(fit.unknowns) - unbiased, 1)))
+
+
+def quality(fit: Fit) -> Quality:
+    """How well the fit explains each set."""
+    basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
+    taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
+    sets = range(len(fit.model.experiments))
+    means = [each.measured.unbiased for each in fit.model.experiments]
+    return Quality(
+        points=np.array([(rows == k).sum() for k in sets]),
+        freedom=np.array([(1 - taken[rows == k]).sum() - means[k] for k in sets]),
+        chi_square=np.array([(fit.residual[rows == k] ** 2).sum() for k in sets]),
+        level=fit.level,
+        autocorrelation=np.array([_autocorrelation(fit.residual[rows == k], fit, k) for k in sets]),
+    )
+
+
+def _autocorrelation(residual: Floats, fit: Fit, k: int) -> float:
+    """Correlation of residuals that follow one another in a channel of a set."""
+    channel = fit.model.experiments[k].measured.channel
+    following = channel[1:] == channel[:-1] if len(channel) else np.ones(len(residual) - 1, bool)
+    product = (residual[1:] * residual[:-1])[following].mean()
+    return float(product / max((residual**2).mean(), 1e-300))
+
+
+def warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
+    """What a reader should know before using the values, a sentence each."""
+    words = {
+        WEAK: "{name} is weakly determined by these data: its standard error is {error:.0%}",
+        UNDETERMINED: "{name} is not determined by these data: leave it out of fit, or measure"
+        " what depends on it",
+        AT_BOUND: "{name} ran to the end of the range that is looked through (a factor of 30 from"
+        " the start): check data and start",
+    }
+    out = [
+        words[status].format(name=name, error=error)
+        for name, status, error in zip(found.names, found.status, found.error, strict=True)
+        if status != DETERMINED
+    ]
+    if found.condition > TOLD_APART:
+        mutual = np.abs(found.correlation[: found.wanted, : found.wanted]) - np.eye(found.wanted)
+        one, other = np.unravel_index(mutual.argmax(), mutual.shape)
+        out.append(
+            f"{found.names[one]} and {found.names[other]} are hardly told apart (correlation"
+            f" {found.correlation[one, other]:+.3f}, condition number {found.condition:.0f})"
+        )
+    if newton > CONVERGED:
+        out.append(
+            f"the fit has not settled: by the adjoint's gradient it is {newton:.2g} standard"
+            " errors from the least sum of squares"
+        )
+    return out + [line for k in range(len(told.points)) for line in _of_set(fit, told, k)]
+
+
+def _of_set(fit: Fit, told: Quality, k: int) -> list[str]:
+    measured = fit.model.experiments[k].measured
+    out = [f"{measured.name}: {remark}" for remark in measured.remarks]
+    excess = told.chi_square[k] / max(told.freedom[k], 1.0)
+    if measured.known and excess > 1 + 4 * np.sqrt(2 / max(told.freedom[k], 1.0)):
+        out.append(
+            f"{measured.name}: residuals are {np.sqrt(excess):.2f} times what the stated noise"
+            " explains, so the intervals are too narrow: state no noise, to have it estimated"
+        )
+    chance = 4 / np.sqrt(told.points[k])
+    if told.autocorrelation[k] > max(chance, 0.15):
+        out.append(
+            f"{measured.name}: residuals that follow one another are alike (correlation"
+            f" {told.autocorrelation[k]:.2f}): the model misses something, and the intervals are"
+            " too narrow"
+        )
+    return out

@@ -1,0 +1,5 @@
+"""Simulates the tests that constants are fitted to."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

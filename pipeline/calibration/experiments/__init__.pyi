@@ -1,0 +1,11 @@
+from . import force_displacement as force_displacement
+from . import free_decay as free_decay
+from . import full_field as full_field
+from . import tracked_specimen as tracked_specimen
+from .experiment import Experiment as Experiment
+from .force_displacement import ForceTest as ForceTest
+from .free_decay import Decay as Decay
+from .full_field import FullFieldExperiment as FullFieldExperiment
+from .full_field import three as three
+from .tracked_specimen import TrackedSpecimen as TrackedSpecimen
+from .tracked_specimen import specimen as specimen

@@ -1,0 +1,155 @@
+"""One set of measurements as the estimator sees it, whatever its kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from pipeline.calibration.inputs import Constants, Name
+from sim.core import Floats, Ints
+
+Kind = Literal["force_displacement", "free_decay", "track"]
+
+_UNSEEN = 1e-8
+
+ELASTIC: tuple[Name, ...] = (
+    "axial_stiffness",
+    "shear_stiffness",
+    "bending_stiffness",
+    "contact_cutoff",
+)
+"""What equilibria depend on."""
+
+
+@dataclass(frozen=True)
+class MeasuredValues:
+    """The measured values of one set.
+
+    Attributes:
+        name: of the set.
+        kind: of the set.
+        abscissa: (n,) displacement in mm, or time in s.
+        values: (n,) forces in N, angles in rad, or displacements in mm and rad.
+        sigma: (n,) standard deviations, or their ratios only.
+        known: whether the standard deviations hold as they are.
+        channel: (n,) which course each value belongs to; of a track, 3 unit + dof, the load cell's
+            last.
+        bias: (n,) standard deviation of what a channel's values have in common besides; infinite
+            where it is unknown, so that a channel's mean tells nothing.
+        axes: (n, r) orthonormal directions of whitened values in which a common cause, such as
+            the noise of the drive, scatters them besides.
+        spread: (r,) standard deviation along them by that cause alone.
+        mixture: (m, r) what of the m independent causes each is made of.
+        remarks: what a reader should know of the set, a sentence each.
+    """
+
+    name: str
+    kind: Kind
+    abscissa: Floats
+    values: Floats
+    sigma: Floats
+    known: bool
+    channel: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    bias: Floats = field(default_factory=lambda: np.zeros(0))
+    axes: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    spread: Floats = field(default_factory=lambda: np.zeros(0))
+    mixture: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    remarks: tuple[str, ...] = ()
+
+    def whitened(self, deviation: Floats) -> Floats:
+        """Deviations (n, ...) from the values as numbers of unit variance, without correlation.
+
+        The covariance in a channel is D + b^2 1 1', with D the squared ``sigma``: its inverse root
+        takes from D^-1/2 x a part of the component along D^-1/2 1.
+        """
+        return self._less_common(self._less_mean((deviation.T / self.sigma).T))
+
+    def transposed(self, white: Floats) -> Floats:
+        """What the transpose of ``whitened`` makes of whitened numbers (n,)."""
+        return self._less_mean(self._less_common(white)) / self.sigma
+
+    def with_common(self, causes: Floats) -> MeasuredValues:
+        """The same with what independent causes do to the values, (n, m) per standard deviation.
+
+        The covariance of whitened values is then 1 + C C': along the axes of C they are divided by
+        what it is there.
+        """
+        white = self._less_mean((causes.T / self.sigma).T)
+        square, turn = np.linalg.eigh(white.T @ white)
+        seen = square > _UNSEEN * max(float(square[-1]), 1.0)
+        spread = np.sqrt(square[seen])
+        return replace(
+            self, axes=white @ turn[:, seen] / spread, spread=spread, mixture=turn[:, seen]
+        )
+
+    def causes(self, deviation: Floats) -> Floats:
+        """The expected causes (m, ...) of deviations (n, ...), in standard deviations."""
+        along = self.axes.T @ self._less_mean((deviation.T / self.sigma).T)
+        return np.asarray(self.mixture @ (along.T * self.spread / (1 + self.spread**2)).T)
+
+    def unexplained(self, causes: Floats) -> Floats:
+        """Causes (m, ...) times their covariance once the values are known, 1 before."""
+        known = self.spread**2 / (1 + self.spread**2)
+        return causes - self.mixture @ (known * (self.mixture.T @ causes).T).T
+
+    def _less_common(self, white: Floats) -> Floats:
+        if not len(self.spread):
+            return white
+        part = 1 - 1 / np.sqrt(1 + self.spread**2)
+        return white - self.axes @ (part * (self.axes.T @ white).T).T
+
+    def _less_mean(self, scaled: Floats) -> Floats:
+        """Multiples (n, ...) of ``sigma`` without what a bias of their channels may explain."""
+        if not len(self.bias):
+            return scaled
+        weight = 1 / self.sigma
+        size = np.bincount(self.channel, weight**2)[self.channel]
+        part = 1 - 1 / np.sqrt(1 + self.bias**2 * size)
+        flat = scaled.reshape(len(scaled), -1)
+        along = np.stack([np.bincount(self.channel, weight * column) for column in flat.T], axis=1)
+        taken = (part * weight / size)[:, None] * along[self.channel]
+        return (flat - taken).reshape(scaled.shape)
+
+    @property
+    def channels(self) -> Ints:
+        """(n,) the channel of each value; one where there is only one."""
+        return self.channel if len(self.channel) else np.zeros(len(self.values), dtype=np.int64)
+
+    @property
+    def unbiased(self) -> int:
+        """Number of means that tell nothing."""
+        return len(np.unique(self.channel[np.isinf(self.bias)])) if len(self.bias) else 0
+
+
+class Experiment(Protocol):
+    """What was measured, and a model of it."""
+
+    @property
+    def measured(self) -> MeasuredValues:
+        """The measurements."""
+        ...
+
+    @property
+    def sees(self) -> tuple[Name, ...]:
+        """The constants that the measurements depend on."""
+        ...
+
+    @property
+    def own_start(self) -> Floats:
+        """(n_own,) unknowns of this set alone to start from."""
+        ...
+
+    @property
+    def own_scale(self) -> Floats:
+        """(n_own,) changes of them that are about as visible as one of a constant by e."""
+        ...
+
+    def predict(self, constants: Constants, own: Floats) -> Floats:
+        """(n,) what would be measured without errors.
+
+        Raises:
+            SimulationError: there is no such state.
+        """
+        ...

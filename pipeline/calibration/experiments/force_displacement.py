@@ -1,0 +1,125 @@
+"""Force over displacement of a small lattice: bottom row clamped, top row moved."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
+from pipeline.calibration.experiments.simulated_experiment import (
+    KnownDrive,
+    Seen,
+    SpecimenSimulation,
+)
+from pipeline.calibration.inputs import Constants, ForceDisplacement, Name, csv_readings
+from pipeline.problem.fields import units
+from pipeline.runtime import UserError
+from sim.core import Floats, Ints, Numbers
+from sim.energy import topology
+from sim.quasistatics import StaticSolver
+from sim.scene import strain_energies
+from sim.solvers import TimeSeries, held_dofs
+from sim.structure import Lattice, Parameters
+
+DIRECTIONS = {"tension": (0.0, 1.0), "compression": (0.0, -1.0), "shear": (1.0, 0.0)}
+TOLERANCE = 1e-12
+"""Of equilibria, relative: far below what a difference of 1e-4 in a logarithm changes."""
+
+
+def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
+    """Displacements in mm and forces in N from the file of a set.
+
+    Raises:
+        UserError: the file cannot be used.
+    """
+    assert asked.file is not None
+    path = folder / asked.file
+    wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
+    displacement, force = csv_readings.read(path, wanted).T
+    if not (np.abs(displacement) > 0).any():
+        remedy = "give a test in which the top row moves"
+        raise UserError("the displacement is zero throughout", file=path, remedy=remedy)
+    return displacement, force
+
+
+@dataclass(frozen=True)
+class ForceTest:
+    """A test of forces (``experiment.Experiment``)."""
+
+    measured: MeasuredValues
+    simulation: SpecimenSimulation
+    tare: bool
+    sees: tuple[Name, ...] = ELASTIC
+
+    @property
+    def own_start(self) -> Floats:
+        """The load cell's zero, N, if it is unknown."""
+        return np.zeros(int(self.tare))
+
+    @property
+    def own_scale(self) -> Floats:
+        """See ``experiment.Experiment``."""
+        return np.full(int(self.tare), float(np.abs(self.measured.values).max()))
+
+    def predict(self, constants: Constants, own: Floats) -> Floats:
+        """See ``experiment.Experiment``."""
+        return self.simulation.predict(constants) + own.sum()
+
+    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        return self.simulation.pulled_back(constants, bar)
+
+
+def experiment(
+    asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats
+) -> ForceTest:
+    """The set as an experiment on equilibria."""
+    sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
+    known = asked.noise is not None
+    measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
+    return ForceTest(measured, simulation(asked, begin, displacement), asked.tare)
+
+
+def simulation(
+    asked: ForceDisplacement, begin: Constants, displacement: Floats
+) -> SpecimenSimulation:
+    """The specimen at the measured displacements."""
+    lattice, contact = asked.lattice.network(), begin.contact
+    bottom, top = (np.array(asked.lattice.side(name)) for name in ("bottom", "top"))
+    towards = np.array([*DIRECTIONS[asked.test], 0.0])
+    steps = np.arange(len(displacement) + 1.0)
+    motion = np.concatenate([[0.0], displacement])[:, None] * towards
+    fixed = topology(lattice, held_dofs(bottom, top), *begin.angles)
+    return SpecimenSimulation(
+        lattice,
+        lattice.vertices,
+        begin.material.density,
+        0.0 if contact is None else contact.stiffness,
+        StaticSolver(fixed, steps[1:], relative=TOLERANCE),
+        KnownDrive(top, TimeSeries(steps, motion)),
+        force_on(lattice, top, towards),
+    )
+
+
+def force_on(lattice: Lattice, moved: Ints, towards: Floats) -> Seen:
+    """The force (n,) on units along a direction: the change of energy with their displacement.
+
+    Contact acts on rotations alone, so its energy does not change with a displacement.
+    """
+    pairs = lattice.ligament_units
+    chosen = np.flatnonzero(np.isin(pairs, moved).any(axis=1))
+
+    def energy(step: Array, state: Array, made: Parameters) -> Array:
+        displaced = state.at[moved].add(step * towards)
+        return strain_energies(displaced, made, chosen, pairs[chosen]).sum()
+
+    def forces(motion: Numbers, made: Parameters) -> Array:
+        of_all = jax.vmap(jax.grad(energy), in_axes=(None, 0, None))
+        return jnp.asarray(of_all(jnp.zeros(()), jnp.asarray(motion), made))
+
+    return forces

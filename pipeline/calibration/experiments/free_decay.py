@@ -1,0 +1,137 @@
+"""Free decay of two units on one ligament: an angle over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import detrend, find_peaks
+
+from pipeline.calibration.experiments.experiment import MeasuredValues
+from pipeline.calibration.inputs import Constants, FreeDecay, Name, csv_readings
+from pipeline.problem.fields import units
+from pipeline.runtime import UserError
+from sim.core import Floats
+
+APART = 0.75
+"""Peaks are at least so many periods apart."""
+VISIBLE = 0.1
+"""Peaks below this part of the highest are left out."""
+LEAST_PEAKS = 4
+SAMPLES = 32
+"""Least number of samples of a trace."""
+
+
+class Peaks(NamedTuple):
+    """What a line through the logarithms of peaks tells.
+
+    Attributes:
+        ratio, error: damping ratio and its standard error.
+        frequency: of the damped oscillation, rad/s.
+    """
+
+    ratio: float
+    error: float
+    frequency: float
+
+
+def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
+    """Times in s, from zero, and angles in rad from the file of a set.
+
+    Raises:
+        UserError: the file cannot be used.
+    """
+    assert asked.file is not None
+    path = folder / asked.file
+    wanted = {asked.columns.time: units.TIME, asked.columns.angle: units.ANGLE}
+    time, angle = csv_readings.read(path, wanted).T
+    key, remedy = asked.columns.time, "sort the lines by time, each time once"
+    if (np.diff(time) <= 0).any():
+        line = int(np.argmax(np.diff(time) <= 0)) + 2
+        what = f"the clock does not ascend at the {line}th line of numbers"
+        raise UserError(what, file=path, key=key, value=float(time[line - 1]), remedy=remedy)
+    if len(time) < SAMPLES:
+        remedy = f"give {SAMPLES} lines or more"
+        raise UserError(f"only {len(time)} samples", file=path, remedy=remedy)
+    if by_peaks(time - time[0], angle) is None:
+        remedy = "cut the trace to begin after the release, with several periods above the noise"
+        raise UserError("no decaying oscillation is seen", file=path, remedy=remedy)
+    return time - time[0], angle
+
+
+def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
+    """Damping ratio by the authors' method: the slope of the logarithms of the peaks.
+
+    A trend is taken off first. With the slope m and the frequency w of the damped oscillation, the
+    ratio is 1 / sqrt(1 + (w / m)^2). The logarithms are weighted by the peaks' heights, since noise
+    moves those of low ones more. None where there are too few peaks, or they do not decay.
+    """
+    even = np.linspace(time[0], time[-1], len(time))
+    course = detrend(np.interp(even, time, angle))
+    spectrum = np.abs(np.fft.rfft(course * np.hanning(len(course))))
+    period = len(course) / max(int(spectrum.argmax()), 1)
+    place, _ = find_peaks(course, distance=max(APART * period, 1.0))
+    place = place[course[place] > VISIBLE * course.max()]
+    if len(place) < LEAST_PEAKS:
+        return None
+    left, top, right = course[place - 1], course[place], course[place + 1]
+    bend = left - 2 * top + right
+    offset = np.where(bend < 0, (left - right) / np.where(bend < 0, 2 * bend, 1.0), 0.0)
+    at = np.interp(place + offset, np.arange(len(even)), even)
+    height = top - (left - right) * offset / 4
+    frequency = 2 * np.pi * (len(at) - 1) / float(at[-1] - at[0])
+    (slope, _), scatter = np.polyfit(at, np.log(height), 1, w=height, cov=True)
+    if slope >= 0:
+        return None
+    ratio = 1 / np.sqrt(1 + (frequency / slope) ** 2)
+    error = ratio * (1 - ratio**2) * np.sqrt(scatter[0, 0]) / -slope
+    return Peaks(float(ratio), float(error), frequency)
+
+
+@dataclass(frozen=True)
+class Decay:
+    """A trace (``experiment.Experiment``).
+
+    Its own unknowns are offset (rad), drift (rad/s), the amplitudes of cosine and sine (rad), and
+    the logarithm of the undamped frequency (rad/s).
+    """
+
+    measured: MeasuredValues
+    peaks: Peaks
+    sees: tuple[Name, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
+
+    @property
+    def own_start(self) -> Floats:
+        """What a linear fit with the peaks' frequency and damping finds."""
+        frequency = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
+        shapes = terms(self.measured.abscissa, self.peaks.ratio, frequency)
+        return np.append(np.linalg.lstsq(shapes, self.measured.values)[0], np.log(frequency))
+
+    @property
+    def own_scale(self) -> Floats:
+        """See ``experiment.Experiment``."""
+        size, whole = np.ptp(self.measured.values), np.ptp(self.measured.abscissa)
+        return np.array([size, size / whole, size, size, 1 / (self.peaks.frequency * whole)])
+
+    def predict(self, constants: Constants, own: Floats) -> Floats:
+        """See ``experiment.Experiment``."""
+        shapes = terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
+        return np.asarray(shapes @ own[:-1])
+
+
+def terms(time: Floats, ratio: float, frequency: float) -> Floats:
+    """What the trace (n,) is a sum of (n, 4): 1, t, and a decaying cosine and sine."""
+    envelope, phase = np.exp(-ratio * frequency * time), frequency * np.sqrt(1 - ratio**2) * time
+    oscillation = [envelope * np.cos(phase), envelope * np.sin(phase)]
+    return np.stack([np.ones_like(time), time, *oscillation], axis=1)
+
+
+def experiment(asked: FreeDecay, time: Floats, angle: Floats) -> Decay:
+    """The set as an experiment."""
+    sigma = np.full(len(angle), 1.0 if asked.noise is None else asked.noise)
+    measured = MeasuredValues(asked.name, asked.kind, time, angle, sigma, asked.noise is not None)
+    peaks = by_peaks(time, angle)
+    assert peaks is not None
+    return Decay(measured, peaks)

@@ -1,0 +1,246 @@
+"""Full-field fit: the motion of every free unit of a track, driven as its held units were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+from jax import Array
+
+from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
+from pipeline.calibration.experiments.load_cell import LoadCellReadings, load_of
+from pipeline.calibration.experiments.measured_drive import Change, changed, followed
+from pipeline.calibration.experiments.simulated_experiment import (
+    AnySolver,
+    KnownDrive,
+    Seen,
+    SpecimenSimulation,
+)
+from pipeline.calibration.experiments.tracked_specimen import specimen
+from pipeline.calibration.inputs import Constants, Error, Name, TrackedMotion
+from pipeline.comparison import redrive
+from pipeline.datasets.tables import TABLES
+from pipeline.runtime import UserError
+from sim.core import Floats, Ints, Numbers
+from sim.energy import topology
+from sim.quasistatics import StaticSolver
+from sim.scene import TURN_ALLOWANCE, Scene
+from sim.structure import Parameters
+from sim.time_integration import ImplicitSolver
+
+TOLERANCE = 1e-12
+"""Of equilibria, relative."""
+STAGES = 1e-7
+"""Of the stages of a motion in time, mm/s."""
+STEPS = 2
+"""In time, between knots of the drive; more where it matters (``fitting``)."""
+UNKNOWN = np.array([0.1, 0.1, np.deg2rad(0.5)])
+"""Standard deviation (mm, mm, rad) of what stays with a held unit, where it is not stated."""
+DAMPING: tuple[Name, ...] = ("damping_ratio", "damping_translation", "damping_rotation")
+COARSE = (
+    "the frames are too few for the motion of the drive, so that what is between them may be"
+    " missed: film faster, or drive more slowly"
+)
+
+
+@dataclass(frozen=True)
+class FullFieldExperiment:
+    """A track as an experiment (``experiment.Experiment``).
+
+    Attributes:
+        measured: displacements of the free units, one course after the other; then the load.
+        simulation: of the specimen under the measured motion of the held units.
+        sees: the constants that the motion depends on.
+        changes: of that motion by one standard deviation of its noise, in independent ways.
+        drive: the motion with those changes that the free units speak for, if it is known.
+        part: (n,) of the motion that these changes make.
+    """
+
+    measured: MeasuredValues
+    simulation: SpecimenSimulation
+    sees: tuple[Name, ...]
+    changes: tuple[Change, ...]
+    drive: KnownDrive | None = None
+    part: Floats = field(default_factory=lambda: np.zeros(()))
+
+    @property
+    def own_start(self) -> Floats:
+        """None."""
+        return np.zeros(0)
+
+    @property
+    def own_scale(self) -> Floats:
+        """None."""
+        return np.zeros(0)
+
+    def predict(self, constants: Constants, own: Floats) -> Floats:
+        """See ``experiment.Experiment``."""
+        del own
+        return self.simulation.predict(constants, self.drive) - self.part
+
+    def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        return self.simulation.pulled_back(constants, bar, self.drive)
+
+    def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
+        """Derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
+        motion = self.simulation.pulled_to_drive(constants, bar, self.drive)
+        assert isinstance(motion, redrive.HermiteMotion)
+        value, slope = np.asarray(motion.value), np.asarray(motion.slope)
+        return np.array(
+            [
+                value[:, each.place, each.dof] @ each.value
+                + slope[:, each.place, each.dof] @ each.slope
+                for each in self.changes
+            ]
+        )
+
+    def with_drive_noise(self, constants: Constants) -> FullFieldExperiment:
+        """The same, knowing what the noise of the measured drive does to the prediction.
+
+        That is linearised about the drive that the free units speak for as well, by the noise that
+        is known so far: one of a noisy drive would belong to another motion (Gauss and Newton's
+        method for constants and drive together, the drive eliminated).
+        """
+        simulation, filtered = self.simulation, self.simulation.drive.motion
+        assert isinstance(filtered, redrive.HermiteMotion)
+        size = np.zeros(len(self.changes))
+        if len(self.measured.spread):
+            size = self.measured.causes(self.measured.values - self.predict(constants, np.zeros(0)))
+        units, motion = simulation.drive.units, changed(filtered, self.changes, size)
+        drive = KnownDrive(units, motion)
+        middle = simulation.predict(constants, drive)
+        moved = (changed(motion, [each], np.ones(1)) for each in self.changes)
+        causes = np.stack(
+            [simulation.predict(constants, KnownDrive(units, each)) - middle for each in moved],
+            axis=1,
+        )
+        measured = self.measured.with_common(causes)
+        return replace(self, measured=measured, drive=drive, part=causes @ size)
+
+    def finer(self) -> FullFieldExperiment:
+        """The same with half the steps in time; of equilibria there are none."""
+        return replace(self, simulation=self.simulation.finer())
+
+
+def experiment(
+    asked: TrackedMotion, folder: Path, begin: Constants, track: xr.Dataset
+) -> FullFieldExperiment:
+    """The set as an experiment.
+
+    Raises:
+        UserError: the problem is wrong, or the track is of something else.
+    """
+    made, path = specimen(asked, folder), folder / str(asked.file)
+    _refuse_other_contact(made.scene, begin, folder / asked.problem)
+    vertices = made.vertices(track, path)
+    upright = made.upright(track, vertices)
+    bias = UNKNOWN if asked.bias is None else three(asked.bias)
+    try:
+        drive = followed(upright, made.scene, bias)
+    except UserError as error:
+        error.file = str(path)
+        raise
+    driven = redrive.under(made.scene, drive.held)
+    frames = np.arange(0, track.sizes["time"], asked.every)
+    shown = upright.isel(time=frames)
+    chosen = _chosen(shown, driven)
+    measured, load = _measured(asked, shown, driven, chosen), None
+    if asked.load is not None:
+        load = load_of(asked.load, made, asked.case, shown, path)
+        measured = load.joined(measured)
+    simulation = SpecimenSimulation(
+        driven.lattice,
+        vertices,
+        begin.material.density,
+        float(np.max(driven.material.contact)),
+        _solver(
+            driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
+        ),
+        KnownDrive(drive.held.unit, drive.held.motion),
+        _seen(chosen, load),
+        made.stiffer,
+    )
+    remarks = (COARSE,) if drive.coarse else ()
+    sees = ELASTIC if driven.static else (*ELASTIC, *DAMPING)
+    return FullFieldExperiment(replace(measured, remarks=remarks), simulation, sees, drive.changes)
+
+
+def three(error: Error) -> Floats:
+    """An error of places and rotations for (ux, uy, theta)."""
+    return np.array([error.displacement, error.displacement, error.rotation])
+
+
+def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
+    """Raises a UserError where the cut-off is wanted of contact that the study has otherwise."""
+    if begin.cutoff is None:
+        return
+    if scene.contact_distance is not None or not np.isclose(scene.barrier, begin.angles[0]):
+        what = "the contact of the problem is not that of which the cut-off is wanted"
+        remedy = "give the calibration's contact the law and the barrier_angle of the problem"
+        raise UserError(what, file=path, key="contact", remedy=remedy)
+
+
+def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
+    """(n, 3) place of the unit, dof, frame of what counts: free, well seen, course by course.
+
+    The first frame is the reference of all others: by definition nothing has moved.
+    """
+    good = track["quality"].values == TABLES["track"]["quality"].flags["good"]
+    motion, sigma = (
+        track[name].transpose("time", "unit", "dof").values for name in ("displacement", "sigma")
+    )
+    counts = np.isfinite(motion) & (sigma > 0) & good[..., None]
+    counts[0] = False
+    counts = counts[:, driven.lattice.id].transpose(1, 2, 0).copy()
+    counts.reshape(-1, counts.shape[2])[driven.held] = False
+    return np.argwhere(counts)
+
+
+def _measured(
+    asked: TrackedMotion, track: xr.Dataset, driven: Scene, chosen: Ints
+) -> MeasuredValues:
+    """What counts of a track in the design's frame."""
+    place, dof, frame = chosen.T
+    unit = driven.lattice.id[place]
+    values, sigma = (
+        track[name].transpose("unit", "dof", "time").values.astype(float)[unit, dof, frame]
+        for name in ("displacement", "sigma")
+    )
+    own = np.full(3, np.inf) if asked.bias is None else three(asked.bias)
+    return MeasuredValues(
+        asked.name,
+        asked.kind,
+        (track["time"].values - track["time"].values[0])[frame],
+        values,
+        sigma,
+        asked.noise == "tracker",
+        3 * unit + dof,
+        own[dof],
+    )
+
+
+def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
+    """What is measured of a motion: what counts of it, and the load if there is a cell."""
+    unit, dof, frame = chosen.T
+
+    def seen(motion: Numbers, made: Parameters) -> Array:
+        moved = jnp.asarray(motion)
+        parts = [] if load is None else [load.force(moved[load.frame], made)]
+        return jnp.concatenate([moved[frame, unit, dof], *parts])
+
+    return seen
+
+
+def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
+    """The solver of the motion at the asked times, differentiable by every ligament's constants."""
+    whole = topology(
+        driven.lattice, driven.held, driven.barrier, driven.cutoff, None, driven.contact_distance
+    )
+    if driven.static:
+        return StaticSolver(whole, asked, relative=TOLERANCE)
+    steps = np.linspace(0.0, driven.duration, STEPS * (knots - 1) + 1)
+    return ImplicitSolver(whole, steps, asked, STAGES, turn_allowance=TURN_ALLOWANCE)

@@ -1,0 +1,99 @@
+"""The load cell of a track: the force of the drive along its direction, at equilibria."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.calibration.experiments.experiment import MeasuredValues
+from pipeline.calibration.experiments.force_displacement import force_on
+from pipeline.calibration.experiments.simulated_experiment import Seen
+from pipeline.calibration.experiments.tracked_specimen import TrackedSpecimen
+from pipeline.calibration.inputs import LoadCell
+from pipeline.runtime import UserError
+from sim.core import Floats, Ints
+
+
+class LoadCellReadings(NamedTuple):
+    """Readings of a load cell.
+
+    Attributes:
+        frame: (n,) in which there are any.
+        time: (n,) of these, s.
+        value: (n,) N.
+        sigma: standard deviation, N.
+        tare: whether the cell's zero is unknown.
+        force: what it reads of motions (n, n_units, 3) of the specimen.
+        channel: its course, after those of all units.
+    """
+
+    frame: Ints
+    time: Floats
+    value: Floats
+    sigma: float
+    tare: bool
+    force: Seen
+    channel: int
+
+    def joined(self, motion: MeasuredValues) -> MeasuredValues:
+        """The motion with the readings behind it."""
+        count = len(self.value)
+        return replace(
+            motion,
+            abscissa=np.append(motion.abscissa, self.time),
+            values=np.append(motion.values, self.value),
+            sigma=np.append(motion.sigma, np.full(count, self.sigma)),
+            channel=np.append(motion.channel, np.full(count, self.channel)),
+            bias=np.append(motion.bias, np.full(count, np.inf if self.tare else 0.0)),
+        )
+
+
+def load_of(
+    asked: LoadCell, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
+) -> LoadCellReadings:
+    """The readings of a track's load cell.
+
+    Raises:
+        UserError: there are none, or what they read is not known.
+    """
+    scene, towards = made.scene, made.towards(case)
+    for wrong, what, remedy in (
+        (
+            not scene.static,
+            "in a motion in time the cell feels the inertia of the grips, too",
+            "leave out load: forces count in slow, static motions",
+        ),
+        (
+            scene.contact_distance is not None,
+            "the force of contact by the law of distance is not known",
+            "leave out load, or use contact of law: angle",
+        ),
+        (
+            towards is None,
+            "a drive by a time series does not tell the direction of the cell",
+            "leave out load, or name a problem whose drive has directions",
+        ),
+        (
+            not np.isfinite(track["load_force"].values).any(),
+            "the track has no readings of a load cell",
+            "leave out load, or track the recording with its log of forces",
+        ),
+    ):
+        if wrong:
+            raise UserError(what, file=path, key="load", remedy=remedy)
+    assert towards is not None
+    value = track["load_force"].values
+    frame = np.flatnonzero(np.isfinite(value))
+    return LoadCellReadings(
+        frame,
+        (track["time"].values - track["time"].values[0])[frame],
+        value[frame],
+        asked.noise,
+        asked.tare,
+        force_on(scene.lattice, scene.driven, towards),
+        3 * track.sizes["unit"] + 2,
+    )

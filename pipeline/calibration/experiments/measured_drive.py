@@ -1,0 +1,199 @@
+"""The measured motion of the held units as a fit takes it: without bias, and with its covariance.
+
+Every course is a cubic spline with equal intervals that begins at zero, as the simulation does, and
+a constant that stays with its unit, which is no motion. A spline that smooths until its residuals
+are as large as the noise would leave out a part of the motion that all driven units have in common;
+least squares leave out only what the intervals are too long for. Their number is found over all
+courses together by the criterion of Akaike, corrected for short series (Hurvich & Tsai 1989). The
+criterion leaves out what is worth no unknown of its own, but all of that together may be worth many
+standard errors of a constant, and free units that resonate show it larger still. So the intervals
+are a quarter as long, and what is left out 256 times smaller.
+
+The coefficients are linear in the measured values, so that their covariance is known: each column
+of its root is a change of the drive by one standard deviation, independent of all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy.interpolate import BSpline
+
+from pipeline.comparison import redrive
+from sim.core import Floats
+from sim.scene import Scene
+
+_DEGREE = 3
+_FLOOR = 0.01
+"""Mean square of residuals, in the tracker's variances, below which they are rounding."""
+_FINER, _COARSE = 4, 2
+"""Times as many intervals as the criterion finds are wanted; with fewer than that is warned of."""
+_PART = 0.5
+"""Coefficients are at most this part of the frames."""
+
+
+class Change(NamedTuple):
+    """One course of a drive changed by one standard deviation of its noise.
+
+    Attributes:
+        place, dof: which course.
+        value, slope: (n,) at the knots.
+    """
+
+    place: int
+    dof: int
+    value: Floats
+    slope: Floats
+
+
+def changed(
+    motion: redrive.HermiteMotion, changes: Sequence[Change], size: Floats
+) -> redrive.HermiteMotion:
+    """The motion with changes of a size each, in standard deviations."""
+    value, slope = (np.array(part) for part in (motion.value, motion.slope))
+    for each, times in zip(changes, size, strict=True):
+        value[:, each.place, each.dof] += times * each.value
+        slope[:, each.place, each.dof] += times * each.slope
+    return motion._replace(value=value, slope=slope)
+
+
+class Followed(NamedTuple):
+    """The drive of a fit.
+
+    Attributes:
+        held: units, and their motion by values and slopes at the knots.
+        changes: of that motion, independent of one another.
+        coarse: whether the frames are too few for enough intervals.
+    """
+
+    held: redrive.Held
+    changes: tuple[Change, ...]
+    coarse: bool
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Courses of the held units. At the first frame they rest: it tells the constants.
+
+    Attributes:
+        time: (n,) s.
+        measured, sigma: (n, n_held, 3) mm, mm, rad.
+        there: (n, n_held) whether the unit was seen.
+        bias: (3,) standard deviation of what stays with a unit through all frames.
+        reach: (3,) range of the motions, mm, mm, rad.
+    """
+
+    time: Floats
+    measured: Floats
+    sigma: Floats
+    there: np.ndarray
+    bias: Floats
+    reach: Floats
+
+    def equations(self, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
+        """Whitened equations (n, 1 + n_coefficients) of a course, and their right sides (n,).
+
+        The first unknown is the constant; the first coefficient is zero. Where no frame tells a
+        coefficient, the course goes on as it went, give or take the range of the motions.
+        """
+        kept = self.there[:, place]
+        sigma = self.sigma[kept, place, dof]
+        basis = self.basis(intervals)[kept]
+        straight = np.diff(np.eye(basis.shape[1]), 2, axis=0)
+        basis[:, 0], straight[:, 0] = 1.0, 0.0
+        shift = np.eye(1, basis.shape[1]) / self.bias[dof]
+        rows = np.concatenate([basis / sigma[:, None], straight / self.reach[dof], shift])
+        given = self.measured[kept, place, dof] / sigma
+        return rows, np.append(given, np.zeros(len(straight) + 1))
+
+    def basis(self, intervals: int) -> Floats:
+        """(n, n_coefficients) all splines of the basis at the frames."""
+        knots = self.knots(intervals)
+        return np.asarray(BSpline.design_matrix(self.time, knots, _DEGREE).toarray())
+
+    def knots(self, intervals: int) -> Floats:
+        """Of the spline, those at the ends fourfold."""
+        inner = np.linspace(0.0, self.time[-1], intervals + 1)
+        return np.pad(inner, _DEGREE, mode="edge")
+
+    def misfit(self, intervals: int, place: int, dof: int) -> float:
+        """Sum of squares that a course of so many intervals leaves, in the tracker's variances."""
+        rows, given = self.equations(intervals, place, dof)
+        rest = rows @ np.linalg.lstsq(rows, given)[0] - given
+        return float(np.sum(rest[: np.count_nonzero(self.there[:, place])] ** 2))
+
+
+def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
+    """The motion of the held units of a track, which begins at rest.
+
+    Args:
+        track: of the specimen, in the design's frame.
+        scene: of the structure under its planned drive.
+        bias: (3,) standard deviation of what stays with a unit through all frames: mm, mm, rad.
+
+    Raises:
+        UserError: no driven unit was seen.
+    """
+    held = redrive.held_motion(track, scene)
+    seen = _seen(track, held, scene, bias)
+    places = np.flatnonzero(~held.assumed).tolist()
+    most = max(1, int(_PART * len(seen.time)) - _DEGREE)
+    best = min(_doubled(most), key=lambda count: _criterion(seen, places, count))
+    intervals = min(_FINER * best, most)
+    value, slope = (np.zeros((intervals + 1, len(held.unit), 3)) for _ in range(2))
+    changes: list[Change] = []
+    for place in places:
+        for dof in range(3):
+            values, slopes = _course(seen, intervals, place, dof)
+            value[:, place, dof], slope[:, place, dof] = values[0], slopes[0]
+            pairs = zip(values[1:], slopes[1:], strict=True)
+            changes.extend(Change(place, dof, *pair) for pair in pairs)
+    mean, guessed = held.driven & ~held.assumed, held.driven & held.assumed
+    for course in (value, slope):
+        course[:, guessed] = course[:, mean].mean(axis=1, keepdims=True)
+    motion = redrive.HermiteMotion(seen.time[-1] / intervals, value, slope)
+    return Followed(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
+
+
+def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> _Seen:
+    chosen = track.sel(unit=scene.lattice.id[held.unit])
+    measured, sigma = (
+        chosen[name].transpose("time", "unit", "dof").values.astype(float)
+        for name in ("displacement", "sigma")
+    )
+    there = np.isfinite(measured).all(axis=2) & np.isfinite(sigma).all(axis=2)
+    reach = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
+    reach += np.nanmax(sigma, axis=(0, 1))
+    time = track["time"].values - track["time"].values[0]
+    return _Seen(time, measured, sigma, there, bias, reach)
+
+
+def _doubled(most: int) -> list[int]:
+    """1, 2, 4 and so on, up to a number."""
+    return [1 << k for k in range(most.bit_length())]
+
+
+def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
+    """Akaike's criterion of all courses with so many intervals."""
+    count = 3 * int(seen.there[:, places].sum())
+    unknown = 3 * len(places) * (intervals + _DEGREE)
+    misfit = sum(seen.misfit(intervals, place, dof) for place in places for dof in range(3))
+    correction = count / max(count - unknown - 1, 1)
+    return count * float(np.log(max(misfit / count, _FLOOR))) + 2 * unknown * correction
+
+
+def _course(seen: _Seen, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
+    """Values and slopes (1 + n_changes, n_knots) of a course, and of its independent changes."""
+    rows, given = seen.equations(intervals, place, dof)
+    orthogonal, factor = np.linalg.qr(rows)
+    root = np.linalg.inv(factor)
+    unknown = np.column_stack([root @ (orthogonal.T @ given), root[:, 1:]])
+    unknown[0] = 0.0  # the constant is no motion, and the first coefficient is zero
+    knots = seen.knots(intervals)
+    spline = BSpline(knots, unknown, _DEGREE)
+    inner = knots[_DEGREE:-_DEGREE]
+    return spline(inner).T, spline.derivative()(inner).T

@@ -1,0 +1,178 @@
+"""Measurements that the simulator predicts, with the adjoint's derivatives of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from pipeline.calibration.inputs import Constants
+from sim.core import Floats, Ints, Numbers
+from sim.quasistatics import StaticSolver
+from sim.solvers import MotionLaw, PrescribedMotion, base, held_values
+from sim.structure import ConcreteParameters, Lattice, Material, Parameters, parameters, shape
+from sim.time_integration import ImplicitSolver, time_grid
+
+AnySolver = StaticSolver | ImplicitSolver
+
+Seen = Callable[[Numbers, Parameters], Array]
+"""What is measured of a motion (n_asked, n_units, 3) of given parameters."""
+
+
+class KnownDrive(PrescribedMotion):
+    """A drive whose values are computed once: a fit asks for the same ones again and again."""
+
+    def values(self, held: Ints, times: Floats) -> Floats:
+        """See ``sim.solvers.base.PrescribedMotion``."""
+        return self._once("values", held, times)
+
+    def rates(self, held: Ints, times: Floats) -> Floats:
+        """See ``sim.solvers.base.PrescribedMotion``."""
+        return self._once("rates", held, times)
+
+    def _once(self, what: Literal["values", "rates"], held: Ints, times: Floats) -> Floats:
+        memory = self.__dict__.setdefault("memory", {})
+        if (key := (what, times.tobytes())) not in memory:
+            units = np.asarray(self.units, dtype=np.int64)
+            compute = _followed(held.tobytes(), units.tobytes(), what)
+            memory[key] = np.asarray(compute(self.motion, times))
+        return memory[key]
+
+
+@lru_cache(maxsize=64)
+def _followed(
+    held: bytes, units: bytes, what: Literal["values", "rates"]
+) -> Callable[[MotionLaw, Numbers], Array]:
+    """Compiled function to the values or rates of the held dofs when units follow a motion."""
+    dofs, moved = (np.frombuffer(each, dtype=np.int64) for each in (held, units))
+
+    def values(motion: MotionLaw, times: Numbers) -> Array:
+        return held_values(dofs, moved, motion, times)
+
+    def rates(motion: MotionLaw, times: Numbers) -> Array:
+        at = jnp.asarray(times)
+        return jax.jvp(lambda t: values(motion, t), (at,), (jnp.ones_like(at),))[1]
+
+    return jax.jit(values if what == "values" else rates)
+
+
+@dataclass(frozen=True)
+class SpecimenSimulation:
+    """A specimen on its measured drive.
+
+    Attributes:
+        lattice: its network.
+        vertices: (n_vertices, 2) as built, mm.
+        density: tonne/mm^2.
+        contact: stiffness, N mm/rad^2.
+        solver: of its motion.
+        drive: of its held units.
+        seen: what is measured of the motion.
+        stiffer: (n_ligaments,) or (1,) factor on the stiffness of each ligament.
+    """
+
+    lattice: Lattice
+    vertices: Floats
+    density: float
+    contact: float
+    solver: AnySolver
+    drive: KnownDrive
+    seen: Seen
+    stiffer: Floats = field(default_factory=lambda: np.ones(1))
+
+    @cached_property
+    def parameters(self) -> Callable[[Numbers], Parameters[Array]]:
+        """Compiled map from a specimen's numbers (5,) to what the solvers take."""
+        made = shape(self.lattice, self.vertices)
+
+        @jax.jit
+        def of_numbers(numbers: Numbers) -> Parameters[Array]:
+            axial, shear, bending, translation, rotation = (numbers[k] for k in range(5))
+            made_of = Material(
+                self.density,
+                self.stiffer * axial,
+                self.stiffer * shear,
+                self.stiffer * bending,
+                self.contact,
+                translation,
+                rotation,
+            )
+            return parameters(self.lattice, made, made_of)
+
+        return of_numbers
+
+    @cached_property
+    def _compiled(self) -> Seen:
+        return jax.jit(self.seen)
+
+    def predict(self, constants: Constants, drive: KnownDrive | None = None) -> Floats:
+        """(n,) what is measured of a specimen, under another drive if one is given.
+
+        Raises:
+            SimulationError: a step failed.
+        """
+        made = self.parameters(constants.numbers)
+        values = ConcreteParameters(*(np.asarray(part) for part in made))
+        found, _, _ = base.forward(self._solver(constants), values, (drive or self.drive,))
+        return np.asarray(self._compiled(found[0], made))
+
+    def pulled_back(
+        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+    ) -> Floats:
+        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint.
+
+        Raises:
+            SimulationError: a step failed, or an equilibrium is not stable.
+        """
+        solver, numbers = self._solver(constants), jnp.asarray(constants.numbers)
+        made = self.parameters(numbers)
+        values = ConcreteParameters(*(np.asarray(part) for part in made))
+        motion, velocity, records = base.forward(solver, values, (drive or self.drive,))
+        by_motion, direct = self._seen_back(motion[0], made, bar)
+        still = np.zeros_like(velocity)
+        pulled = base.backward(solver, records, np.asarray(by_motion)[None], still)
+        total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
+        return np.asarray(self._parameters_back(numbers, Parameters(*total)))
+
+    def pulled_to_drive(
+        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+    ) -> MotionLaw:
+        """Derivatives of `bar @ predict` by the numbers of the drive's motion, by the adjoint.
+
+        Raises:
+            SimulationError: a step failed, or an equilibrium is not stable.
+        """
+        solver, made = self._solver(constants), self.parameters(constants.numbers)
+        known = drive or self.drive
+
+        def seen(motion: MotionLaw) -> Array:
+            drives = (PrescribedMotion(known.units, motion),)
+            return self.seen(base.simulate(solver, made, drives).displacement[0], made)
+
+        return jax.vjp(seen, known.motion)[1](jnp.asarray(bar))[0]
+
+    def finer(self) -> SpecimenSimulation:
+        """The same with half the steps in time; of equilibria there are none."""
+        solver = self.solver
+        if isinstance(solver, StaticSolver):
+            return self
+        return replace(self, solver=replace(solver, times=time_grid.halved(solver.times)))
+
+    @cached_property
+    def _seen_back(self) -> Callable[[Numbers, Parameters, Numbers], tuple[Array, Parameters]]:
+        return jax.jit(lambda motion, made, bar: jax.vjp(self.seen, motion, made)[1](bar))
+
+    @cached_property
+    def _parameters_back(self) -> Callable[[Numbers, Parameters], Array]:
+        return jax.jit(lambda at, bar: jax.vjp(self.parameters, at)[1](bar)[0])
+
+    def _solver(self, constants: Constants) -> AnySolver:
+        if constants.cutoff is None:
+            return self.solver
+        return replace(self.solver, topology=replace(self.solver.topology, cutoff=constants.cutoff))

@@ -1,0 +1,100 @@
+"""The specimen of a track: a structure of a study, and its motion in the frame of the design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline import datasets
+from pipeline import problem as problems
+from pipeline.calibration.inputs import TrackedMotion
+from pipeline.comparison import measured_places, register
+from pipeline.posing import flat_vertices, scene_of, spread
+from pipeline.problem import Problem
+from pipeline.runtime import UserError
+from sim.core import Floats
+from sim.scene import Scene
+from sim.structure import shape
+
+LEAST_FRAMES = 8
+
+
+class TrackedSpecimen(NamedTuple):
+    """A structure of a study.
+
+    Attributes:
+        problem: of the study.
+        scene: of the structure, under the problem's drives.
+        stiffer: (n_ligaments,) factor on the stiffness of each ligament.
+    """
+
+    problem: Problem
+    scene: Scene
+    stiffer: Floats
+
+    def vertices(self, track: xr.Dataset, path: Path) -> Floats:
+        """(n_vertices, 2) as built, mm.
+
+        Raises:
+            UserError: the track, read from `path`, is of something else.
+        """
+        if track.sizes["unit"] != self.problem.lattice.n_units:
+            remedy = "name the problem of the study that was filmed"
+            raise UserError("the track is of another lattice", file=path, key="unit", remedy=remedy)
+        built = flat_vertices(self.scene.lattice, track["vertices"])
+        if not np.isfinite(built).all():
+            remedy = "name the structure that was filmed: intact, altered or cloaked"
+            raise UserError("the track lacks units of the structure", file=path, remedy=remedy)
+        return built
+
+    def upright(self, track: xr.Dataset, vertices: Floats) -> xr.Dataset:
+        """The track turned into the design's frame; `vertices` (n_vertices, 2) are as built."""
+        lattice = self.scene.lattice
+        centre = spread(np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"])
+        found = register(centre, measured_places(track, centre))
+        seen = track["displacement"].transpose("time", "unit", "dof").values.astype(float)
+        return track.assign(displacement=(("time", "unit", "dof"), found.upright(seen)))
+
+    def towards(self, case: int) -> Floats | None:
+        """(3,) unit vector along which a load case drives; None where it has no such direction."""
+        along = getattr(self.problem.drive, "directions", None)
+        return None if along is None else np.array([np.cos(along[case]), np.sin(along[case]), 0.0])
+
+
+def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
+    """The structure that a set is of.
+
+    Raises:
+        UserError: the problem is wrong, or has no such load case.
+    """
+    path = folder / asked.problem
+    problem = problems.load(path, asked.preset)
+    scene = scene_of(problem, path.parent)
+    if asked.case >= len(scene.motions):
+        what = f"the problem has {len(scene.motions)} load cases, numbered from zero"
+        remedy = "give the number of one of them"
+        raise UserError(what, file=path, key="case", value=asked.case, remedy=remedy)
+    if asked.structure == "intact" and scene.reference is not None:
+        scene = scene.reference
+    ones = np.ones(scene.lattice.n_ligaments)
+    return TrackedSpecimen(
+        problem, scene, ones * scene.material.axial / problem.material.axial_stiffness
+    )
+
+
+def read(asked: TrackedMotion, folder: Path) -> xr.Dataset:
+    """The track of a set.
+
+    Raises:
+        UserError: it cannot be read, or is too short.
+    """
+    assert asked.file is not None
+    track = datasets.read(folder / asked.file, "track")
+    if track.sizes["time"] < LEAST_FRAMES * asked.every:
+        what = f"only {len(track['time'][:: asked.every])} frames are taken"
+        remedy = f"give a track of {LEAST_FRAMES} frames or more, or a smaller `every`"
+        raise UserError(what, file=folder / asked.file, remedy=remedy)
+    return track

@@ -1,0 +1,133 @@
+"""From the YAML of a calibration and its files to a fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.calibration.experiments import (
+    Experiment,
+    FullFieldExperiment,
+    force_displacement,
+    free_decay,
+    full_field,
+    tracked_specimen,
+)
+from pipeline.calibration.fit_uncertainty import inverted
+from pipeline.calibration.inputs import (
+    Calibration,
+    Constants,
+    ForceDisplacement,
+    FreeDecay,
+    Set,
+    start,
+)
+from pipeline.calibration.least_squares import Fit, Model, fit
+from pipeline.runtime import UserError
+from sim.core import Floats, SimulationError
+
+_ROUNDS = 5
+"""At most, in which the effect of the drive's noise is found anew, at better constants."""
+_HALVINGS = 5
+"""At most, of the steps in time."""
+AGREED = 0.2
+"""Constants that change by less, in standard errors, are final."""
+
+
+def fitted(asked: Calibration, path: Path) -> Fit:
+    """The fit that a calibration asks for.
+
+    Args:
+        asked: the calibration.
+        path: its YAML; files are named as seen from there.
+
+    Raises:
+        UserError: a file cannot be used, or the measured states cannot be simulated.
+    """
+    begin = start(asked)
+    experiments = [experiment(each, begin, path) for each in asked.data]
+    model = Model(begin, asked.fit, experiments)
+    values = sum(len(each.measured.values) for each in experiments)
+    if values <= len(model.start):
+        remedy = "measure more, or fit fewer constants"
+        what = f"{values} values do not determine {len(model.start)} unknowns"
+        raise UserError(what, file=path, key="data", remedy=remedy)
+    try:
+        return settled(model)
+    except SimulationError as error:
+        raise unsimulated(error, path) from error
+
+
+def unsimulated(error: SimulationError, path: Path) -> UserError:
+    """What it means that measured states cannot be simulated."""
+    remedy = "check lattice, displacements and the values in material that the fit starts from"
+    what = f"the measured states cannot be simulated: {error}"
+    return UserError(what, file=path, key="data", remedy=remedy)
+
+
+def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
+    """One set as an experiment.
+
+    Raises:
+        UserError: its file cannot be used.
+    """
+    if asked.file is None:
+        raise UserError(
+            "the data of this set are computed, and have not been yet",
+            file=path,
+            key=f"data: {asked.name}",
+            remedy=f"run python -m pipeline.stages.calibrate synthesise {path} --out-dir FOLDER,"
+            " give the calibration.yaml that it writes",
+        )
+    folder = path.parent
+    if isinstance(asked, ForceDisplacement):
+        return force_displacement.experiment(asked, begin, *force_displacement.read(asked, folder))
+    if isinstance(asked, FreeDecay):
+        return free_decay.experiment(asked, *free_decay.read(asked, folder))
+    return full_field.experiment(asked, folder, begin, tracked_specimen.read(asked, folder))
+
+
+def settled(model: Model) -> Fit:
+    """The fit with steps in time, and an effect of the drives' noise, that suit what it finds."""
+    if not any(isinstance(each, FullFieldExperiment) for each in model.experiments):
+        return fit(model)
+    found = fit(_noisy(model, model.begin))
+    for _ in range(_ROUNDS):
+        before, known = found, _noisy(found.model, found.model.constants(found.unknowns))
+        found = _resolved(fit(known, before.unknowns))
+        if _moved(found, found.unknowns - before.unknowns) < AGREED:
+            break
+    return found
+
+
+def _resolved(found: Fit) -> Fit:
+    """The fit with steps in time so short that half of them would move no constant."""
+    for _ in range(_HALVINGS):
+        finer = found.model._replace(experiments=[_finer(each) for each in found.model.experiments])
+        change = finer.residual(found.unknowns) - found.model.residual(found.unknowns)
+        level = found.level[found.model.set_of_row]
+        shift = -inverted(found.jacobian) @ (found.jacobian.T @ (change / level))
+        if _moved(found, shift) < AGREED:
+            return found
+        found = fit(finer, found.unknowns)
+    return found
+
+
+def _moved(found: Fit, change: Floats) -> float:
+    """The largest of the constants' changes, in standard errors."""
+    error = np.sqrt(np.diag(inverted(found.jacobian)))
+    return float(np.abs(change / error)[: len(found.model.names)].max())
+
+
+def _noisy(model: Model, at: Constants) -> Model:
+    """The model with what the noise of its drives does at some constants."""
+    knowing = [
+        each.with_drive_noise(at) if isinstance(each, FullFieldExperiment) else each
+        for each in model.experiments
+    ]
+    return model._replace(experiments=knowing)
+
+
+def _finer(each: Experiment) -> Experiment:
+    return each.finer() if isinstance(each, FullFieldExperiment) else each

@@ -1,0 +1,5 @@
+"""Reads what a calibration is given: its file, readings, constants."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

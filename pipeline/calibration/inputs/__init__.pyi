@@ -1,0 +1,13 @@
+from . import csv_readings as csv_readings
+from .computed_measurements import Error as Error
+from .constants import UNITS as UNITS
+from .constants import WRITTEN as WRITTEN
+from .constants import Constants as Constants
+from .constants import start as start
+from .description import Calibration as Calibration
+from .description import ForceDisplacement as ForceDisplacement
+from .description import FreeDecay as FreeDecay
+from .description import LoadCell as LoadCell
+from .description import Name as Name
+from .description import Set as Set
+from .description import TrackedMotion as TrackedMotion

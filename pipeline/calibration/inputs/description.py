@@ -1,0 +1,225 @@
+"""The YAML file of a calibration: which constants are wanted, and what was measured."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from pipeline.calibration.inputs.computed_measurements import (
+    Amplitude,
+    ComputedMeasurements,
+    Error,
+    VirtualDecay,
+    VirtualForces,
+    VirtualTrack,
+)
+from pipeline.problem.fields import Count, Force, Length, Section, exactly_one, fault
+from pipeline.problem.sections import Contact, Lattice, MaterialConstants
+
+Name = Literal[
+    "axial_stiffness",
+    "shear_stiffness",
+    "bending_stiffness",
+    "damping_ratio",
+    "damping_translation",
+    "damping_rotation",
+    "contact_cutoff",
+]
+
+File = Annotated[str, Field(min_length=1)]
+Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
+
+
+class ForceColumns(Section):
+    """Names of the columns; their units stand in brackets behind them in the file.
+
+    Attributes:
+        displacement: of the top row.
+        force: on it.
+    """
+
+    displacement: str = "displacement"
+    force: str = "force"
+
+
+class ForceDisplacement(Section):
+    """Force over displacement of a lattice whose bottom row is clamped and whose top row moves.
+
+    Attributes:
+        name: of the set.
+        file: a CSV with a heading, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        lattice: the specimen.
+        test: where the top row moves to; displacement and force count positive that way.
+        columns: of the file.
+        noise: standard deviation of the forces; estimated where it is not given.
+        tare: whether the load cell's zero is unknown.
+    """
+
+    kind: Literal["force_displacement"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualForces | None = None
+    lattice: Lattice
+    test: Literal["tension", "compression", "shear"]
+    columns: ForceColumns = ForceColumns()
+    noise: Force | None = None
+    tare: bool = False
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        return self
+
+
+class DecayColumns(Section):
+    """Names of the columns; their units stand in brackets behind them in the file.
+
+    Attributes:
+        time: of the readings.
+        angle: between the units.
+    """
+
+    time: str = "time"
+    angle: str = "angle"
+
+
+class FreeDecay(Section):
+    """Angle over time of two units on one ligament that was bent and let go.
+
+    Attributes:
+        name: of the set.
+        file: a CSV with a heading, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        columns: of the file.
+        noise: standard deviation of the angles; estimated where it is not given.
+    """
+
+    kind: Literal["free_decay"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualDecay | None = None
+    columns: DecayColumns = DecayColumns()
+    noise: Amplitude | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        return self
+
+
+class LoadCell(Section):
+    """A load cell that was read during a recording, along the drive of a static load case.
+
+    Attributes:
+        noise: standard deviation of the forces; where the tracker's uncertainties are ratios only,
+            it is one to them, too.
+        tare: whether the cell's zero is unknown.
+    """
+
+    noise: Annotated[Force, Field(gt=0.0)]
+    tare: bool = False
+
+
+class TrackedMotion(Section):
+    """The motion of a whole specimen, as `pipeline.stages.track` writes it.
+
+    Attributes:
+        name: of the set.
+        file: the track, as seen from this file.
+        virtual: how it is computed, in place of a file.
+        problem: of the study that was filmed, likewise.
+        preset: of the problem.
+        structure: which of the study's structures it is.
+        case: number of the study's load case; for what is computed, and for the load cell.
+        every: takes every so many frames.
+        noise: whether the tracker's uncertainties hold, or only their ratios do.
+        bias: standard deviation of what stays with a unit through all frames (registration); where
+            it is not given, each unit's is unknown and nothing is learnt from its mean place.
+        load: the load cell whose readings are in the track; without it they are left out.
+    """
+
+    kind: Literal["track"]
+    name: Label
+    file: File | None = None
+    virtual: VirtualTrack | None = None
+    problem: File
+    preset: str | None = None
+    structure: Literal["intact", "altered", "cloaked"] = "cloaked"
+    case: Annotated[int, Field(ge=0, strict=True)] = 0
+    every: Count = 1
+    noise: Literal["tracker", "estimated"] = "estimated"
+    bias: Error | None = None
+    load: LoadCell | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "file", "virtual")
+        if self.virtual is not None and self.structure == "cloaked":
+            remedy = "give intact or altered"
+            raise fault("a cloaked structure cannot be computed here", remedy, "structure")
+        return self
+
+
+Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminator="kind")]
+
+
+class Calibration(Section):
+    """Which constants are wanted, from which measurements.
+
+    Attributes:
+        title: one line about it.
+        doc: more lines.
+        spacing: of the lattice, for the authors' law of damping.
+        material: values to start from; those that are not wanted stay as they are.
+        contact: of neighbouring units in the tests of forces; without it there is none.
+        fit: the wanted constants.
+        data: what was measured; all sets are fitted together.
+        virtual: what data are computed with.
+        synthetic: whether the data were computed, not measured.
+    """
+
+    title: str = ""
+    doc: str = ""
+    spacing: Length
+    material: MaterialConstants
+    contact: Contact | None = None
+    fit: Annotated[tuple[Name, ...], Field(min_length=1)]
+    data: Annotated[tuple[Set, ...], Field(min_length=1)]
+    virtual: ComputedMeasurements | None = None
+    synthetic: bool = False
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for what, remedy, key in _faults(self):
+            raise fault(what, remedy, key)
+        return self
+
+
+def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
+    """What the sections do not see by themselves: fault, remedy, key."""
+    found = []
+    names = [each.name for each in asked.data]
+    if len(set(names)) < len(names):
+        found.append(("two sets have one name", "name them apart", "data"))
+    if len(set(asked.fit)) < len(asked.fit):
+        found.append(("a constant is named twice", "name each once", "fit"))
+    by_ratio, both = asked.material.damping.ratio is not None, {"translation", "rotation"}
+    wanted = {"ratio"} if by_ratio else both
+    unknown = {name for name in {"ratio", *both} - wanted if f"damping_{name}" in asked.fit}
+    if unknown:
+        form = "ratio" if by_ratio else "translation and rotation"
+        remedy = "write material.damping in the form that is wanted in fit"
+        found.append((f"the damping starts from {form}", remedy, "fit"))
+    if "contact_cutoff" in asked.fit and asked.contact is None:
+        remedy = "give contact, with law: angle"
+        found.append(("the cut-off of no contact is wanted", remedy, "fit"))
+    if asked.contact is not None and asked.contact.law != "angle":
+        remedy = "give contact of law: angle, or none"
+        found.append(("contact by the law of distance is not known here", remedy, "contact"))
+    computed = [each.virtual is not None for each in asked.data]
+    if any(computed) != (asked.virtual is not None):
+        remedy = "give virtual.truth with virtual sets, and only then"
+        found.append(("data are computed with true constants", remedy, "virtual"))
+    return found

@@ -1,0 +1,15 @@
+from . import redrive as redrive
+from .cloak_reduction import reduction as reduction
+from .compared_quantities import middle_units as middle_units
+from .compared_quantities import quantities as quantities
+from .comparison_dataset import Compared as Compared
+from .comparison_dataset import dataset as dataset
+from .measured_side import measurement as measurement
+from .nominal_side import along as along
+from .nominal_side import axis as axis
+from .nominal_side import nominal as nominal
+from .registration import measured_places as measured_places
+from .registration import pixel_size as pixel_size
+from .registration import register as register
+from .simulated_side import simulation as simulation
+from .wording import words as words

@@ -1,0 +1,25 @@
+"""What a cloak takes from a measured quantity, with the interval that follows from both of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.runtime import Floats
+
+
+def reduction(before: Floats, after: Floats) -> Floats:
+    """Value and ends of the interval (3,) of 1 - after / before.
+
+    The distances of the ends from the values add up as those of independent errors do, to first
+    order.
+
+    Args:
+        before: (3,) value, lower and upper end of what was measured without the cloak.
+        after: (3,) likewise with it.
+    """
+    first, first_low, first_high = before
+    last, last_low, last_high = after
+    value = 1 - last / first
+    down = np.hypot((last_high - last) / first, last * (first - first_low) / first**2)
+    up = np.hypot((last - last_low) / first, last * (first_high - first) / first**2)
+    return np.array([value, value - down, value + up])

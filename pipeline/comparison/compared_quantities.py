@@ -1,0 +1,105 @@
+"""What is followed along a recording: turning, shift, departure from the intact, contraction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.comparison.nominal_side import nominal
+from pipeline.problem import Problem
+from pipeline.runtime import Floats, Ints, Mask
+
+FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_error")
+"""Names in the dataset."""
+
+
+class Quantity(NamedTuple):
+    """A number that units have together.
+
+    Attributes:
+        of: makes it (..., frames) of motions (..., frames, n, 3) in mm and rad.
+        units: (n,) places of the units that count.
+        less: (frames, n_units, 3) motion that is taken off theirs first.
+        sampled: whether they stand for others, so that an interval holds their scatter too.
+    """
+
+    of: Callable[[Floats], Floats]
+    units: Ints
+    less: Floats | None = None
+    sampled: bool = True
+
+    def along(self, motion: Floats, units: Ints) -> Floats:
+        """The number (..., frames) of motions (..., frames, n, 3) of units of these places (n,)."""
+        return self.of(motion if self.less is None else motion - self.less[:, units])
+
+
+def quantities(
+    asked: Problem, response: xr.Dataset, time: Floats, inside: Mask
+) -> dict[str, Quantity]:
+    """What is followed, by its name; without an intact structure there is nothing to mimic.
+
+    Args:
+        asked: the problem.
+        response: of all structures under the load case of the recording.
+        time: (frames,) of the response at the frames, s; NaN where it has none.
+        inside: (n_units,) those that are compared in the region of interest.
+    """
+    units = np.flatnonzero(inside)
+    low, high = (middle_units(asked, side) for side in ("bottom", "top"))
+    nearer, rows = partial(nearing, lower=len(low)), np.array([*low, *high])
+    found = {
+        "mean_rotation": Quantity(rotation, units),
+        "mean_displacement": Quantity(distance, units),
+        "contraction": Quantity(nearer, rows, sampled=False),
+    }
+    if "intact" in response["structure"].values:
+        intact = response.sel(structure="intact")
+        of = partial(size, spacing=asked.lattice.spacing)
+        motion = intact["displacement"].transpose("time", "unit", "dof").values
+        course = of(motion[:, units])
+        of = partial(of, unit=course[-1] if asked.static else course.max())
+        found["mimicking_error"] = Quantity(of, units, nominal(intact, time).displacement)
+    return found
+
+
+def rotation(motion: Floats) -> Floats:
+    """Mean |theta|, rad."""
+    return mean(np.abs(motion[..., 2]))
+
+
+def distance(motion: Floats) -> Floats:
+    """Mean |u|, mm."""
+    return mean(np.linalg.norm(motion[..., :2], axis=-1))
+
+
+def nearing(motion: Floats, lower: int) -> Floats:
+    """How much nearer the first ``lower`` units come to the others, which are above them, mm."""
+    rise = motion[..., 1]
+    return mean(rise[..., :lower]) - mean(rise[..., lower:])
+
+
+def size(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
+    """Root mean square of |U|, U = (ux / spacing, uy / spacing, theta), in multiples of a unit."""
+    square = np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1)
+    return np.asarray(np.sqrt(mean(square)) / unit)
+
+
+def middle_units(problem: Problem, side: str) -> list[int]:
+    """Units of a side in the middle half of the lattice (7 columns of 15)."""
+    lattice = problem.lattice
+    along = {unit: x for unit, x, _ in lattice.sites()}
+    low, high = min(along.values()), max(along.values())
+    reach = (high - low + lattice.spacing) / 4
+    return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
+
+
+def mean(values: Floats) -> Floats:
+    """Mean over the last axis of those that are known; NaN of none."""
+    known = np.isfinite(values)
+    count = known.sum(axis=-1)
+    total = np.where(known, values, 0.0).sum(axis=-1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,0 +1,206 @@
+"""A comparison as a dataset: both sides at the frames, metrics, and how they were brought there."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.comparison import curves
+from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
+from pipeline.comparison.curves import Sides
+from pipeline.comparison.measured_side import Measurement
+from pipeline.comparison.metrics import METRICS, Pair, estimates
+from pipeline.comparison.nominal_side import ComparisonAxis, Nominal
+from pipeline.comparison.simulated_side import SimulatedSide
+from pipeline.datasets.tables import NETWORK
+from pipeline.runtime import Floats
+
+SEED = 0
+
+_MOTION = ("time", "unit", "dof")
+_OF_SIDE = ("side", "dof", "estimate")
+Variables = dict[str, tuple[Any, ...]]
+
+
+class Compared(NamedTuple):
+    """All that a comparison is made of.
+
+    Attributes:
+        measurement: the measured side.
+        axis: time or load.
+        simulation: under the measured motion, with its imperfect copies.
+        nominal: as the problem says.
+        quantities: what is followed, by its name.
+        design: as built.
+        frequency: of the drive, Hz; NaN without.
+        level: part of the copies in a band.
+        pixel: size of a pixel as calibrated and as stated, mm.
+    """
+
+    measurement: Measurement
+    axis: ComparisonAxis
+    simulation: SimulatedSide
+    nominal: Nominal
+    quantities: dict[str, Quantity]
+    design: xr.Dataset
+    frequency: float
+    level: float
+    pixel: tuple[float, float]
+
+    @property
+    def sides(self) -> Sides:
+        """Both simulations and what was measured, NaN where there is nothing to compare."""
+        measured, sigma = self.measurement.displacement, self.measurement.sigma
+        simulated, copies = self.simulation.displacement, self.simulation.copies
+        return Sides(measured, sigma, simulated, self.nominal.displacement, copies, self.level)
+
+
+def dataset(made: Compared) -> xr.Dataset:
+    """The dataset ``comparison``, without its attributes."""
+    random = np.random.default_rng(SEED)
+    design, axis, measurement = made.design, made.axis, made.measurement
+    lag = 0.0 if axis.lag is None else axis.lag.value
+    coordinates = {
+        **{name: design[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), measurement.time - lag),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+        "side": (("side",), ["simulated", "nominal"]),
+        "source": (("source",), ["measured", "simulated", "nominal"]),
+        "estimate": (("estimate",), ["value", "low", "high"]),
+        "drive_displacement": (("time", "xy"), measurement.drive),
+    }
+    variables = {
+        **{name: design[name] for name in (*NETWORK, "vertices")},
+        **_motions(made),
+        **_metrics(made, random),
+        **_curves(made, random),
+        **_alignment(made),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _motions(made: Compared) -> Variables:
+    measurement, simulation, sides = made.measurement, made.simulation, made.sides
+    band = sides.within(sides.copies)
+    forces = sides.within(simulation.force_copies)
+    quality = measurement.track["quality"].values[measurement.frames]
+    motions = {
+        "measured": sides.measured,
+        "measured_sigma": sides.sigma,
+        "simulated": sides.simulated,
+        "nominal": sides.nominal,
+        "residual": sides.measured - sides.simulated,
+        "band_low": band[0],
+        "band_high": band[2],
+    }
+    courses = {
+        "branch": made.axis.branch,
+        "frame": measurement.track["frame"].values[measurement.frames],
+        "load_force": measurement.force,
+        "simulated_force": simulation.force,
+        "nominal_force": made.nominal.force,
+        "force_low": forces[0],
+        "force_high": forces[2],
+    }
+    inside = measurement.compared
+    compared = sides._replace(measured=np.where(inside[:, None], sides.measured, np.nan))
+    return {
+        **{name: (_MOTION, values) for name, values in motions.items()},
+        **{name: (("time",), values) for name, values in courses.items()},
+        "quality": (("time", "unit"), quality),
+        "use": (("unit",), measurement.use),
+        "nominal_drive": (("time", "xy"), made.nominal.drive),
+        "band_coverage": (("dof",), curves.coverage(compared, band)),
+        "band_coverage_usual": (
+            ("dof",),
+            curves.usual_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
+        ),
+        "band_samples": ((), len(sides.copies)),
+    }
+
+
+def _metrics(made: Compared, random: np.random.Generator) -> Variables:
+    sides, inside = made.sides, made.measurement.compared
+    time = None if made.axis.lag is None else made.measurement.time
+    pairs = [
+        Pair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
+        for motion in sides.motions[1:]
+    ]
+    found = np.stack([estimates(pair, time, random) for pair in pairs])
+    table: Variables = {
+        name: (_OF_SIDE, np.moveaxis(found[:, :, place], 1, -1))
+        for place, name in enumerate(METRICS)
+    }
+    table["phase_lag"] = (_OF_SIDE, 2 * np.pi * made.frequency * table["time_shift"][1])
+    apart = np.stack([sides.measured - motion for motion in sides.motions[1:]])
+    apart[:, :, ~inside] = np.nan
+    return {
+        **table,
+        **_forces(made, random),
+        "rmse_map": (("side", "unit", "dof"), root_mean_square(apart, axis=1)),
+    }
+
+
+def _forces(made: Compared, random: np.random.Generator) -> Variables:
+    """How far the forces are from those of the load cell; its noise is in their scatter."""
+    measured = made.measurement.force[:, None, None]
+    still = np.zeros_like(measured)
+    sides = (made.simulation.force, made.nominal.force)
+    pairs = [Pair(measured, force[:, None, None], still) for force in sides]
+    found = np.stack([estimates(pair, None, random)[..., 0] for pair in pairs])
+    names = {"force_rmse": "rmse", "force_nrmse": "nrmse"}
+    return {
+        name: (("side", "estimate"), found[:, :, METRICS.index(metric)])
+        for name, metric in names.items()
+    }
+
+
+def _curves(made: Compared, random: np.random.Generator) -> Variables:
+    sides, along = made.sides, ("source", "time", "estimate")
+    nothing = np.full((3, len(sides.measured), 3), np.nan)
+    followed = {
+        name: curves.curve(sides, made.quantities[name], random)
+        if name in made.quantities
+        else nothing
+        for name in FOLLOWED
+    }
+    return {
+        **{name: (along, values) for name, values in followed.items()},
+        "peak_to_peak": (("source", "unit", "dof", "estimate"), curves.peaks(sides, random)),
+    }
+
+
+def _alignment(made: Compared) -> Variables:
+    found, lag = made.measurement.registration, made.axis.lag
+    calibrated, stated = made.pixel
+    scalars = {
+        "registration_rotation": found.rotation,
+        "registration_rotation_sigma": found.rotation_sigma,
+        "registration_scale": found.scale,
+        "registration_scale_sigma": found.scale_sigma,
+        "registration_residual": found.residual,
+        "pixel_size": calibrated,
+        "pixel_size_stated": stated,
+        "time_lag": np.nan if lag is None else lag.value,
+        "time_lag_sigma": np.nan if lag is None else lag.sigma,
+        "drive_correlation": np.nan if lag is None else lag.correlation,
+        "drive_gain": np.nan if lag is None else lag.gain,
+        "drive_gain_sigma": np.nan if lag is None else lag.gain_sigma,
+        "drive_turn": made.axis.turn,
+    }
+    return {
+        **{name: ((), value) for name, value in scalars.items()},
+        "registration_shift": (("xy",), found.shift),
+        "registration_shift_sigma": (("xy",), found.shift_sigma),
+    }
+
+
+def root_mean_square(values: Floats, axis: int) -> Floats:
+    """Root of the mean square over an axis of those that are known; NaN of none."""
+    known = np.isfinite(values)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0) ** 2
+    mean = total.sum(axis=axis) / np.maximum(count, 1)
+    return np.where(count > 0, np.sqrt(mean), np.nan)

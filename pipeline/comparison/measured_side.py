@@ -1,0 +1,143 @@
+"""The measured side: which frames and units of a track are compared, in the design's frame."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.comparison.alignment import LEAST_FRAMES, too_few
+from pipeline.comparison.registration import Registration, measured_places, register
+from pipeline.datasets.tables import TABLES
+from pipeline.posing import CLAMPED, DRIVEN
+from pipeline.runtime import Floats, Ints, Mask, UserError
+from pipeline.tracking.geometry import of_design
+from pipeline.tracking.output import is_driven, mean_seen
+
+MOST_FRAMES = 600
+COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)
+
+_SEEN = 0.5  # of the frames, or a unit counts as lost
+_SAME = 0.5  # mm between a vertex of the track and of the design
+
+
+class Measurement(NamedTuple):
+    """What was measured, in the design's frame.
+
+    Attributes:
+        frames: (n_frames,) numbers of those that are compared, in the track.
+        time: (n_frames,) on the track's clock, s.
+        displacement, sigma: (n_frames, n_units, 3) mm and rad, NaN where not measured.
+        use: (n_units,) whether the unit is compared.
+        centre: (n_units, 2) at rest by the design, mm; NaN for those that are absent.
+        registration: of the units at rest.
+        track: the whole of it, turned into the design's frame.
+        drive: (n_frames, 2) mean displacement of the driven units, mm; NaN while none is seen.
+        force: (n_frames,) of the load cell, N; NaN without.
+    """
+
+    frames: Ints
+    time: Floats
+    displacement: Floats
+    sigma: Floats
+    use: NDArray[np.int8]
+    centre: Floats
+    registration: Registration
+    track: xr.Dataset
+    drive: Floats
+    force: Floats
+
+    @property
+    def compared(self) -> Mask:
+        """Which units (n_units,) are compared."""
+        return np.asarray(self.use == COMPARED)
+
+
+def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
+    """The measured side of a comparison.
+
+    Args:
+        track: of the recording.
+        design: as built.
+
+    Raises:
+        UserError: the track is not of this design, shows no driven units, or is too short.
+    """
+    check(track, design)
+    centre = _centres(design)
+    found = register(centre, measured_places(track, centre))
+    motion = found.upright(track["displacement"].values.astype(float))
+    turned = track.assign(displacement=(track["displacement"].dims, motion))
+    frames = chosen_frames(track)
+    shown = turned.isel(time=frames)
+    displacement = shown["displacement"].values
+    return Measurement(
+        frames=frames,
+        time=shown["time"].values,
+        displacement=displacement,
+        sigma=shown["sigma"].values.astype(float),
+        use=_use(displacement, design),
+        centre=centre,
+        registration=found,
+        track=turned,
+        drive=mean_seen(displacement[:, is_driven(design), :2]),
+        force=shown["load_force"].values,
+    )
+
+
+def check(track: xr.Dataset, design: xr.Dataset) -> None:
+    """Refuses a track that is not of a design, in which no driven unit is seen, or that is short.
+
+    Raises:
+        UserError: telling which.
+    """
+    if not np.array_equal(track["unit"].values, design["unit"].values):
+        raise _another(f"it has {track.sizes['unit']} units, the design {design.sizes['unit']}")
+    tracked, built = (data["vertices"].values for data in (track, design))
+    if tracked.shape != built.shape or not np.array_equal(np.isnan(tracked), np.isnan(built)):
+        raise _another("other units are absent, or they have other vertices")
+    if (apart := float(np.nanmax(np.abs(tracked - built)))) > _SAME:
+        raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
+    seen = np.isfinite(track["displacement"].values[:, is_driven(design), 0]).any(axis=1)
+    if not seen.any():
+        raise UserError(
+            "no driven unit is seen in any frame: there is nothing to align with",
+            key="window",
+            remedy="film the driven units too, or give a window that shows them",
+        )
+    if seen.sum() < LEAST_FRAMES:
+        raise too_few(int(seen.sum()))
+
+
+def _another(why: str) -> UserError:
+    return UserError(
+        f"the track is not of this study's design: {why}",
+        key="design",
+        remedy="give the recording the `structure` that was filmed, and leave out `design`; or"
+        " compare it in the study of its own design",
+    )
+
+
+def chosen_frames(track: xr.Dataset) -> Ints:
+    """Frames to compare: no duplicates, and every so many of a long track."""
+    duplicate = TABLES["track"]["timing"].flags["duplicate"]
+    frames = np.flatnonzero(track["timing"].values != duplicate)
+    return frames[:: -(-len(frames) // MOST_FRAMES)]
+
+
+def _centres(design: xr.Dataset) -> Floats:
+    specimen = of_design(design)
+    out = np.full((design.sizes["unit"], 2), np.nan)
+    out[np.isin(design["unit"].values, specimen.ids)] = specimen.centre
+    return out
+
+
+def _use(motion: Floats, design: xr.Dataset) -> NDArray[np.int8]:
+    lost = np.isfinite(motion).all(axis=2).mean(axis=0) < _SEEN
+    support = design["support"].values
+    absent = np.isnan(design["vertices"].values[:, 0, 0])
+    conditions = [absent, support == CLAMPED, support == DRIVEN, lost]
+    chosen = np.select(conditions, [ABSENT, HELD, PUSHED, LOST], COMPARED)
+    return np.asarray(chosen, dtype=np.int8)

@@ -1,0 +1,99 @@
+"""The nominal side: the study's own response at the times or loads of the measured frames."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from pipeline.comparison import alignment
+from pipeline.comparison.alignment import Lag, SampledMotion
+from pipeline.runtime import Floats
+
+
+class ComparisonAxis(NamedTuple):
+    """What both sides have in common.
+
+    Attributes:
+        time: (frames,) of the response, s; NaN where it has none.
+        branch: (frames,) which way the load goes.
+        lag: of the drive; None for load, which has no time.
+        turn: direction of the measured less that of the nominal drive, rad.
+    """
+
+    time: Floats
+    branch: NDArray[np.int8]
+    lag: Lag | None
+    turn: float
+
+
+class Nominal(NamedTuple):
+    """The response at the frames.
+
+    Attributes:
+        displacement: (frames, units, 3) mm and rad, NaN where there is none.
+        drive: (frames, 2) of the driven units, mm.
+        force: (frames,) of the drive along its direction, N.
+    """
+
+    displacement: Floats
+    drive: Floats
+    force: Floats
+
+
+def along(response: xr.Dataset) -> Floats:
+    """Unit vector (2,) of the drive of a response of one case."""
+    angle = np.deg2rad(float(response["direction"]))
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
+    """How the measured frames lie on the axis of a response of one structure and case.
+
+    Args:
+        time: (frames,) on the track's clock, s.
+        drive: (frames, 2) measured displacement of the driven units, mm.
+        response: the nominal one.
+        static: whether it is a path of equilibria.
+
+    Raises:
+        UserError: the drive cannot be aligned.
+    """
+    nominal = SampledMotion(response["time"].values, response["drive_displacement"].values)
+    if not static:
+        lag = alignment.find_lag(SampledMotion(time, drive), nominal)
+        turn = alignment.turn(drive, nominal.at(time - lag.value))
+        still = np.full(len(time), alignment.MOTION, dtype=np.int8)
+        shown = np.where(time - lag.value <= nominal.time[-1], time - lag.value, np.nan)
+        return ComparisonAxis(shown, still, lag, turn)
+    way = along(response)
+    pushed = SampledMotion(nominal.time, (nominal.value @ way)[:, None])
+    shown = alignment.load_time(drive @ way, pushed)
+    turn = alignment.turn(drive, nominal.at(shown))
+    return ComparisonAxis(shown, alignment.branches(drive @ way), None, turn)
+
+
+def nominal(response: xr.Dataset, time: Floats) -> Nominal:
+    """A response of one structure and case at its own times, NaN where these are.
+
+    Before its start it rests; between its samples runs a cubic spline.
+    """
+    samples = response["time"].values
+    known = np.isfinite(time)
+    at = np.clip(time[known], samples[0], samples[-1])
+
+    def course(values: Floats) -> Floats:
+        out = np.full((len(time), *values.shape[1:]), np.nan)
+        out[known] = CubicSpline(samples, values)(at)
+        return out
+
+    motion = response["displacement"].transpose("time", "unit", "dof").values
+    present = np.isfinite(motion[0, :, 0])
+    displacement = np.full((len(time), *motion.shape[1:]), np.nan)
+    displacement[:, present] = course(motion[:, present])
+    drive = course(response["drive_displacement"].transpose("time", "xy").values)
+    force = course(response["drive_force"].transpose("time", "xy").values @ along(response))
+    return Nominal(displacement, drive, force)

@@ -1,0 +1,76 @@
+"""The simulated side: driven by the measured motion, with imperfect copies for its band."""
+
+from __future__ import annotations
+
+import logging
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.comparison import redrive, tolerance_band
+from pipeline.posing import PosedStructure, spread
+from pipeline.problem import Problem
+from pipeline.runtime import Floats
+
+LOG = logging.getLogger(__name__)
+
+
+class SimulatedSide(NamedTuple):
+    """What a structure does under the measured motion of what holds it.
+
+    Attributes:
+        displacement: (frames, units, 3) of all units, mm and rad; NaN for those that are absent.
+        force: (frames,) of the drive along its direction, N.
+        copies: (samples, frames, units, 3) of imperfect copies under the same motion.
+        force_copies: (samples, frames) likewise.
+        failures: why the path ended early, and why copies have no simulation.
+    """
+
+    displacement: Floats
+    force: Floats
+    copies: Floats
+    force_copies: Floats
+    failures: tuple[str, ...]
+
+
+def simulation(
+    asked: Problem,
+    structure: PosedStructure,
+    track: xr.Dataset,
+    times: Floats,
+    way: Floats,
+    threads: int = 1,
+) -> SimulatedSide:
+    """Simulates a structure and imperfect copies of it as the specimen was driven.
+
+    Args:
+        asked: the problem, with the tolerances.
+        structure: as designed.
+        track: in the design's frame.
+        times: (frames,) on the track's clock, s.
+        way: (2,) direction of the drive.
+        threads: copies simulated side by side.
+
+    Raises:
+        UserError: no driven unit was seen.
+    """
+    held = redrive.held_motion(track, structure.scene)
+    clock = times - track["time"].values[0]
+    made = redrive.redriven(structure, held, clock)
+    lattice, size = structure.scene.lattice, track.sizes["unit"]
+    displacement = spread(made.displacement, lattice, size, axis=1)
+    if made.failure is not None:
+        LOG.warning("warning: the simulation ended early: %s", made.failure)
+        nothing = np.empty((0, *displacement.shape))
+        return SimulatedSide(
+            displacement, made.drive_force @ way, nothing, nothing[..., 0, 0], (made.failure,)
+        )
+    copies = tolerance_band.sampled(asked, structure, clock, held, threads=threads)
+    return SimulatedSide(
+        displacement,
+        made.drive_force @ way,
+        spread(copies.displacement, lattice, size, axis=2),
+        copies.drive_force @ way,
+        copies.failures,
+    )

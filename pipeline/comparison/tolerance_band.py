@@ -1,0 +1,138 @@
+"""How far a simulation spreads under the tolerances of specimens and the doubt about constants.
+
+Specimens are drawn (pipeline/posing/drawn_specimen.py) and simulated under the same drive. The
+band between
+two quantiles of theirs, taken at p (n + 1) (Weibull's), holds the next specimen with the stated
+probability, at each instant and for each unit by itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from pipeline.comparison.redrive import Held, under
+from pipeline.posing import PosedStructure, drawn
+from pipeline.problem import Problem
+from pipeline.runtime import cli
+from sim.energy import observe
+from sim.quasistatics import StaticSolver
+from sim.scene import Scene, concrete_parameters, make_plan
+from sim.solvers import Case, Measure, Solved, Solver, run_batch
+from sim.structure import MOST_ROUNDS
+
+Floats = NDArray[np.float64]
+Places = NDArray[np.int64]
+
+STREAM = 1
+"""First word of the seeds of all draws here, so that no other specimen equals one of them."""
+
+
+class Samples(NamedTuple):
+    """Specimens that were simulated.
+
+    Attributes:
+        displacement: (n_samples, n_times, n_units, 3) of the units of the structure's lattice.
+        drive_force: (n_samples, n_times, 2) force of the drive on all driven units, N.
+        failures: of each specimen drawn that has no simulation, why.
+    """
+
+    displacement: Floats
+    drive_force: Floats
+    failures: tuple[str, ...]
+
+
+def sampled(
+    asked: Problem,
+    structure: PosedStructure,
+    times: Floats,
+    held: Held | None = None,
+    case: int = 0,
+    threads: int = 1,
+) -> Samples:
+    """Draws and simulates specimens of a structure.
+
+    Args:
+        asked: the problem, with how many to draw and how far they may be off.
+        structure: as designed, under the planned drives.
+        times: (n_times,) of the output, ascending, s.
+        held: the measured motion to drive them by in place of a planned one.
+        case: number of the planned load case.
+        threads: specimens simulated side by side.
+
+    Raises:
+        SimulationError: the structure as designed cannot be simulated.
+    """
+    planned, vertices = structure
+    scene = _alone(planned, case) if held is None else under(planned, held)
+    seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
+    made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
+    unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
+    failures = [unsound for _, copy in made if not copy.sound]
+    solver = _solver(scene, vertices, times)
+    cases = (
+        Case(concrete_parameters(each, copy.vertices), scene.drives[0], solver)
+        for each, copy in made
+        if copy.sound
+    )
+    courses = []
+    with cli.progress(len(made), "specimens", initial=len(failures)) as bar:
+        for outcome in run_batch(cases, _measure(scene, planned.driven), threads):
+            if outcome.value is None:
+                failures.append(outcome.failure or "")
+            else:
+                courses.append(outcome.value)
+            bar.update(failed=len(failures))
+    shape = (len(courses), len(times))
+    return Samples(
+        np.array([motion for motion, _ in courses]).reshape(*shape, scene.lattice.n_units, 3),
+        np.array([force for _, force in courses]).reshape(*shape, 2),
+        tuple(failures),
+    )
+
+
+def _alone(scene: Scene, case: int) -> Scene:
+    """The scene under one of its load cases."""
+    return replace(scene, motions=(scene.motions[case],), weights=np.ones(1))
+
+
+def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
+    """The plan's solver; of a path of equilibria, with the steps of the structure as designed."""
+    solver = make_plan(scene, vertices, times).solver
+    if not isinstance(solver, StaticSolver):
+        return solver
+    record = solver.forward(concrete_parameters(scene, vertices), scene.drives[0])[2]
+    return replace(solver, start=record)
+
+
+def _measure(scene: Scene, driven: Places) -> Measure[tuple[Floats, Floats]]:
+    def reduce(solved: Solved) -> tuple[Floats, Floats]:
+        motion = solved.displacement
+        reaction = observe(scene.topology, solved.case.values, motion).reaction
+        return motion, reaction[:, driven, :2].sum(axis=1)
+
+    return reduce
+
+
+def limits(values: Floats, level: float) -> Floats:
+    """Lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
+
+    The limits hold the next sample with the probability ``level``; with too few samples for that
+    they are the least and the greatest of them.
+    """
+    below = (1 - level) / 2
+    shares = [below, 0.5, 1 - below]
+    return np.asarray(np.quantile(values, shares, axis=0, method="weibull"))
+
+
+def widened(band: Floats, sigma: Floats, level: float) -> Floats:
+    """The band (3, ...) of what is measured with standard uncertainties ``sigma`` (...)."""
+    low, middle, high = band
+    noise = ndtri((1 + level) / 2) * sigma
+    return np.stack(
+        [middle - np.hypot(middle - low, noise), middle, middle + np.hypot(high - middle, noise)]
+    )

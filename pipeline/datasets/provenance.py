@@ -1,0 +1,135 @@
+"""Where a dataset comes from, as attributes: problem, parents, versions, commit and plan.
+
+No dates, hosts or wall times: the same sources make the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import subprocess
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.problem import Problem, Stage, canonical_json, section_hash
+from pipeline.runtime import UserError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def attributes(
+    problem: Problem,
+    stage: Stage,
+    *,
+    method: str | None = None,
+    parents: Mapping[str, Path] | None = None,
+    plan: object = None,
+) -> dict[str, str]:
+    """The provenance of a dataset that `stage` makes.
+
+    Args:
+        problem: the problem; as much of it as the stage depends on is stored in full.
+        stage: the stage.
+        method: the optimisation method, where the stage runs only one.
+        parents: files that the stage read, by role.
+        plan: what was decided and skipped; anything that JSON can hold.
+    """
+    return {
+        "problem": canonical_json(problem, stage, method),
+        "problem_hash": section_hash(problem, stage, method),
+        **_made_from(parents or {}),
+        "plan": _json(plan if plan is not None else {}),
+    }
+
+
+def recorded(
+    description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
+) -> dict[str, str]:
+    """The provenance of what is made of a recording, or of the measurements of a calibration.
+
+    Args:
+        description: its YAML as JSON.
+        parents: files that were read, by role; the hash of a folder is that of its files.
+        synthetic: whether it was rendered or computed.
+        role: what it describes.
+    """
+    return {
+        role: description,
+        "synthetic": "yes" if synthetic else "no",
+        **_made_from(parents),
+    }
+
+
+def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
+    return {
+        "history": f"written by metacloak, commit {git_commit()}",
+        "parents": _json({name: file_hash(path) for name, path in parents.items()}),
+        "packages": _json(dict(package_versions())),
+        "git_commit": git_commit(),
+    }
+
+
+def check_parent(made: xr.Dataset, file: Path, role: str, parent: Path) -> None:
+    """Refuses a dataset that was made from another file than the one beside it.
+
+    Args:
+        made: the dataset.
+        file: its file.
+        role: what the other is to it.
+        parent: the other.
+
+    Raises:
+        UserError: it tells of another file, or of none.
+    """
+    try:
+        known = json.loads(made.attrs["parents"])[role]
+    except (LookupError, ValueError, TypeError):
+        known = None
+    if known != file_hash(parent):
+        remedy = f"make it again from {parent}"
+        raise UserError(f"it is that of another {role}", file=file, key="parents", remedy=remedy)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 of a file's bytes, or of the names and bytes of a folder's files, in hex."""
+    if path.is_dir():
+        inside = sorted(each for each in path.iterdir() if each.is_file())
+        listed = "".join(f"{each.name} {file_hash(each)}\n" for each in inside)
+        return hashlib.sha256(listed.encode()).hexdigest()
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@lru_cache(maxsize=1)
+def package_versions() -> Mapping[str, str]:
+    """Versions of Python and of the packages that results depend on."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+@lru_cache(maxsize=1)
+def git_commit() -> str:
+    """The commit of the sources, or "unknown" outside a git checkout."""
+    command = ["git", "-C", str(_ROOT), "rev-parse", "--verify", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return done.stdout.strip()
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)

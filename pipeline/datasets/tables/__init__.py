@@ -1,0 +1,5 @@
+"""Defines the variables of every kind of dataset."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,5 @@
+"""Engraves ids and marks on units, and reads them back."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

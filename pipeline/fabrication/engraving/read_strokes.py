@@ -1,0 +1,157 @@
+"""Reads the id that is engraved on a part from its strokes, against the shapes of its letters.
+
+Strokes of known length and direction vote for one height and one turn of the text; then every
+letter is looked for. Slots may cut through letters, so not all of a letter has to be there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString
+from shapely.geometry.base import BaseGeometry
+
+from pipeline.fabrication.engraving.reading_order import in_order
+from pipeline.fabrication.engraving.stroke_font import text
+
+Floats = NDArray[np.float64]
+
+LEAST = 2.0
+"""Height of letters below which they cannot be read, mm."""
+
+LEGIBLE = 0.6
+"""Share of an id's strokes that has to be there."""
+
+_WHOLE = 0.98  # of the strokes, with which no better height is looked for
+_TURNED = 0.01  # rad; turns nearer to each other, or to half a turn, go together
+_NEAR = 0.02  # mm from a stroke
+_SAMPLE = 0.1  # mm
+_SPECK = 0.15  # mm; shorter pieces are ends of letters
+_HEIGHTS = (1.9, 12.0)  # mm, of letters
+_TURNS, _SIZES = 1e-3, 2e-3  # rad and mm: votes so near to each other are one
+_TURNS_KEPT, _SIZES_KEPT = 6, 3
+_SPOTS_KEPT = 8
+_MARK = 1.8  # mm, largest mark
+
+
+class Reading(NamedTuple):
+    """How letters stand: their height in mm, and their turn in rad."""
+
+    height: float
+    turn: float
+
+
+def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
+    """How the letters of an id stand; None if the strokes do not show it and a mark beside it.
+
+    Args:
+        words: the id.
+        strokes: polylines (n, 2), mm: the id and the mark that tells how it stands.
+    """
+    lines = [stroke for stroke in strokes if len(stroke) > 1]
+    if not lines:
+        return None
+    lines = [stroke - lines[0][0] for stroke in lines]  # the same wherever the text stands
+    drawn = _segments(lines)
+    glyphs = [text(letter, 1.0) for letter in words]
+    whole = shapely.MultiLineString(lines)
+    shapely.prepare(whole)
+    best, most = None, LEGIBLE
+    for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
+        if best is not None and (most > _WHOLE or abs(np.sin(turn - best.turn)) > _TURNED):
+            break  # no better one is to be expected, upright or upside down
+        spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
+        found, share = _read(letters, drawn, whole, spin)
+        if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
+            best, most = Reading(size, turn), share
+    return best
+
+
+def _is_mark(rest: BaseGeometry) -> bool:
+    """Whether the strokes that belong to no letter can be one small mark."""
+    pieces = [piece for piece in shapely.get_parts(rest) if piece.length > _SPECK]
+    return bool(pieces) and span(pieces) < _MARK
+
+
+def span(pieces: Sequence[BaseGeometry]) -> float:
+    """Longer side of the box about some pieces."""
+    x0, y0, x1, y1 = shapely.total_bounds(pieces)
+    return float(max(x1 - x0, y1 - y0))
+
+
+def _segments(strokes: Sequence[Floats]) -> Floats:
+    """(n, 2, 2) starts and ends."""
+    return np.concatenate([np.stack([stroke[:-1], stroke[1:]], axis=1) for stroke in strokes])
+
+
+def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
+    """Heights and turns of the text, those with most votes first.
+
+    A stroke that a slot cuts votes for the right turn still, for the height only a whole one does:
+    where all are cut, letters are small.
+    """
+    ours, theirs = (pair[:, 1] - pair[:, 0] for pair in (drawn, known))
+    ratio = (ours[:, 0] + 1j * ours[:, 1])[:, None] / (theirs[:, 0] + 1j * theirs[:, 1])[None]
+    votes = np.concatenate([ratio.ravel(), -ratio.ravel()])  # strokes may be drawn backwards
+    turns = np.round(np.angle(votes) / _TURNS)
+    sizes = np.round(np.abs(votes) / _SIZES)
+    possible = (np.abs(votes) > _HEIGHTS[0]) & (np.abs(votes) < _HEIGHTS[1])
+    for turn in _commonest(turns, _TURNS_KEPT):
+        for size in _commonest(sizes[possible & (turns == turn)], _SIZES_KEPT):
+            yield size * _SIZES, turn * _TURNS
+        yield LEAST, turn * _TURNS
+
+
+def _commonest(votes: Floats, count: int) -> list[float]:
+    """The values with most votes, the largest of those with as many first."""
+    kinds, counts = np.unique(votes, return_counts=True)
+    return [float(kind) for kind in kinds[np.lexsort((-kinds, -counts))[:count]]]
+
+
+def _read(
+    letters: Sequence[Sequence[Floats]], drawn: Floats, whole: shapely.Geometry, spin: Floats
+) -> tuple[shapely.Geometry, float]:
+    """The letters where they stand, in reading order, and the share of them that is there."""
+    lengths = [shapely.MultiLineString(letter).length for letter in letters]
+    offers = [_spots(letter, drawn, whole) for letter in letters]
+    upright = [places @ np.linalg.inv(spin) for places, _ in offers]
+    weights = [there * length for (_, there), length in zip(offers, lengths, strict=True)]
+    taken, weight = in_order(upright, weights)
+    lines = [
+        stroke + places[at]
+        for at, letter, (places, _) in zip(taken, letters, offers, strict=False)
+        for stroke in letter
+    ]
+    return shapely.MultiLineString(lines), weight / sum(lengths)
+
+
+def _spots(
+    letter: Sequence[Floats], drawn: Floats, whole: shapely.Geometry
+) -> tuple[Floats, Floats]:
+    """Where a letter may be (n, 2), and how much of it is there (n,); the best places.
+
+    A stroke of the letter, or what a slot leaves of it, is drawn from its start or to its end.
+    """
+    own = _segments(letter)
+    both = np.concatenate([drawn, drawn[:, ::-1]])
+    ours, theirs = both[:, 1] - both[:, 0], own[:, 1] - own[:, 0]
+    lengths = np.linalg.norm(theirs, axis=-1)
+    aside = ours[:, None, 0] * theirs[None, :, 1] - ours[:, None, 1] * theirs[None, :, 0]
+    reach = (ours[:, None] * theirs[None]).sum(axis=-1) / lengths
+    fits = (np.abs(aside) < _NEAR * lengths) & (reach > _SAMPLE) & (reach < lengths + _NEAR)
+    places = np.concatenate([(both[:, None] - own[None])[fits][:, end] for end in (0, 1)])
+    places = np.unique(np.round(places, 2), axis=0)
+    points = np.concatenate([shapely.get_coordinates(_finely(one)) for one in letter])
+    near = shapely.dwithin(whole, shapely.points(places[:, None] + points[None]), 2 * _NEAR)
+    there = near.mean(axis=1)
+    order = np.argsort(-there, kind="stable")[:_SPOTS_KEPT]
+    return places[order], there[order]
+
+
+def _finely(stroke: Floats) -> shapely.Geometry:
+    return shapely.segmentize(LineString(stroke), _SAMPLE)

@@ -1,0 +1,1 @@
+from . import package_folder as package_folder

@@ -1,0 +1,65 @@
+"""The manifest of a package: what it was made from, with which parameters, and what is in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from pipeline.datasets import file_hash, git_commit, package_versions
+from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.problem import Problem, section_hash
+from pipeline.runtime import UserError
+
+NAME = "manifest.json"
+_AGAIN = (
+    "make the package again: python -m pipeline.stages.fabricate, or snakemake --forcerun fabricate"
+)
+_READ = ("units", "letters_for_ids", "shims", "thin_walls_mm", "files")
+
+
+def read(folder: Path) -> dict[str, Any]:
+    """What the manifest of a package tells.
+
+    Raises:
+        UserError: there is none, or it is that of another version of the exporter.
+    """
+    path = folder / NAME
+    try:
+        told = dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError) as error:
+        what = f"the manifest cannot be read: {error}"
+        raise UserError(what, file=path, remedy=_AGAIN) from error
+    if missing := [key for key in _READ if key not in told]:
+        what = "another version of the exporter made the package: its manifest lacks a key"
+        raise UserError(what, file=path, key=missing[0], remedy=_AGAIN)
+    return told
+
+
+def write(folder: Path, specimen: BuiltSpecimen, asked: Problem, design: Path) -> None:
+    """Write the manifest of all other files in a package's folder.
+
+    Args:
+        folder: the package, complete but for its manifest.
+        specimen: what is built.
+        asked: the problem whose section `fabrication` holds.
+        design: the design dataset.
+    """
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != NAME)
+    told = {
+        "study": specimen.study,
+        "structure": specimen.structure,
+        "design_sha256": file_hash(design),
+        "problem_hash": section_hash(asked, "fabricate"),
+        "parameters": asked.fabrication.model_dump(mode="json"),
+        "parameters_note": "lengths in mm; spares is a ratio",
+        "units": [unit.label for unit in specimen.units],
+        "letters_for_ids": specimen.letters,
+        "shims": {shim.id: shim.count for shim in specimen.shims},
+        "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
+        "packages": dict(package_versions()),
+        "git_commit": git_commit(),
+        "files": {path.relative_to(folder).as_posix(): file_hash(path) for path in files},
+    }
+    text = json.dumps(told, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    (folder / NAME).write_text(text + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,5 @@
+"""Shapes units: outlines, slots for shims, dots for tracking."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

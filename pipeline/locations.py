@@ -1,8 +1,0 @@
-"""Holds the folders of this project: its code and its caches."""
-
-from __future__ import annotations
-
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parent.parent
-CACHE = ROOT / ".cache"

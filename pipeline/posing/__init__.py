@@ -1,0 +1,5 @@
+"""Poses scenes from problems and turns what is simulated into datasets."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

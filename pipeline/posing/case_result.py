@@ -1,0 +1,202 @@
+"""What is kept of a simulated case: motion, energies, forces, clearance, loss and their errors."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from sim.energy import Observables
+    from sim.scene import Scene
+    from sim.solvers import Case, Measure, Solved
+
+from sim.core import Floats
+
+Places = NDArray[np.int64]
+
+CLEARANCE_STRIDE = 4
+"""Gaps and overlaps of a motion in time are looked for in every so many samples."""
+NOT_ASKED, UNSTABLE, STABLE, JUMPED = -1, 0, 1, 2
+"""Stability of a state: no equilibrium; no minimum of the energy; a minimum; one that the structure
+jumped to from where its path ended."""
+LOG = logging.getLogger(__name__)
+
+
+class PosedStructure(NamedTuple):
+    """A structure under the problem's drives, its vertices (n_vertices, 2) in mm."""
+
+    scene: Scene
+    vertices: Floats
+
+
+class Times(NamedTuple):
+    """When the response is wanted.
+
+    Attributes:
+        asked: all times, ascending, s.
+        shown, integrated, sampled: where in them the response's own samples are, those of the
+            loss's integral, and those of the authors' sum.
+    """
+
+    asked: Floats
+    shown: Places
+    integrated: Places
+    sampled: Places
+
+
+class CaseResult(NamedTuple):
+    """What is kept of a simulated case: at the times shown, of the loss, and (region) at all."""
+
+    displacement: Floats
+    velocity: Floats
+    observables: Observables
+    drive_force: Floats
+    roi_energy: Floats
+    gap: Floats
+    overlapping: Floats
+    stability: NDArray[np.int8]
+    region: Floats
+    loss: float
+    loss_samples: float
+    loss_error: float
+    displacement_error: float
+
+
+def measure(
+    structure: PosedStructure, times: Times, intact: list[CaseResult] | None
+) -> Measure[CaseResult]:
+    """What reduces the cases of a structure.
+
+    Args:
+        structure: the structure.
+        times: when its motion was asked for.
+        intact: the cases of the structure to be mimicked, if one was simulated.
+    """
+    from sim.energy import observe
+    from sim.scene import objective, scales
+    from sim.solvers import solve_case
+    from sim.structure import clearance
+
+    scene, vertices = structure
+    stride = 1 if scene.static else CLEARANCE_STRIDE
+
+    def loss_of(motion: Floats, case: Case, at: Places, weights: Floats | None) -> float:
+        measure = objective(scene, _target(motion, scene, case.number, intact, at), weights)
+        return float(measure(motion[None, at], case.values)[0])
+
+    def reduce(solved: Solved) -> CaseResult:
+        case, motion = solved.case, solved.displacement
+        finer = case.solver.refined(solved.record)
+        refined = solve_case(finer, case.values, case.drive)[0].reshape(motion.shape)
+        loss, fine_loss = (
+            loss_of(each, case, times.integrated, None) for each in (motion, refined)
+        )
+        mean = np.full(len(times.sampled), 1 / len(times.sampled))
+        region, fine_region = (
+            each[times.integrated][:, scene.region] / scales(scene.lattice.spacing)
+            for each in (motion, refined)
+        )
+        shown = motion[times.shown]
+        seen = observe(scene.topology, case.values, shown)
+        found = clearance(scene.lattice, vertices, shown[::stride])
+        return CaseResult(
+            displacement=shown,
+            velocity=solved.velocity[times.shown],
+            observables=seen,
+            drive_force=seen.reaction[:, scene.driven, :2].sum(axis=1),
+            roi_energy=_roi_energy(scene, case, shown),
+            gap=_at_stride(found.gap, stride, len(shown)),
+            overlapping=_at_stride(found.overlaps, stride, len(shown)),
+            stability=_stability(solved, times.shown),
+            region=motion[:, scene.region],
+            loss=loss,
+            loss_samples=loss_of(motion, case, times.sampled, mean),
+            loss_error=abs(loss - fine_loss) / (1.0 if scene.reference else fine_loss),
+            displacement_error=float(
+                np.linalg.norm(region - fine_region) / np.linalg.norm(fine_region)
+            ),
+        )
+
+    return reduce
+
+
+def _target(
+    motion: Floats,
+    scene: Scene,
+    number: int,
+    intact: list[CaseResult] | None,
+    at: Places,
+) -> Floats | None:
+    """What the region (1, n_at, n_region, 3) should do: as the intact one did, which is its own."""
+    if scene.reference is None:
+        return None
+    whole = motion[:, scene.region] if intact is None else intact[number].region
+    return np.asarray(whole[None, at])
+
+
+def _roi_energy(scene: Scene, case: Case, motion: Floats) -> Floats:
+    from sim.scene import strain_energies
+
+    chosen = scene.region_ligaments
+    units = scene.lattice.ligament_units[chosen]
+    return np.asarray(strain_energies(motion, case.values, chosen, units).sum(axis=-1))
+
+
+def _at_stride(values: NDArray[np.generic], stride: int, size: int) -> Floats:
+    out = np.full(size, np.nan)
+    out[::stride] = values
+    return out
+
+
+def _stability(solved: Solved, at: Places) -> NDArray[np.int8]:
+    from sim.quasistatics import StaticRecord
+
+    record = solved.record
+    if isinstance(record, StaticRecord):
+        flags = np.where(record.stable == 1, np.where(record.jumped == 1, JUMPED, STABLE), UNSTABLE)
+        for flag, what in ((UNSTABLE, "is not stable"), (JUMPED, "was reached by a jump")):
+            if len(which := np.flatnonzero(flags == flag)):
+                LOG.warning("the equilibrium %s at load %s of %d", what, which + 1, len(flags))
+        return flags[at].astype(np.int8)
+    return np.full(len(at), NOT_ASKED, dtype=np.int8)
+
+
+def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:
+    """The structures to compare, by name; an intact one only where something is to be mimicked."""
+    from pipeline.posing.structure_variables import flat_vertices
+
+    found = {
+        "altered": PosedStructure(scene, scene.lattice.vertices),
+        "cloaked": PosedStructure(scene, flat_vertices(scene.lattice, design["vertices"])),
+    }
+    if scene.reference is None:
+        return found
+    intact = replace(scene.reference, reference=scene.reference)
+    return {"intact": PosedStructure(intact, intact.lattice.vertices), **found}
+
+
+def times_of(asked: Problem, scene: Scene) -> Times:
+    """Output times of a problem's response."""
+    from sim.scene import sample_times
+
+    horizon = scene.duration
+    end = (
+        horizon
+        if asked.frequency is None
+        else max(horizon, asked.response.cycles / asked.frequency)
+    )
+    shown = np.linspace(0.0, end, asked.response.samples)
+    integrated = sample_times(scene)
+    sampled = integrated if scene.steps else np.linspace(0.0, horizon, asked.horizon.samples)
+    wanted = (shown, integrated, sampled)
+    nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
+    every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)
+    ends = np.cumsum([len(times) for times in wanted])[:-1]
+    return Times(np.asarray(every * 1e-9), *np.split(place, ends))

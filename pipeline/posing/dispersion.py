@@ -1,0 +1,64 @@
+"""Waves in the unit cell of a problem's lattice, at rest and compressed, as variables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.posing.structure_variables import Variables
+from pipeline.posing.to_scene import lattice_of, material_of
+from pipeline.problem import Problem
+from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
+from pipeline.runtime import UserError
+from sim.core import SimulationError
+from sim.energy import topology
+from sim.structure import Parameters, parameters, shape
+from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
+
+
+def waves(asked: Problem, wanted: Spectrum) -> Variables:
+    """Bands of the unit cell at rest and compressed.
+
+    Raises:
+        UserError: the lattice has no unit cell, or it does not hold a strain.
+    """
+    cell = _cell(asked)
+    vectors, _ = brillouin_path(cell, wanted.waves)
+    found, lateral = [], []
+    for share in wanted.compressions:
+        try:
+            state = strained(cell, np.diag([-share, 0.0]), np.diag([0.0, 1.0]))
+        except SimulationError as error:
+            raise UserError(
+                str(error), key="spectrum.compressions", value=share, remedy="compress it less"
+            ) from error
+        squares = bands(cell, vectors, state)
+        found.append(np.sign(squares) * np.sqrt(np.abs(squares)) / (2 * np.pi))
+        lateral.append(state.gradient[1, 1])
+    places = np.arange(len(vectors)) / wanted.waves
+    return {
+        "wave": (("wave",), places),
+        "band": (("band",), np.arange(found[0].shape[1])),
+        "wave_vector": (("wave", "xy"), vectors),
+        "lateral_strain": (("compression",), lateral),
+        "band_frequency": (("compression", "wave", "band"), np.stack(found)),
+    }
+
+
+def _cell(asked: Problem) -> UnitCell:
+    """Unit cell of the lattice before anything was removed or reshaped."""
+    if isinstance(asked.lattice, ListedNetwork):
+        what = "a lattice from a file has no unit cell to send waves through"
+        raise UserError(what, key="spectrum", remedy="leave the section out")
+    lattice = lattice_of(asked)
+    made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked))
+    contact = asked.contact
+    fixed = topology(
+        lattice, np.zeros(0, dtype=np.int64), contact.barrier_angle, contact.cutoff_angle
+    )
+    period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
+    values = Parameters(*(np.asarray(part) for part in made))
+    try:
+        return cell_of(lattice, fixed, values, period)
+    except ValueError as error:
+        what, remedy = str(error), "enlarge the lattice, or leave the section out"
+        raise UserError(what, key="spectrum", remedy=remedy) from error

@@ -1,0 +1,69 @@
+"""What it means to the user that a structure cannot be designed or simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.runtime import UserError
+
+if TYPE_CHECKING:
+    from sim.constraints import ConstraintVector
+    from sim.core import SimulationError
+    from sim.optimise import InfeasibleStartError
+    from sim.scene import Scene
+
+_KEYS = {"convexity": "convex"}
+
+
+def infeasible(
+    error: InfeasibleStartError, constraints: ConstraintVector, source: Path
+) -> UserError:
+    """No design near the start can be made."""
+    kind, where = constraints.named(error.constraint)
+    return UserError(
+        f"infeasible at the start, by {error.violation:.3g} mm (angles times 5 mm) at {where},"
+        " and no design nearby can be made",
+        file=source,
+        key=f"constraints.{_KEYS.get(kind, kind)}",
+        remedy="ask for less there, or start from another lattice",
+    )
+
+
+class Simulated(NamedTuple):
+    """What was to be simulated: a structure of a problem file at solver times (n_asked,)."""
+
+    source: Path
+    scene: Scene
+    name: str
+    asked: NDArray[np.float64]
+
+
+def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> UserError:
+    """A structure's motion could not be followed to its end.
+
+    Args:
+        error: the solver's.
+        tried: what was to be simulated; times of a static structure are load parameters.
+        kept: the dataset that holds what was computed, if there is one.
+    """
+    scene = tried.scene
+    what = f"the {tried.name} structure cannot be simulated"
+    if scene.static and error.step is not None:
+        reached = 0.0 if error.step == 0 else float(tried.asked[error.step - 1])
+        driven = np.stack(
+            [np.asarray(motion(np.array([reached])))[0, :2] for motion in scene.motions]
+        )
+        length = float(np.linalg.norm(driven, axis=1).max())
+        what += f" beyond a driven displacement of {length:.3g} mm"
+        what += f" ({reached / scene.duration:.0%} of the load)"
+    if error.unit is not None:
+        i, j = scene.lattice.index[error.unit]
+        what += f", look at unit [{i}, {j}]"
+    remedy = "lower drive.amplitude, or ask for solver.accuracy: tight"
+    if kept is not None:
+        remedy += f"; all up to there is in {kept}"
+    return UserError(f"{what}: {error}", file=tried.source, key="drive.amplitude", remedy=remedy)

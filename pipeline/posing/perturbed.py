@@ -1,0 +1,190 @@
+"""Imperfect copies of a design: how they are drawn, simulated and measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem.sections import Robustness
+from pipeline.runtime import cli
+from sim.energy import observe
+from sim.scene import (
+    Scene,
+    concrete_parameters,
+    make_plan,
+    objective,
+    sample_times,
+    scales,
+    target_motion,
+)
+from sim.solvers import Case, Measure, MotionLaw, Outcome, Solved, run_batch
+from sim.structure import MOST_ROUNDS, PerturbedStructure, shifted, stiffened
+
+Floats = NDArray[np.float64]
+
+GEOMETRY, STIFFNESS = "geometry", "stiffness"
+
+
+class Noise(NamedTuple):
+    """A kind of imperfection and its size, a share of the spacing or of the stiffness."""
+
+    kind: str
+    size: float
+
+    @property
+    def name(self) -> str:
+        """As the dataset labels it."""
+        return f"{self.kind} {100 * self.size:g} %"
+
+
+class PerturbedResponse(NamedTuple):
+    """What is kept of a copy under one load case: curves (n_times,) and numbers."""
+
+    rotation: Floats
+    departure: Floats
+    reaction: Floats
+    loss: float
+    min_void_angle: float
+
+
+def noises(asked: Robustness) -> list[Noise]:
+    """The imperfections that a problem asks for."""
+    return [
+        *(Noise(GEOMETRY, size) for size in asked.geometry),
+        *(Noise(STIFFNESS, size) for size in asked.stiffness),
+    ]
+
+
+def draw(
+    scene: Scene, vertices: Floats, noise: Noise, seed: Sequence[int]
+) -> tuple[Scene, PerturbedStructure]:
+    """One copy of a structure: the scene with its stiffnesses, and its vertices.
+
+    Equal seeds give equal copies, whatever else is drawn.
+    """
+    random = np.random.default_rng(seed)
+    if noise.kind == GEOMETRY:
+        largest = noise.size * scene.lattice.spacing
+        return scene, shifted(scene.lattice, vertices, largest, scene.cutoff, random)
+    material = stiffened(scene.material, scene.lattice.n_ligaments, noise.size, random)
+    return replace(scene, material=material), PerturbedStructure(vertices, 0, 0, sound=True)
+
+
+def simulate(
+    scene: Scene,
+    vertices: Floats,
+    asked: Robustness,
+    samples: Sequence[int],
+    threads: int,
+) -> xr.Dataset:
+    """The dataset ``scatter`` of some of the copies.
+
+    Args:
+        scene: of the structure to copy.
+        vertices: (n_vertices, 2) its shipped design.
+        asked: what to draw.
+        samples: numbers of the copies to draw of each kind.
+        threads: copies simulated side by side.
+    """
+    target = None if scene.reference is None else target_motion(scene, threads)
+    parts = []
+    with cli.progress(len(noises(asked)) * len(samples), "copies") as bar:
+        for number, noise in enumerate(noises(asked)):
+            seeds = [(asked.seed, number, sample) for sample in samples]
+            drawn = [draw(scene, vertices, noise, seed) for seed in seeds]
+            outcomes = _outcomes(scene, vertices, drawn, target, threads)
+            rows = []
+            for (_, copy), outcome in zip(drawn, outcomes, strict=True):
+                rows.append(_row(scene, copy, outcome))
+                bar.update(failed=sum(row["status"].item() != "ok" for row in rows))
+            part = xr.concat(rows, dim=xr.DataArray(list(samples), dims="sample", name="sample"))
+            parts.append(part)
+    names = [noise.name for noise in noises(asked)]
+    return xr.concat(parts, dim=xr.DataArray(names, dims="noise", name="noise"))
+
+
+def _outcomes(
+    scene: Scene,
+    vertices: Floats,
+    drawn: Sequence[tuple[Scene, PerturbedStructure]],
+    target: Floats | None,
+    threads: int,
+) -> Iterator[list[Outcome[PerturbedResponse]]]:
+    """Outcomes of the load cases of every copy; none of a copy that cannot be made."""
+    plan = make_plan(scene, vertices, sample_times(scene), every_case=True)
+    cases = (
+        Case(concrete_parameters(imperfect, copy.vertices), drive, plan.solver, number)
+        for imperfect, copy in drawn
+        if copy.sound
+        for number, drive in enumerate(scene.drives)
+    )
+    n_cases = len(scene.drives)
+    done = run_batch(cases, _measure(scene, target), threads)
+    for _, copy in drawn:
+        yield list(islice(done, n_cases)) if copy.sound else []
+
+
+def _measure(scene: Scene, target: Floats | None) -> Measure[PerturbedResponse]:
+    scale = scales(scene.lattice.spacing)
+
+    def reduce(solved: Solved) -> PerturbedResponse:
+        case, motion = solved.case, solved.displacement
+        aim = None if target is None else target[case.number : case.number + 1]
+        inside = motion[:, scene.region]
+        apart = (inside if aim is None else inside - aim[0]) / scale
+        seen = observe(scene.topology, case.values, motion)
+        force = seen.reaction[:, scene.driven, :2].sum(axis=1)
+        loss = objective(scene, aim)(jnp.asarray(motion[None]), case.values)
+        return PerturbedResponse(
+            np.abs(inside[..., 2]).mean(axis=1),
+            np.sqrt((apart**2).sum(axis=-1).mean(axis=-1)),
+            force @ _along(scene.motions[case.number]),
+            float(loss[0]),
+            float(seen.void_angle.min()),
+        )
+
+    return reduce
+
+
+def _along(motion: MotionLaw) -> Floats:
+    """Unit vector (2,) of a drive along a straight line; NaN of any other."""
+    angle = float(getattr(motion, "direction", np.nan))
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def _row(
+    scene: Scene, copy: PerturbedStructure, outcomes: list[Outcome[PerturbedResponse]]
+) -> xr.Dataset:
+    """What the dataset holds of one copy: the mean of its load cases, or why there is none."""
+    failure = next((outcome.failure for outcome in outcomes if outcome.failure is not None), None)
+    if not copy.sound:
+        failure = f"units still overlap at rest after {MOST_ROUNDS} draws"
+    courses = [outcome.value for outcome in outcomes if outcome.value is not None]
+    times = sample_times(scene)
+
+    def mean(name: str) -> Floats:
+        values = np.array([getattr(course, name) for course in courses])
+        return np.tensordot(scene.weights, values, axes=1)
+
+    curves = {
+        name: ("time", np.full(len(times), np.nan) if failure else mean(name))
+        for name in ("rotation", "departure", "reaction")
+    }
+    voids = [course.min_void_angle for course in courses]
+    numbers = {
+        "loss": np.nan if failure else float(mean("loss")),
+        "min_void_angle": np.nan if failure else min(voids),
+        "clashes": copy.clashes,
+        "redrawn": copy.redrawn,
+        "status": failure or "ok",
+    }
+    return xr.Dataset(
+        {**curves, **{name: ((), value) for name, value in numbers.items()}}, {"time": times}
+    )

@@ -1,0 +1,149 @@
+"""The dataset of a study's responses, from what was measured of every structure and case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.posing.case_result import CaseResult, PosedStructure
+from pipeline.posing.law_comparison import LAWS, by_contact
+from pipeline.posing.structure_variables import (
+    Variables,
+    network_variables,
+    spread,
+    unit_coordinates,
+)
+from pipeline.posing.to_scene import contact_distance, lattice_of
+from pipeline.problem import Problem
+
+Floats = NDArray[np.float64]
+
+_MOTION = ("structure", "case", "time", "unit", "dof")
+_STEP, _CASE = _MOTION[:3], _MOTION[:2]
+_OBSERVED = {
+    "strain_energy": "strain_energy",
+    "contact_energy": "contact_energy",
+    "min_void_angle": "void_angle",
+    "contact_pairs": "contact_pairs",
+    "max_stretch": "stretch",
+    "max_shear": "shear",
+    "max_bend": "bend",
+}
+_OF_STEPS = ("roi_energy", "gap", "overlapping", "stability")
+_OF_CASES = ("loss", "loss_samples", "loss_error", "displacement_error")
+
+Table = dict[str, list[CaseResult]]
+
+
+def assemble_response(
+    asked: Problem, structures: dict[str, PosedStructure], times: Floats, measured: Table
+) -> xr.Dataset:
+    """The dataset ``response``.
+
+    Args:
+        asked: the problem.
+        structures: by name, in the order of the dataset.
+        times: (n_times,) of the samples shown, s.
+        measured: the cases of each structure.
+    """
+    scene = structures["altered"].scene
+    variables = {
+        **network_variables(asked, scene),
+        **_over_units(asked, structures, measured),
+        **_over_steps(measured),
+        **_over_cases(measured),
+        **by_contact(structures, contact_distance(asked)),
+        "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
+    }
+    for name in ("loss", "loss_samples", "loss_by_contact"):
+        variables[name] = (*variables[name], {"units": loss_units(asked)})
+    return xr.Dataset(variables, _coordinates(asked, structures, times))
+
+
+def loss_units(asked: Problem) -> str:
+    """Unit of a problem's loss."""
+    return "N mm" if asked.objective.kind == "strain_energy" else "1"
+
+
+def case_directions(asked: Problem) -> list[float]:
+    """Direction of each load case in rad; zero for a measured drive."""
+    return list(getattr(asked.drive, "directions", (0.0,)))
+
+
+def _gather(measured: Table, of_case: Callable[[CaseResult], object]) -> Floats:
+    return np.array([[of_case(case) for case in cases] for cases in measured.values()])
+
+
+def _over_units(
+    asked: Problem, structures: dict[str, PosedStructure], measured: Table
+) -> Variables:
+    size = lattice_of(asked).n_units
+
+    def whole(of_case: Callable[[CaseResult], Floats]) -> Floats:
+        return np.stack(
+            [
+                [spread(of_case(case), structures[name].scene.lattice, size, 1) for case in cases]
+                for name, cases in measured.items()
+            ]
+        )
+
+    lattices = [(each.scene.lattice, each.vertices) for each in structures.values()]
+    padded = [spread(lattice.padded(places), lattice, size) for lattice, places in lattices]
+    return {
+        "vertices": (("structure", "unit", "vertex", "xy"), np.stack(padded)),
+        "displacement": (_MOTION, whole(lambda case: case.displacement)),
+        "velocity": (_MOTION, whole(lambda case: case.velocity)),
+        "reaction_force": (_MOTION, whole(lambda case: case.observables.reaction)),
+    }
+
+
+def _over_steps(measured: Table) -> Variables:
+    def observed(name: str) -> Floats:
+        return _gather(measured, lambda case: getattr(case.observables, name))
+
+    def kept(name: str) -> Floats:
+        return _gather(measured, lambda case: getattr(case, name))
+
+    return {
+        **{name: (_STEP, observed(source)) for name, source in _OBSERVED.items()},
+        **{name: (_STEP, kept(name)) for name in _OF_STEPS},
+        "drive_force": ((*_STEP, "xy"), kept("drive_force")),
+    }
+
+
+def _over_cases(measured: Table) -> Variables:
+    def kept(name: str) -> Floats:
+        return _gather(measured, lambda case: getattr(case, name))
+
+    return {
+        **{name: (_CASE, kept(name)) for name in _OF_CASES},
+        "min_gap": (_CASE, _gather(measured, lambda case: np.nanmin(case.gap))),
+        "overlaps": (_CASE, _gather(measured, lambda case: int(np.nanmax(case.overlapping)))),
+    }
+
+
+def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
+    """Mean displacement (n_cases, n_times, 2) of the driven units, mm."""
+    scene = structures["altered"].scene
+    dofs = (3 * scene.driven[:, None] + np.arange(2)).ravel()
+    place = np.searchsorted(scene.held, dofs)
+    held = np.stack([drive.values(scene.held, times) for drive in scene.drives])
+    return np.asarray(held[:, :, place].reshape(*held.shape[:2], -1, 2).mean(axis=2))
+
+
+def _coordinates(asked: Problem, structures: dict[str, PosedStructure], times: Floats) -> Variables:
+    directions = case_directions(asked)
+    frequency = np.nan if asked.frequency is None else asked.frequency
+    return {
+        **unit_coordinates(lattice_of(asked)),
+        "structure": (("structure",), list(structures)),
+        "direction": (("case",), np.rad2deg(directions)),
+        "frequency": (("case",), [frequency] * len(directions)),
+        "amplitude": (("case",), [getattr(asked.drive, "amplitude", np.nan)] * len(directions)),
+        "time": (("time",), times),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+        "contact_law": (("contact_law",), list(LAWS)),
+    }

@@ -1,0 +1,51 @@
+"""The scene that a design is optimised for: the problem's own, or with all that it must hold."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.posing.to_scene import motions_of, scene_of
+from pipeline.problem import Problem
+from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive, Robust
+from sim.scene import Scene
+from sim.solvers import MotionLaw
+
+
+def design_scene(asked: Problem, folder: Path) -> Scene:
+    """The scene whose loss a design of a problem is to lower; the drive's own cases come first.
+
+    Raises:
+        UserError: the file of a measured drive cannot be read.
+    """
+    robust, scene = asked.objective.robust, scene_of(asked, folder)
+    if robust is None:
+        return scene
+    copies = _copies(robust, scene) if robust.copies else None
+    scene = replace(scene, sharpness=robust.sharpness, copies=copies)
+    if not robust.loads:
+        return scene
+    loads = (Load(), *robust.loads)
+    every = [_under(asked, load) for load in loads]
+    motions: tuple[MotionLaw, ...] = tuple(m for each in every for m in motions_of(each, folder))
+    frequency = max(each.frequency for each in every if each.frequency is not None)
+    share = np.array([load.weight for load in loads])
+    weights = np.outer(share / share.sum(), scene.weights).ravel()
+    return replace(scene.under(motions, scene.duration, frequency), weights=weights)
+
+
+def _under(asked: Problem, load: Load) -> Problem:
+    """The problem under another load."""
+    assert isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive)
+    changed = load.model_dump(include={"amplitude", "frequency"}, exclude_none=True)
+    return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})
+
+
+def _copies(robust: Robust, scene: Scene) -> NDArray[np.float64]:
+    """Shifts (n_copies, n_groups, 2) of the vertices, evenly spread, mm."""
+    largest = robust.geometry * scene.lattice.spacing
+    random = np.random.default_rng(robust.seed)
+    return random.uniform(-largest, largest, (robust.copies, scene.lattice.n_groups, 2))

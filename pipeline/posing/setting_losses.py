@@ -1,0 +1,110 @@
+"""The losses of the altered structure and of a design in one problem, and why there are none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from pipeline.posing.structure_variables import flat_vertices
+from pipeline.posing.to_scene import lattice_of, scene_of
+from pipeline.problem import Problem, canonical_json, from_canonical
+from pipeline.problem.reading import findings, reason
+from pipeline.problem.sections import Setting, laid
+from pipeline.runtime import SweepResult, UserError
+from sim.core import SimulationError
+from sim.scene import Scene, concrete_parameters, make_plan, objective, target_motion
+from sim.solvers import Case, Outcome, Solved, run_batch
+
+Floats = NDArray[np.float64]
+Result = Outcome[tuple[float, float]]
+
+
+class UnposedError(ValueError):
+    """A setting that makes no problem that could be simulated."""
+
+
+def results(
+    asked: Problem, setting: Setting, folder: Path, vertices: xr.DataArray, threads: int
+) -> list[SweepResult]:
+    """What comes of every load case of a problem with a setting laid over it.
+
+    Args:
+        asked: the problem, whose files lie in ``folder``.
+        setting: what to change.
+        folder: see there.
+        vertices: (unit, vertex, xy) the design.
+        threads: load cases simulated side by side.
+
+    Raises:
+        UnposedError: the setting makes no problem, or one that the design does not fit.
+        SimulationError: what the structures should mimic cannot be simulated.
+    """
+    try:
+        problem = _posed(asked, setting)
+        if lattice_of(problem).n_units != vertices.sizes["unit"]:
+            raise UnposedError("the design is of a lattice with another number of units")
+        # No design space is asked for: its symmetry costs more than it could save.
+        scene = replace(scene_of(problem, folder), symmetry="none")
+    except ValidationError as error:
+        raise UnposedError(reason(error)[0]) from error
+    except UserError as error:
+        raise UnposedError(error.what) from error
+    target = None if scene.reference is None else target_motion(scene, threads)
+    altered = _simulated(scene, scene.lattice.vertices, target, threads)
+    cloaked = _simulated(scene, flat_vertices(scene.lattice, vertices), target, threads)
+    return [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
+
+
+def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
+    """Several load cases as one: their losses weighted, their smallest void angle."""
+    numbers = np.array([each[:-1] for each in found])
+    loss, altered = weights @ numbers[:, :2]
+    status = next((each.status for each in found if each.status != "ok"), "ok")
+    return SweepResult(float(loss), float(altered), float(numbers[:, 2].min()), status)
+
+
+def _posed(asked: Problem, setting: Setting) -> Problem:
+    """The problem with a setting in place of its own values, and without a sweep."""
+    data = laid(json.loads(canonical_json(asked, "sweep")), setting)
+    data.pop("sweep")
+    problem = from_canonical(data)
+    for finding in findings(problem):
+        raise UnposedError(f"{'.'.join(map(str, finding.keys))}: {finding.what}")
+    return problem
+
+
+def _found(altered: Result, cloaked: Result) -> SweepResult:
+    nothing = (float("nan"), float("nan"))
+    loss, void = cloaked.value or nothing
+    failures = (cloaked.failure, altered.failure and f"altered structure: {altered.failure}")
+    status = next((failure for failure in failures if failure), "ok")
+    return SweepResult(loss, (altered.value or nothing)[0], void, status)
+
+
+def _simulated(
+    scene: Scene, vertices: Floats, target: Floats | None, threads: int
+) -> Iterator[Result]:
+    """Loss and smallest void angle of a structure in each load case."""
+    try:
+        plan = make_plan(scene, vertices, threads=threads)
+    except SimulationError as error:
+        return iter([Outcome(None, str(error), error)] * len(scene.motions))
+    values = concrete_parameters(scene, vertices)
+
+    def reduce(solved: Solved) -> tuple[float, float]:
+        number = solved.case.number
+        measure = objective(scene, None if target is None else target[number : number + 1])
+        loss = float(measure(solved.displacement[None], values)[0])
+        voids = scene.topology.smallest_void_angle(values.void, solved.displacement)
+        return loss, float(voids.min())
+
+    cases = (Case(values, scene.drives[k], plan.solver, int(k)) for k in plan.simulated)
+    solved = list(run_batch(cases, reduce, threads))
+    return (solved[k] for k in np.searchsorted(plan.simulated, plan.case_of))

@@ -1,0 +1,102 @@
+"""A structure as variables of a dataset, and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline import datasets
+from pipeline import problem as problems
+from pipeline.posing.to_scene import altered_lattice_of, lattice_of
+from pipeline.problem import Problem
+from pipeline.runtime import UserError
+from sim.core import Floats
+from sim.scene import Scene
+from sim.structure import Lattice
+
+Variables = dict[str, tuple[Any, ...]]
+
+SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
+FREE, CLAMPED, DRIVEN = range(3)
+
+_ALIKE = 1e-6  # mm
+
+
+def unit_coordinates(intact: Lattice) -> Variables:
+    """Labels of the units, removed ones too, and of the specimen frame's axes."""
+    return {
+        "unit": (("unit",), intact.id),
+        "i": (("unit",), intact.index[:, 0]),
+        "j": (("unit",), intact.index[:, 1]),
+        "xy": (("xy",), ["x", "y"]),
+    }
+
+
+def network_variables(problem: Problem, scene: Scene) -> Variables:
+    """Regions, supports and ligaments of the intact network of a scene."""
+    intact, kept = lattice_of(problem), scene.lattice.id
+    region = np.full(intact.n_units, VOID, dtype=np.int8)
+    region[kept] = SURROUNDINGS
+    region[list(problems.inclusion_units(problem))] = INCLUSION
+    region[kept[scene.cloak]] = CLOAK
+    region[kept[scene.driven]] = SOURCE
+    interest = np.zeros(intact.n_units, dtype=np.int8)
+    interest[kept[scene.region]] = 1
+    support = np.full(intact.n_units, FREE, dtype=np.int8)
+    support[kept[np.unique(scene.clamped // 3)]] = CLAMPED
+    support[kept[scene.driven]] = DRIVEN
+    local = intact.ligaments - intact.first_vertex[intact.ligament_units]
+    return {
+        "region": (("unit",), region),
+        "roi": (("unit",), interest),
+        "support": (("unit",), support),
+        "ligament_unit": (("ligament", "end"), intact.ligament_units),
+        "ligament_vertex": (("ligament", "end"), local),
+    }
+
+
+def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:
+    """Which of the ligaments (n_ligaments,) of the intact network a structure has.
+
+    Args:
+        network: a design or a response.
+        structure: intact, altered or cloaked.
+    """
+    gone = (network["region"].values == VOID) & (structure != "intact")
+    place = np.searchsorted(network["unit"].values, network["ligament_unit"].values)
+    return ~gone[place].any(axis=1)
+
+
+def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:
+    """Vertices (n_vertices, 2) of a padded array (unit, vertex, xy), in the lattice's order."""
+    local = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
+    unit = lattice.id[lattice.unit]
+    return np.asarray(vertices.transpose("unit", "vertex", "xy").values[unit, local])
+
+
+def read_design(asked: Problem, path: Path) -> xr.Dataset:
+    """The design in a file, which must be one of the problem's lattice and void.
+
+    Raises:
+        UserError: it cannot be read, or is of another.
+    """
+    design = datasets.read(path, "design")
+    intact = lattice_of(asked)
+    start, found = intact.padded(intact.vertices), design["vertices_initial"].values
+    alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
+    if not alike or np.isnan(flat_vertices(altered_lattice_of(asked), design["vertices"])).any():
+        remedy = "give a design of this problem: run python -m pipeline.stages.design again"
+        raise UserError("the design is of another lattice or void", file=path, remedy=remedy)
+    return design
+
+
+def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:
+    """An array over the units of a network as one over all ``size`` units, NaN where removed."""
+    inner = np.moveaxis(np.asarray(values), axis, 0)
+    out = np.full((size, *inner.shape[1:]), np.nan)
+    out[lattice.id] = inner
+    return np.moveaxis(out, 0, axis)

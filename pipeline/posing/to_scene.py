@@ -1,0 +1,212 @@
+"""From a problem to the scene that sim/ simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import problem as problems
+from pipeline.problem import Problem
+from pipeline.problem.sections import (
+    HarmonicDrive,
+    LinearRampDrive,
+    PulseDrive,
+    RampHarmonicDrive,
+    TanhRampDrive,
+    TimeSeriesDrive,
+)
+from pipeline.runtime import UserError
+from sim.constraints import Limits
+from sim.energy import activation_distance
+from sim.scene import Scene
+from sim.solvers import loads
+from sim.structure import Lattice, Material
+
+DOFS = ("ux", "uy", "theta")
+TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
+
+
+def lattice_of(problem: Problem) -> Lattice:
+    """The intact initial network of a problem."""
+    return problem.lattice.network()
+
+
+def altered_lattice_of(problem: Problem) -> Lattice:
+    """The initial network of a problem with its void."""
+    return lattice_of(problem).without(_units(problems.void_units(problem)))
+
+
+def scene_of(
+    problem: Problem, folder: Path, motions: tuple[loads.MotionLaw, ...] | None = None
+) -> Scene:
+    """The scene of a problem whose files lie in ``folder``.
+
+    Args:
+        problem: the problem.
+        folder: where the problem's own files (a measured drive) are.
+        motions: drives to use in place of the problem's load cases.
+
+    Raises:
+        UserError: the file of a measured drive cannot be read.
+    """
+    made = motions_of(problem, folder) if motions is None else motions
+    weights = problem.drive.case_weights if motions is None else np.full(len(made), 1 / len(made))
+    intact, altered = lattice_of(problem), altered_lattice_of(problem)
+    interest = _units(problems.interest_units(problem))
+    samples = problem.horizon.samples
+    material = material_of(problem)
+    scene = Scene(
+        lattice=intact,
+        material=material,
+        barrier=problem.contact.barrier_angle,
+        cutoff=problem.contact.cutoff_angle,
+        contact_distance=contact_distance(problem) if problem.contact.law == "geometric" else None,
+        clamped=clamped_dofs(problem, intact),
+        driven=driven_units(problem, intact),
+        motions=made,
+        weights=np.asarray(weights),
+        duration=problem.horizon_time,
+        frequency=problem.frequency,
+        static=problem.static,
+        cloak=_units(()),
+        region=interest,
+        objective=problem.objective.kind,
+        samples=samples + 1 - samples % 2,
+        steps=problem.horizon.steps,
+        accuracy=problem.solver.accuracy,
+        integrator=problem.solver.integrator,
+    )
+    return replace(
+        scene,
+        lattice=altered,
+        material=_stiffened(problem, altered, material),
+        clamped=clamped_dofs(problem, altered),
+        driven=driven_units(problem, altered),
+        cloak=altered.positions(_units(problems.cloak_units(problem))),
+        region=altered.positions(interest),
+        frozen=altered.positions(_units(problems.source_units(problem))),
+        reference=scene if problem.objective.target == "intact" else None,
+        symmetry=problem.optimiser.symmetry,
+    )
+
+
+def _units(ids: Iterable[int]) -> NDArray[np.int64]:
+    return np.array(sorted(ids), dtype=np.int64)
+
+
+def contact_distance(problem: Problem) -> float:
+    """Activation distance of geometric contact, whether or not the problem asks for it, mm."""
+    asked = problem.contact.distance
+    ligament, gap = problem.lattice.ligament_length, problem.constraints.gap
+    return activation_distance(ligament, gap) if asked is None else asked
+
+
+def limits_of(problem: Problem) -> Limits:
+    """What a design must keep to so that it can be made."""
+    asked = problem.constraints
+    return Limits(
+        edge_length=asked.edge_length,
+        block_angle=asked.block_angle,
+        convex=asked.convex,
+        void_angle=asked.void_angle,
+        gap=asked.gap,
+    )
+
+
+def clamped_dofs(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
+    """Dofs (3 place of the unit + dof) of a network that the supports hold, ascending."""
+    dofs = [
+        3 * lattice.positions(_units(problems.selected_units(support.units, problem.lattice)))
+        + DOFS.index(dof)
+        for support in problem.supports
+        for dof in support.clamp
+    ]
+    return np.unique(np.concatenate([_units(()), *dofs]))
+
+
+def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
+    """Places of the units of a network that follow the drive."""
+    return lattice.positions(_units(problems.selected_units(problem.drive.units, problem.lattice)))
+
+
+def material_of(problem: Problem) -> Material:
+    """Constants of a problem's specimen, without those of an inclusion."""
+    given = problem.material
+    translation, rotation = problem.damping_coefficients
+    return Material(
+        density=given.density,
+        axial=given.axial_stiffness,
+        shear=given.shear_stiffness,
+        bending=given.bending_stiffness,
+        contact=problem.contact.stiffness,
+        damping_translation=translation,
+        damping_rotation=rotation,
+    )
+
+
+def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Material:
+    """The material with the ligaments of an inclusion's units as much stiffer as asked for."""
+    if problem.inclusion is None:
+        return material
+    stiff = lattice.positions(_units(problems.inclusion_units(problem)))
+    touched = np.isin(lattice.ligament_units, stiff).any(axis=1)
+    factor = np.where(touched, problem.inclusion.stiffness_factor, 1.0)
+    return material._replace(
+        axial=material.axial * factor,
+        shear=material.shear * factor,
+        bending=material.bending * factor,
+    )
+
+
+def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
+    """The drive of every load case."""
+    drive = problem.drive
+    match drive:
+        case TimeSeriesDrive():
+            return (_measured(folder / drive.file),)
+        case RampHarmonicDrive():
+            return tuple(
+                loads.Harmonic(drive.amplitude, drive.frequency, a, drive.rise_time, drive.delay)
+                for a in drive.directions
+            )
+        case HarmonicDrive():
+            return tuple(
+                loads.Harmonic(drive.amplitude, drive.frequency, a) for a in drive.directions
+            )
+        case PulseDrive():
+            return tuple(
+                loads.Pulse(drive.amplitude, drive.width, a, drive.delay) for a in drive.directions
+            )
+        case TanhRampDrive():
+            return tuple(
+                loads.TanhRamp(drive.amplitude, drive.duration, a) for a in drive.directions
+            )
+        case LinearRampDrive():
+            return tuple(
+                loads.LinearRamp(drive.amplitude, drive.duration, a) for a in drive.directions
+            )
+
+
+def _measured(path: Path) -> loads.TimeSeries:
+    """A measured motion: a CSV with the columns TIME_SERIES_COLUMNS, times ascending."""
+    remedy = "write a CSV with the header " + ", ".join(TIME_SERIES_COLUMNS)
+    try:
+        header, *_ = path.read_text(encoding="utf-8").splitlines() or [""]
+        if tuple(name.strip() for name in header.split(",")) != TIME_SERIES_COLUMNS:
+            raise UserError(
+                "the columns of a measured drive are wrong", file=path, value=header, remedy=remedy
+            )
+        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"the measured drive cannot be read: {error}", file=path, remedy=remedy
+        ) from error
+    if table.shape[1:] != (4,) or not np.isfinite(table).all() or (np.diff(table[:, 0]) <= 0).any():
+        raise UserError(
+            "the measured drive needs finite values at ascending times", file=path, remedy=remedy
+        )
+    return loads.TimeSeries(table[:, 0], table[:, 1:])

@@ -1,0 +1,17 @@
+from .identity import Stage as Stage
+from .identity import canonical_json as canonical_json
+from .identity import content_hash as content_hash
+from .identity import from_canonical as from_canonical
+from .identity import section_hash as section_hash
+from .model import Problem as Problem
+from .reading import load as load
+from .reading import preset_names as preset_names
+from .sections import selected_units as selected_units
+from .sections import units_within as units_within
+from .stage_outputs import Output as Output
+from .stage_outputs import outputs as outputs
+from .unit_roles import cloak_units as cloak_units
+from .unit_roles import inclusion_units as inclusion_units
+from .unit_roles import interest_units as interest_units
+from .unit_roles import source_units as source_units
+from .unit_roles import void_units as void_units

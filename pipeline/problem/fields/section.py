@@ -1,0 +1,61 @@
+"""The base of every section of a problem: frozen, strict about its keys, with a helpful refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import ClassVar
+
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from pipeline.problem.fields.key_docs import lead, meanings
+from pipeline.problem.fields.quantities import fault
+
+
+class Section(BaseModel):
+    """An immutable part of a problem; unknown keys are refused with the nearest known one."""
+
+    model_config: ClassVar[ConfigDict] = ConfigDict(
+        frozen=True, extra="forbid", validate_by_name=False, validate_by_alias=True
+    )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """The schema, in which every key has the meaning that the docstring tells."""
+        made = handler(core_schema)
+        whole = handler.resolve_ref_schema(made)
+        whole["description"] = lead(cls)
+        told = meanings(cls)
+        for name, field in cls.model_fields.items():
+            if (key := field.alias or name) in whole["properties"] and name in told:
+                whole["properties"][key]["description"] = told[name]
+        return made
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: object) -> object:
+        if not isinstance(data, Mapping):
+            return data
+        known = [field.alias or name for name, field in cls.model_fields.items()]
+        for key in data:
+            if key not in known:
+                near = get_close_matches(str(key), known, n=1)
+                hint = f"did you mean {near[0]!r}? " if near else ""
+                raise fault("unknown key", f"{hint}known here: {', '.join(known)}", key=str(key))
+        return data
+
+
+def exactly_one(section: Section, *names: str) -> None:
+    """Refuse a section that gives none or several of the alternatives `names`.
+
+    Raises:
+        PydanticCustomError: naming the alternatives.
+    """
+    given = [name for name in names if getattr(section, name) is not None]
+    if len(given) != 1:
+        what = "nothing given" if not given else f"{' and '.join(given)} exclude each other"
+        raise fault(what, f"give exactly one of: {', '.join(names)}")

@@ -1,0 +1,12 @@
+from . import formula as formula
+from .images import ImageError as ImageError
+from .images import read_outlines as read_outlines
+from .network_files import NetworkError as NetworkError
+from .network_files import read_network as read_network
+from .plane import Outline as Outline
+from .plane import Point as Point
+from .plane import box_middle as box_middle
+from .plane import extents as extents
+from .plane import inside as inside
+from .plane import placed as placed
+from .plane import turned as turned

@@ -1,0 +1,10 @@
+from . import joint_figure as joint_figure
+from . import yaml_file as yaml_file
+from .feasibility import findings as findings
+from .joint_figure import Joint as Joint
+from .loading import load as load
+from .loading import overlaid as overlaid
+from .loading import preset_names as preset_names
+from .loading import reason as reason
+from .loading import section as section
+from .loading import told as told

@@ -1,0 +1,269 @@
+"""From a YAML file and the name of a preset to a checked problem, or one clear message."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from pipeline.problem import Problem
+from pipeline.problem.fields import FOLDER, Section
+from pipeline.problem.reading import yaml_file
+from pipeline.problem.reading.feasibility import findings
+from pipeline.problem.reading.yaml_file import Document, KeyPath
+from pipeline.problem.sections import Sweep, TimeSeriesDrive, designs, sweep_cases
+from pipeline.runtime import UserError, read_bounded
+
+_LARGEST = 64 << 20  # bytes of a measured motion
+
+Alone = TypeVar("Alone", bound=Section)
+
+
+def load(path: str | Path, preset: str | None = None) -> Problem:
+    """The problem in a YAML file, with one of its presets laid over it, or one of its designs.
+
+    Args:
+        path: the file.
+        preset: the name of a preset, the number of a design, or both: "quick", "2", "quick.2".
+
+    Raises:
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    document = yaml_file.read(Path(path))
+    data = dict(document.data)
+    presets = data.pop("presets", None) or {}
+    preset, number = designs.parted(preset)
+    if preset is not None:
+        data = overlaid(data, _preset(document, presets, preset))
+    if number is not None:
+        data = _design(document, data, number)
+    try:
+        problem = Problem.model_validate(data, context={FOLDER: document.path.parent})
+    except ValidationError as error:
+        raise told(error, document, data, preset) from error
+    if problem.sweep is not None:
+        _check_sweep(problem.sweep, document, data, preset)
+    if preset is None and problem.optimiser.start == "study":
+        what, remedy = "a study cannot start from its own design", "say so in a preset of it"
+        raise _user_error(document, preset, data, ("optimiser", "start"), what, remedy)
+    for finding in findings(problem):
+        raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
+    return _with_recording(problem, document)
+
+
+def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[str, Any]:
+    try:
+        return designs.chosen(data, number)
+    except LookupError as error:
+        count = designs.design_count(data)
+        remedy = f"give one from 1 to {count}" if count else "name a preset, or none"
+        raise UserError(str(error), file=document.path, key="designs", remedy=remedy) from error
+
+
+def _check_sweep(
+    sweep: Sweep, document: Document, data: Mapping[str, Any], preset: str | None
+) -> None:
+    """Tries the first value of every parameter that a sweep sets, one at a time."""
+    first = next(sweep_cases.settings(sweep))
+    for key, word in first.items():
+        try:
+            Problem.model_validate(
+                sweep_cases.laid(data, {key: word}), context={FOLDER: document.path.parent}
+            )
+        except ValidationError as error:
+            what, remedy = reason(error)
+            place = ("sweep", sweep.form, key)
+            raise _user_error(document, preset, data, place, what, remedy) from error
+
+
+def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
+    """`base` with `overlay` laid over it: mappings merge, all else replaces, null removes a key."""
+    merged = dict(base)
+    for key, value in overlay.items():
+        below = merged.get(key)
+        if value is None:
+            merged.pop(key, None)
+        elif isinstance(value, Mapping):
+            merged[key] = overlaid(below if isinstance(below, Mapping) else {}, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def preset_names(path: str | Path) -> tuple[str, ...]:
+    """The names of the presets in a problem file.
+
+    Raises:
+        UserError: the file cannot be read.
+    """
+    presets = yaml_file.read(Path(path)).data.get("presets")
+    return tuple(presets) if isinstance(presets, dict) else ()
+
+
+def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
+    def refused(what: str, key: str, remedy: str) -> UserError:
+        line = document.line(("presets", name))
+        return UserError(what, file=document.path, line=line, key=key, remedy=remedy)
+
+    if not isinstance(presets, dict):
+        raise refused("presets are wanted here", "presets", "write `NAME:` and its keys below it")
+    if name not in presets:
+        known = ", ".join(map(str, presets)) or "none"
+        near = get_close_matches(name, [str(key) for key in presets], n=1)
+        hint = f"did you mean {near[0]!r}? " if near else ""
+        raise refused(f"no preset {name!r}", "presets", f"{hint}presets here: {known}")
+    if not isinstance(presets[name], dict):
+        remedy = "write the keys that it changes below it"
+        raise refused("keys and values are wanted here", f"presets.{name}", remedy)
+    return presets[name]
+
+
+def section(path: Path, kind: type[Alone]) -> Alone:
+    """A section that is a YAML file of its own.
+
+    Raises:
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    document = yaml_file.read(path)
+    try:
+        return kind.model_validate(document.data, context={FOLDER: document.path.parent})
+    except ValidationError as error:
+        raise told(error, document, document.data, None) from error
+
+
+def told(
+    error: ValidationError, document: Document, data: dict[str, Any], preset: str | None
+) -> UserError:
+    """The first of the errors of validation, in words; `data` is the document with its preset."""
+    first, *others = error.errors(include_url=False)
+    keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
+    what, remedy, key = _in_words(first)
+    if key is not None:
+        keys = (*keys, key)
+    if others:
+        remedy += f" ({len(others)} more after this one)"
+    return _user_error(document, preset, data, keys, what, remedy)
+
+
+def reason(error: ValidationError) -> tuple[str, str]:
+    """What is wrong first, and the remedy."""
+    what, remedy, _ = _in_words(error.errors(include_url=False)[0])
+    return what, remedy
+
+
+_WORDS = {
+    "missing": ("missing key", "add it"),
+    "union_tag_not_found": ("the key `kind` is missing", "add it"),
+    "union_tag_invalid": ("unknown kind", "give one of {expected_tags}"),
+    "literal_error": ("not one of the choices", "give {expected}"),
+    "model_type": ("keys and values are wanted here", "write them below it, indented"),
+    "dict_type": ("keys and values are wanted here", "write them below it, indented"),
+    "tuple_type": ("a list is wanted here", "write it as [first, second]"),
+    "finite_number": ("not a finite number", "give a finite number"),
+    "greater_than": ("too small", "give a number greater than {gt}"),
+    "greater_than_equal": ("too small", "give a number of at least {ge}"),
+    "less_than_equal": ("too large", "give a number of at most {le}"),
+    "too_short": ("too few items", "give at least {min_length}"),
+    "too_long": ("too many items", "give at most {max_length}"),
+    "int_type": ("not a whole number", "give a whole number"),
+    "float_type": ("not a number", "give a number"),
+    "float_parsing": ("not a number", "give a number"),
+    "string_type": ("not a text", "put it in quotes"),
+    "bool_type": ("neither true nor false", "give true or false"),
+    "bool_parsing": ("neither true nor false", "give true or false"),
+}
+
+
+def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
+    """What is wrong, the remedy, and a key below the error's place if there is one."""
+    context = error.get("ctx", {})
+    if error["type"] == "problem":
+        return context["what"], context["remedy"], context["key"]
+    what, remedy = _WORDS.get(error["type"], (error["msg"], "correct the value"))
+    return what, remedy.format_map(context), None
+
+
+def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:
+    """The location without the tags of unions, which are no keys of the file."""
+    keys: list[str | int] = []
+    tag: object = None
+    for part in location:
+        if part == tag:  # a kind that is also the name of a key: `file`
+            tag = None
+            continue
+        if (isinstance(data, Mapping) and part in data) or (
+            isinstance(data, list) and isinstance(part, int) and part < len(data)
+        ):
+            data = data[part]  # type: ignore[index]
+            keys.append(part)
+            tag = data.get("kind") if isinstance(data, Mapping) else None
+    return (*keys, location[-1]) if missing else tuple(keys)
+
+
+def _user_error(
+    document: Document,
+    preset: str | None,
+    data: Mapping[str, Any],
+    keys: KeyPath,
+    what: str,
+    remedy: str,
+) -> UserError:
+    overlay: KeyPath = () if preset is None else ("presets", preset)
+    place = keys if (*overlay, *keys) not in document.lines else (*overlay, *keys)
+    return UserError(
+        what,
+        file=document.path,
+        line=document.line(place),
+        key=_dotted(place),
+        value=_value(data, keys),
+        remedy=remedy,
+    )
+
+
+def _dotted(keys: KeyPath) -> str:
+    text = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
+    return text.removeprefix(".") or "(the whole file)"
+
+
+def _value(data: object, keys: KeyPath) -> object:
+    """The value at `keys` if it is a plain one: a whole section would not help the reader."""
+    for key in keys:
+        if isinstance(data, Mapping):
+            data = data.get(key)
+        elif isinstance(data, list) and isinstance(key, int):
+            data = data[key]
+    return None if isinstance(data, Mapping) else data
+
+
+def _with_recording(problem: Problem, document: Document) -> Problem:
+    """The problem with the content hash of the measured motion that it refers to, if any."""
+    drive = problem.drive
+    if not isinstance(drive, TimeSeriesDrive):
+        return problem
+    try:
+        held = read_bounded(document.path.parent / drive.file, _LARGEST)
+    except OSError as error:
+        raise UserError(
+            f"the measured motion cannot be read: {error.strerror}",
+            file=document.path,
+            line=document.line(("drive", "file")),
+            key="drive.file",
+            value=drive.file,
+            remedy="give its path as seen from the problem file",
+        ) from error
+    found = hashlib.sha256(held).hexdigest()
+    if drive.sha256 not in (None, found):
+        raise UserError(
+            f"{drive.file} is not the file that was meant: its SHA-256 is {found}",
+            file=document.path,
+            line=document.line(("drive", "sha256")),
+            key="drive.sha256",
+            value=drive.sha256,
+            remedy="restore the file, or correct or remove the hash",
+        )
+    return problem.model_copy(update={"drive": drive.model_copy(update={"sha256": found})})

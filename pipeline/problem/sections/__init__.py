@@ -1,0 +1,5 @@
+"""Defines the sections of the problem file, one a module."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

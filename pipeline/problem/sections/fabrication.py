@@ -1,0 +1,224 @@
+"""How a study's specimens are made: the section `fabrication`, whose defaults are the paper's."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.problem.fields import Gap, Length, Ratio, Section, fault
+
+_LEAST_LABEL = 2.0  # mm; smaller letters can neither be engraved nor printed
+_LEAST_RIM = 2.0  # mm around a bolt's hole
+_MOST_PLAY = 1.0  # mm beside a unit in its pocket
+_WIDEST_SLOT = 8.0  # mm
+
+Clearances = Annotated[tuple[Gap, ...], Field(min_length=1, max_length=20)]
+
+
+class Slots(Section):
+    """Slots at the vertices that hold the shims.
+
+    Attributes:
+        direction: where a slot points: the unit's centroid, along its ligament, or along the
+            bisector of its corner. Where the walls would be too thin, it turns as far as it must.
+        depth: wanted depth from the vertex.
+        depth_min: least length in which the shim is held, where there is no more room.
+        depth_max: largest depth, where only a deeper slot has thick enough walls.
+        thicken: most that a unit may grow beside a slot, where nothing else gives thick walls.
+        clearance: beside the shim on both sides: width = shim thickness + 2 clearance.
+        tip: the tips beside the mouth are cut back to walls of this thickness.
+    """
+
+    direction: Literal["centroid", "ligament", "bisector"] = "centroid"
+    depth: Length = 3.0
+    depth_min: Length = 1.0
+    depth_max: Length = 5.0
+    clearance: Gap = 0.1
+    tip: Gap = 0.1
+    thicken: Gap = 1.0
+
+    @model_validator(mode="after")
+    def _depths_ascend(self) -> Self:
+        if not self.depth_min <= self.depth <= self.depth_max:
+            what = f"{self.depth:g} mm is not within the limits of the depth"
+            remedy = f"keep it from {self.depth_min:g} mm to {self.depth_max:g} mm"
+            raise fault(what, remedy, "depth")
+        return self
+
+
+class Shims(Section):
+    """Strips that join the units.
+
+    Attributes:
+        thickness: of the foil.
+        spares: extra pieces of each length, as a ratio; at least one.
+        strips: also draw the authors' continuous paths, one per row and one per column.
+    """
+
+    thickness: Length = 0.25
+    spares: Ratio = 0.1
+    strips: bool = False
+
+
+class Labels(Section):
+    """Ids on the parts.
+
+    Attributes:
+        height: of the letters; smaller where there is no room.
+        stroke: width of their strokes.
+        depth: of their strokes.
+    """
+
+    height: Length = 3.0
+    stroke: Length = 0.5
+    depth: Length = 0.4
+
+    @model_validator(mode="after")
+    def _legible(self) -> Self:
+        if self.height < _LEAST_LABEL:
+            what = f"letters of {self.height:g} mm cannot be read"
+            raise fault(what, f"give at least {_LEAST_LABEL:g} mm", "height")
+        return self
+
+
+class Markers(Section):
+    """Dots on top of the units for the tracking.
+
+    Attributes:
+        kind: none, recesses to be filled with paint, or raised dots; the template has them always.
+        count: dots per unit, on a line through its centroid if there is room; one if not.
+        spread: distance of the outer dots.
+        diameter: of a dot; both are smaller where there is no room.
+        depth: of a recess, or height of a raised dot.
+    """
+
+    kind: Literal["none", "recess", "dots"] = "none"
+    count: Literal[1, 2, 3] = 2
+    spread: Length = 6.0
+    diameter: Length = 2.0
+    depth: Length = 0.4
+
+
+class Laser(Section):
+    """Sheets for the laser cutter.
+
+    Attributes:
+        kerf: width of the cut; the drawings are also written without compensation.
+        sheet: width and height of a sheet.
+        margin: free rim of a sheet.
+        gap: smallest distance of two parts.
+        template_thickness: of the template with the tracking dots and of the spacer comb.
+    """
+
+    kerf: Gap = 0.15
+    sheet: tuple[Length, Length] = (600.0, 300.0)
+    margin: Gap = 5.0
+    gap: Length = 2.0
+    template_thickness: Length = 1.0
+
+
+class Print(Section):
+    """Plates for the printer.
+
+    Attributes:
+        bed: width and depth of the bed.
+        margin: free rim of the bed.
+        gap: smallest distance of two parts.
+        first_layer_inset: how far the first layer is drawn in, against its squeezing out.
+        layer: height of the first layer.
+    """
+
+    bed: tuple[Length, Length] = (250.0, 210.0)
+    margin: Gap = 5.0
+    gap: Length = 2.0
+    first_layer_inset: Gap = 0.0
+    layer: Length = 0.2
+
+
+class Fixture(Section):
+    """What holds the specimen: pads on a breadboard, grips on bolts, jig.
+
+    Attributes:
+        clearance: between a unit and its pocket.
+        pad: edge of a corner pad's square, and width of a grip's flange.
+        hole: diameter of the bolt holes.
+        grid: pitch of the breadboard.
+        bolt_pitch: pitch of the bolts of a grip.
+        base: thickness below the units.
+        pocket: depth of the pockets.
+    """
+
+    clearance: Gap = 0.15
+    pad: Length = 15.0
+    hole: Length = 4.2
+    grid: Length = 25.4
+    bolt_pitch: Length = 40.0
+    base: Length = 4.0
+    pocket: Length = 4.0
+
+    @model_validator(mode="after")
+    def _holds(self) -> Self:
+        if self.hole > self.pad - 2.0 * _LEAST_RIM:
+            what = f"a hole of {self.hole:g} mm leaves no rim on a pad of {self.pad:g} mm"
+            raise fault(what, f"give at most {self.pad - 2.0 * _LEAST_RIM:g} mm", "hole")
+        if self.clearance > _MOST_PLAY:
+            what = f"with {self.clearance:g} mm of clearance a pocket holds no unit"
+            raise fault(what, f"give at most {_MOST_PLAY:g} mm", "clearance")
+        return self
+
+
+class Fabrication(Section):
+    """What is made of a design.
+
+    Attributes:
+        material: of the units; its density gives the mass in the bill of materials.
+        thickness: height of the units.
+        minimum_wall: thinnest wall at a slot's inner end and between two slots.
+        minimum_gap: smallest distance of two units.
+        fillet_radius: of the units' corners.
+        paper: size of the pages of the assembly sheet.
+        slots: at the vertices, for the shims.
+        shims: that join the units.
+        labels: ids on the parts.
+        markers: dots for the tracking.
+        laser: sheets for the laser cutter.
+        print: plates for the printer.
+        fixture: what holds the specimen.
+        coupon: clearances that the test piece has, to find the one that fits.
+    """
+
+    material: Literal["PLA", "PETG", "ABS", "ASA", "PA12", "PMMA", "POM"] = "PLA"
+    thickness: Length = 8.1
+    minimum_wall: Length = 0.8
+    minimum_gap: Gap = 0.1
+    fillet_radius: Gap = 0.0
+    paper: Literal["A4", "Letter"] = "A4"
+    slots: Slots = Slots()
+    shims: Shims = Shims()
+    labels: Labels = Labels()
+    markers: Markers = Markers()
+    laser: Laser = Laser()
+    print: Print = Print()
+    fixture: Fixture = Fixture()
+    coupon: Clearances = (0.0, 0.05, 0.1, 0.15, 0.2)
+
+    @model_validator(mode="after")
+    def _sizes_fit(self) -> Self:
+        sunk = self.labels.depth + self.markers.depth * (self.markers.kind == "recess")
+        if sunk > self.thickness / 2.0:
+            what = f"letters and dots {sunk:g} mm deep take more than half of the thickness"
+            raise fault(what, f"keep them within {self.thickness / 2.0:g} mm", "labels.depth")
+        if self.print.first_layer_inset > self.minimum_wall / 2.0:
+            what = "the first layer is drawn in by more than half of the thinnest wall"
+            remedy = f"give at most {self.minimum_wall / 2.0:g} mm"
+            raise fault(what, remedy, "print.first_layer_inset")
+        if self.shims.thickness + 2.0 * max(self.coupon) > _WIDEST_SLOT:
+            what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
+            raise fault(what, "give smaller clearances", "coupon")
+        return self
+
+    @property
+    def slot_width(self) -> float:
+        """Width of a slot in mm."""
+        return self.shims.thickness + 2.0 * self.slots.clearance

@@ -1,0 +1,317 @@
+"""The kinds of lattices: squares or triangles on a grid, and networks read from a file.
+
+A unit's site is the centroid of its starting polygon, which for squares is their lattice point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, model_validator
+from pydantic.json_schema import SkipJsonSchema
+
+from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
+
+if TYPE_CHECKING:
+    from sim.structure import Lattice as Network
+
+Size = Annotated[int, Field(ge=1, le=1000, strict=True)]
+Point = tuple[float, float]
+
+
+class _Grid(Section):
+    """Units in columns and rows: unit (i, j) has the id `i + across * j`.
+
+    Attributes:
+        kind: which of the lattices this is.
+        columns: of units, or of cells with two units each (kagome).
+        rows: likewise.
+        spacing: of the units, or of the cells.
+        ligament_length: from unit to unit, where a ligament joins them.
+    """
+
+    columns: Size
+    rows: Size
+    spacing: Length
+    ligament_length: Length
+
+    @property
+    def across(self) -> int:
+        """Number of units in a row."""
+        return self.columns
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return self.across * self.rows
+
+    def unit(self, i: int, j: int) -> int:
+        """The id of unit (i, j).
+
+        Raises:
+            IndexError: it is not in the lattice.
+        """
+        if i >= self.across or j >= self.rows:
+            raise IndexError(f"unit [{i}, {j}] is not in the lattice")
+        return i + self.across * j
+
+    def name(self, unit: int) -> str:
+        """A unit by its lattice indices."""
+        j, i = divmod(unit, self.across)
+        return f"[{i}, {j}]"
+
+    @property
+    def extent(self) -> str:
+        """How far the indices run, in words."""
+        return f"i runs to {self.across - 1} and j to {self.rows - 1}, from zero"
+
+    def side(self, name: str) -> tuple[int, ...]:
+        """The units along a side or at the corners, ascending."""
+        deep = self.across // self.columns
+        every, rows = range(self.across), range(self.rows)
+        ends, caps = sorted({*every[:deep], *every[-deep:]}), sorted({rows[0], rows[-1]})
+        sides = {
+            "corners": (ends, caps),
+            "left": (every[:deep], rows),
+            "right": (every[-deep:], rows),
+            "bottom": (every, rows[:1]),
+            "top": (every, rows[-1:]),
+        }
+        chosen, along = sides[name]
+        return tuple(self.unit(i, j) for j in along for i in chosen)
+
+
+class Quads(_Grid):
+    """Squares of alternating bias on a square lattice, joined by ligaments at their corners.
+
+    Attributes:
+        bias_angle: by which the squares are turned, left and right by turns.
+    """
+
+    kind: Literal["quads"] = "quads"
+    bias_angle: Angle
+
+    @property
+    def edge_length(self) -> float:
+        """Edge of the starting squares in mm."""
+        return (self.spacing - self.ligament_length) / math.sqrt(2.0) / math.cos(self.bias_angle)
+
+    @property
+    def centre_site(self) -> Point:
+        """The site of the centre unit, or the middle of the lattice where there is none, in mm."""
+        return self.spacing * (self.columns - 1) / 2, self.spacing * (self.rows - 1) / 2
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
+        for j in range(self.rows):
+            for i in range(self.columns):
+                yield self.unit(i, j), i * self.spacing, j * self.spacing
+
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """The units that each ligament joins."""
+        for unit in range(self.n_units):
+            if (unit + 1) % self.columns:
+                yield unit, unit + 1
+            if unit + self.columns < self.n_units:
+                yield unit, unit + self.columns
+
+    def network(self) -> Network:
+        """The lattice for sim/."""
+        from sim.structure import quads
+
+        return quads(self.columns, self.rows, self.spacing, self.ligament_length, self.bias_angle)
+
+
+class Kagome(_Grid):
+    """Two triangles in every cell, (2 i, j) and (2 i + 1, j), joined at three corners.
+
+    Attributes:
+        bias: by which the joints of even and of odd cells are moved up and down.
+        cell_angle: between the sides of a cell: 60 deg in the regular kagome lattice, 90 deg as
+            the authors take it.
+    """
+
+    kind: Literal["kagome"]
+    bias: Coordinate
+    cell_angle: Angle = math.pi / 2
+
+    @property
+    def across(self) -> int:
+        """Number of units in a row."""
+        return 2 * self.columns
+
+    @property
+    def centre_site(self) -> Point:
+        """The middle of the cells, in mm."""
+        up = self.rows * self.spacing / 2
+        along = self.columns * self.spacing / 2
+        return along + up * math.cos(self.cell_angle), up * math.sin(self.cell_angle)
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
+        return _sites(self)
+
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """The units that each ligament joins."""
+        return _bonds(self)
+
+    def network(self) -> Network:
+        """The lattice for sim/."""
+        from sim.structure import kagome
+
+        return kagome(
+            self.columns,
+            self.rows,
+            self.spacing,
+            self.ligament_length,
+            self.bias,
+            self.cell_angle,
+        )
+
+
+class ListedNetwork(Section):
+    """Polygons and ligaments from a file: CSV, netCDF, or closed polylines and lines of a DXF.
+
+    Units are numbered in the order of the file and listed as [number, 0].
+
+    Attributes:
+        kind: which of the lattices this is.
+        file: as seen from the problem file; lengths in it are mm.
+        spacing: the length that makes displacements comparable with rotations, about the distance
+            of neighbouring units.
+    """
+
+    kind: Literal["file"]
+    file: Annotated[str, StringConstraints(min_length=1)]
+    spacing: Length
+    polygons: SkipJsonSchema[tuple[tuple[Point, ...], ...] | None] = None
+    ligaments: SkipJsonSchema[tuple[tuple[Point, Point], ...] | None] = None
+
+    @model_validator(mode="after")
+    def _with_content(self, info: ValidationInfo) -> Self:
+        if info.context == SIM_UNITS:
+            return self
+        for name in ("polygons", "ligaments"):
+            if getattr(self, name) is not None:
+                raise fault("unknown key", "leave it out: they are read from the file", name)
+        from pipeline.problem.outlines import NetworkError, read_network
+
+        folder = (info.context or {}).get(FOLDER, ".")
+        try:
+            polygons, ligaments = read_network(Path(folder) / self.file)
+            made = self.model_copy(update={"polygons": polygons, "ligaments": ligaments})
+            made.network()
+        except NetworkError as error:
+            raise fault(error.what, error.remedy, "file") from error
+        except ValueError as error:
+            remedy = "end every ligament at a corner of a unit"
+            raise fault(str(error), remedy, "file") from error
+        return made
+
+    @property
+    def columns(self) -> int:
+        """Number of units."""
+        return len(self.polygons or ())
+
+    @property
+    def rows(self) -> int:
+        """One: the units are listed one after the other."""
+        return 1
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return self.columns
+
+    @property
+    def ligament_length(self) -> float:
+        """Mean length of the ligaments in mm."""
+        lengths = [math.dist(*ends) for ends in self.ligaments or ()]
+        return math.fsum(lengths) / max(len(lengths), 1)
+
+    @property
+    def extent(self) -> str:
+        """How far the indices run, in words."""
+        return f"i runs to {self.n_units - 1} and j is 0"
+
+    def unit(self, i: int, j: int) -> int:
+        """The id of unit (i, 0).
+
+        Raises:
+            IndexError: it is not in the lattice.
+        """
+        if i >= self.n_units or j > 0:
+            raise IndexError(f"unit [{i}, {j}] is not in the lattice")
+        return i
+
+    def name(self, unit: int) -> str:
+        """A unit by its number."""
+        return f"[{unit}, 0]"
+
+    def side(self, name: str) -> tuple[int, ...]:
+        """The units within half a spacing of a side's outermost site, or both ways at corners."""
+        every = list(self.sites())
+        x, y = [x for _, x, _ in every], [y for _, _, y in every]
+        near = self.spacing / 2
+        sides = {
+            "left": {u for u, a, _ in every if a <= min(x) + near},
+            "right": {u for u, a, _ in every if a >= max(x) - near},
+            "bottom": {u for u, _, b in every if b <= min(y) + near},
+            "top": {u for u, _, b in every if b >= max(y) - near},
+        }
+        sides["corners"] = (sides["left"] | sides["right"]) & (sides["bottom"] | sides["top"])
+        return tuple(sorted(sides[name]))
+
+    @property
+    def centre_site(self) -> Point:
+        """The middle of the box around the sites, in mm."""
+        _, x, y = zip(*self.sites(), strict=True)
+        return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
+        return _sites(self)
+
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """The units that each ligament joins."""
+        return _bonds(self)
+
+    def network(self) -> Network:
+        """The lattice for sim/.
+
+        Raises:
+            ValueError: a polygon without area, or a ligament that does not join two units.
+        """
+        from sim.structure import listed
+
+        return listed(self.polygons or (), self.ligaments or (), self.spacing)
+
+
+@lru_cache(maxsize=8)
+def _network(lattice: Kagome | ListedNetwork) -> Network:
+    return lattice.network()
+
+
+def _sites(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, float, float]]:
+    return iter([(unit, x, y) for unit, (x, y) in enumerate(_network(lattice).site.tolist())])
+
+
+def _bonds(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, int]]:
+    return iter([(one, other) for one, other in _network(lattice).ligament_units.tolist()])
+
+
+def _kind(value: object) -> str:
+    named = value.get("kind", "quads") if isinstance(value, dict) else getattr(value, "kind", "")
+    return str(named)
+
+
+Lattice = Annotated[
+    Annotated[Quads, Tag("quads")]
+    | Annotated[Kagome, Tag("kagome")]
+    | Annotated[ListedNetwork, Tag("file")],
+    Discriminator(_kind),
+]

@@ -1,0 +1,104 @@
+"""Constants of a specimen: its units, its ligaments, its damping, the contact of its units."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, Self
+
+from pydantic import model_validator
+
+from pipeline.problem.fields import (
+    Angle,
+    BendingStiffness,
+    ContactStiffness,
+    Damping,
+    Density,
+    Length,
+    Ratio,
+    RotaryDamping,
+    Section,
+    Stiffness,
+    fault,
+)
+
+UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
+UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
+
+
+class DampingLaw(Section):
+    """Viscous damping to ground per unit: the authors' ratio, or the two coefficients.
+
+    Attributes:
+        ratio: over the critical damping of one unit on one ligament.
+        translation: force over velocity; together with `rotation`.
+        rotation: torque over angular velocity.
+    """
+
+    ratio: Ratio | None = None
+    translation: Damping | None = None
+    rotation: RotaryDamping | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        pair = [self.translation is not None, self.rotation is not None]
+        if (self.ratio is not None) == any(pair) or any(pair) != all(pair):
+            raise fault("one form of damping is wanted", "give ratio, or translation and rotation")
+        return self
+
+
+class MaterialConstants(Section):
+    """Units and ligaments.
+
+    Attributes:
+        density: mass of the units over their area, in the plane.
+        axial_stiffness: force over elongation of a ligament.
+        shear_stiffness: force over lateral displacement of its ends.
+        bending_stiffness: torque over relative rotation of its ends.
+        damping: of the units.
+    """
+
+    density: Density
+    axial_stiffness: Stiffness
+    shear_stiffness: Stiffness
+    bending_stiffness: BendingStiffness
+    damping: DampingLaw
+
+    def damping_coefficients(self, spacing: float) -> tuple[float, float]:
+        """Translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.
+
+        The ratio is that of a single-ligament oscillator with the mass and inertia of a square
+        that is not rotated, whatever the design (the authors' formula).
+        """
+        law = self.damping
+        if law.ratio is None:
+            assert law.translation is not None
+            assert law.rotation is not None
+            return law.translation, law.rotation
+        mass = UNROTATED_AREA * self.density * spacing**2
+        inertia = UNROTATED_MOMENT * self.density * spacing**4
+        return (
+            law.ratio * 2.0 * math.sqrt(mass * self.shear_stiffness),
+            law.ratio * 2.0 * math.sqrt(inertia * self.bending_stiffness),
+        )
+
+
+class Contact(Section):
+    """Contact of units: on the void angles of bonded ones (the authors'), or on true distances.
+
+    On angles there is none above the cut-off and no bound at the barrier; on distances none beyond
+    `distance` and no bound at a touch. Designs are judged by both.
+
+    Attributes:
+        law: by which the design is optimised.
+        stiffness: of the contact, torque over angle squared.
+        barrier_angle: void angle at which the energy is infinite.
+        cutoff_angle: void angle above which there is no contact.
+        distance: of two units beyond which there is none; by default a twelfth of the ligaments'
+            length, or the gap that the constraints ask for if that is smaller.
+    """
+
+    law: Literal["angle", "geometric"]
+    stiffness: ContactStiffness
+    barrier_angle: Angle
+    cutoff_angle: Angle
+    distance: Length | None = None

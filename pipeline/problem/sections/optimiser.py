@@ -1,0 +1,63 @@
+"""How a design is looked for."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.problem.fields import Count, Length, Section
+
+
+class Method(Section):
+    """The budget of one optimisation method.
+
+    Attributes:
+        evaluations: of loss and gradient, at most.
+    """
+
+    evaluations: Count
+
+
+class Methods(Section):
+    """The optimisation methods to run; the better design is shipped.
+
+    Attributes:
+        sqp: sequential quadratic programming in a trust region.
+        mma: method of moving asymptotes, as the authors do.
+    """
+
+    sqp: Method | None = None
+    mma: Method | None = None
+
+    @property
+    def chosen(self) -> dict[str, Method]:
+        """The methods asked for, by name."""
+        pairs = {"sqp": self.sqp, "mma": self.mma}
+        return {name: method for name, method in pairs.items() if method is not None}
+
+
+class Optimiser(Section):
+    """How to look for the design; lengths are shifts of vertices.
+
+    Attributes:
+        methods: one or both.
+        start: from the initial lattice; or, in a preset, from the design of the study itself.
+        geometric: the budget with which a design by the angle law of contact is optimised again
+            with contact on distance, where its loss depends on the law.
+        symmetry: that the design is to have.
+        trust_radius: at the start.
+        trust_radius_max: at most.
+        kick: random shifts with which an optimisation that has ended goes on, as far as its
+            budget allows.
+        seed: of the kicks.
+    """
+
+    methods: Methods
+    start: Literal["initial", "study"] = "initial"
+    geometric: Method = Method(evaluations=60)
+    symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
+    trust_radius: Length = 0.25
+    trust_radius_max: Length = 1.0
+    kick: Length = 0.15
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0

@@ -1,0 +1,79 @@
+"""The section `prediction` of a problem: how far specimens and constants may be off."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from pipeline.problem.fields import Angle, Gap, Ratio, Samples, Section
+
+
+class Assembly(Section):
+    """How far units are off their place once they are joined, at rest and without force.
+
+    Attributes:
+        shift: standard deviation along x and along y.
+        turn: standard deviation of the rotation.
+    """
+
+    shift: Gap = 0.1
+    turn: Angle = math.radians(0.4)
+
+
+class Tolerances(Section):
+    """By how much a specimen differs from its design, and the constants from the true ones.
+
+    Attributes:
+        geometry: largest shift of a vertex along x and y, either way and evenly spread, as a share
+            of the spacing.
+        ligaments: standard deviation of every ligament's stiffnesses, as a share of them.
+        stiffness: the same of each of the three stiffnesses, of all ligaments together.
+        units: standard deviation of every unit's damping, as a share of it.
+        damping: the same of the damping of all units together.
+        assembly: how far units are off their place.
+    """
+
+    geometry: Ratio = 0.01
+    ligaments: Ratio = 0.05
+    stiffness: Ratio = 0.05
+    units: Ratio = 0.1
+    damping: Ratio = 0.2
+    assembly: Assembly = Assembly()
+
+
+class Prediction(Section):
+    """The spread of the simulation that a measured course is compared with.
+
+    A size that is not given is the smallest that `robustness` tries of its kind, where it tries
+    some, and else the usual one of `Tolerances`.
+
+    Attributes:
+        samples: specimens drawn.
+        level: part of the specimens between the limits of the band.
+        seed: of the draws.
+        geometry: largest shift of a vertex along x and y, either way and evenly spread, as a share
+            of the spacing.
+        ligaments: standard deviation of every ligament's stiffnesses, as a share of them.
+        stiffness: the same of each of the three stiffnesses, of all ligaments together.
+        units: standard deviation of every unit's damping, as a share of it.
+        damping: the same of the damping of all units together.
+        assembly: how far units are off their place.
+    """
+
+    samples: Samples = 64
+    level: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    geometry: Ratio | None = None
+    ligaments: Ratio | None = None
+    stiffness: Ratio | None = None
+    units: Ratio | None = None
+    damping: Ratio | None = None
+    assembly: Assembly | None = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The sizes that are given, by name."""
+        sizes = {name: getattr(self, name) for name in Tolerances.model_fields}
+        return {name: size for name, size in sizes.items() if size is not None}

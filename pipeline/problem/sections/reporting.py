@@ -1,0 +1,61 @@
+"""Sections of a problem that no design depends on: how robust it is, and what the report tells."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Ratio, Section
+
+
+class Robustness(Section):
+    """Imperfect copies of the shipped design, each simulated.
+
+    Attributes:
+        samples: copies of each kind and size of imperfection.
+        geometry: largest shifts of a vertex along x and y, either way and evenly spread, as shares
+            of the spacing.
+        stiffness: standard deviations of every ligament's stiffnesses, as shares of them.
+        seed: of the random numbers.
+    """
+
+    samples: Count = 200
+    geometry: tuple[Ratio, ...] = (0.03, 0.05)
+    stiffness: tuple[Ratio, ...] = (0.1,)
+    seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class Paper(Section):
+    """What a publication tells of this study, to stand beside the numbers computed here.
+
+    Attributes:
+        figure: its figure.
+        variant: which of its sets of values is run.
+        strain: its label of the full load.
+        values: the words that it uses for the facts of the report, by key.
+    """
+
+    figure: str
+    variant: str = ""
+    strain: Positive | None = None
+    values: dict[str, str] = Field(default_factory=dict)
+
+
+class ReportOptions(Section):
+    """Choices of the report.
+
+    Attributes:
+        snapshots: driven displacements that it shows.
+        instants: times of a motion in time that it shows.
+        places: the units nearest to these are followed over time, at most three.
+        shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
+            yields at about 5 %).
+        paper: what a publication tells.
+    """
+
+    snapshots: tuple[Gap, ...] = ()
+    instants: tuple[Delay, ...] = ()
+    places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
+    shim_strain_limit: Positive = 0.05
+    paper: Paper | None = None

@@ -1,0 +1,116 @@
+"""The cases of a sweep, and what each sets."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import islice, product
+from typing import Any
+
+import numpy as np
+
+from pipeline.problem.sections.sweep import Sweep, Word, taken_apart
+
+Setting = Mapping[str, Word | list[Word]]
+"""Values by the dotted keys that they are set at."""
+
+DIRECTIONS = "drive.directions"
+
+
+def case_count(sweep: Sweep) -> int:
+    """Number of cases."""
+    if sweep.samples is not None:
+        return sweep.samples
+    sizes = [len(values) for values in sweep.values.values()]
+    return math.prod(sizes) if sweep.grid is not None else sizes[0]
+
+
+def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
+    """What each case sets, one after the other."""
+    if sweep.random is not None:
+        yield from (_drawn(sweep, number) for number in range(case_count(sweep)))
+    elif sweep.list is not None:
+        for values in zip(*sweep.values.values(), strict=True):
+            yield dict(zip(sweep.keys, values, strict=True))
+    else:
+        for values in product(*reversed(sweep.values.values())):  # the last one varies fastest
+            yield dict(zip(sweep.keys, reversed(values), strict=True))
+
+
+def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
+    """A random case: the same whatever other cases there are."""
+    assert sweep.random is not None
+    random = np.random.default_rng((sweep.seed, number))
+    return {key: spread.drawn(random) for key, spread in sweep.random.items()}
+
+
+@dataclass(frozen=True)
+class DirectionGroup:
+    """Cases one after the other that differ by the direction of their drive alone.
+
+    They are load cases of one scene: what is a copy of another, turned, is not simulated.
+    """
+
+    numbers: range
+    settings: tuple[dict[str, Word], ...]
+
+    @property
+    def cases(self) -> list[tuple[int, dict[str, Word]]]:
+        """Number and setting of each."""
+        return list(zip(self.numbers, self.settings, strict=True))
+
+    @property
+    def together(self) -> Setting:
+        """One setting with the directions of all."""
+        first, *others = self.settings
+        if DIRECTIONS not in first:
+            return first
+        return first | {DIRECTIONS: [each[DIRECTIONS] for each in (first, *others)]}
+
+
+def group_size(sweep: Sweep) -> int:
+    """Cases in each group: directions are grouped where a grid names them first."""
+    grouped = sweep.grid is not None and sweep.keys[0] == DIRECTIONS
+    return len(sweep.values[DIRECTIONS]) if grouped else 1
+
+
+def group_count(sweep: Sweep) -> int:
+    """Number of groups of cases."""
+    return case_count(sweep) // group_size(sweep)
+
+
+def part(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
+    """The groups of one of several parts of a sweep, none of which is empty or much larger."""
+    size, total = group_size(sweep), group_count(sweep)
+    first, last = (size * (total * (number + edge) // parts) for edge in (0, 1))
+    cases = islice(settings(sweep), first, last)
+    return [
+        DirectionGroup(range(start, start + size), tuple(islice(cases, size)))
+        for start in range(first, last, size)
+    ]
+
+
+def unit_of(sweep: Sweep, key: str) -> str:
+    """The unit in which a parameter's values are given; "1" for plain numbers and for words."""
+    first = taken_apart(next(islice(settings(sweep), 1))[key])
+    return (first and first[1]) or "1"
+
+
+def laid(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
+    """The content of a problem file with a setting laid over it.
+
+    A single value at a key that holds a list is a list of one; new directions weigh equally.
+    """
+    made = copy.deepcopy(dict(data))
+    for key, value in setting.items():
+        *above, last = key.split(".")
+        section = made
+        for name in above:
+            section = section.setdefault(name, {})
+        several = isinstance(section.get(last), list)
+        section[last] = [value] if several and not isinstance(value, list) else value
+        if key == DIRECTIONS:
+            section.pop("weights", None)
+    return made

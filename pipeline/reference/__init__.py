@@ -1,1 +1,0 @@
-"""Pages of the documentation that follow from the code: keys of the YAML files, datasets."""

@@ -1,0 +1,64 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+
+from pipeline.runtime.errors import refusal
+
+
+@contextmanager
+def write_atomically(path: Path) -> Iterator[Path]:
+    """A path beside ``path`` to write to: it takes its place at the end, or vanishes on an error.
+
+    It is this process's own, so that two that write the same file do not meet half of each other's.
+
+    Raises:
+        UserError: the folder is full, read-only or not ours.
+    """
+    aside = path.with_name(f".part_{os.getpid()}_{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _clear(path)
+        yield aside
+        sync(aside)
+        aside.replace(path)
+        sync(path.parent)
+    except OSError as error:
+        raise refusal(path, error) from error
+    finally:
+        _discard(aside)
+
+
+def sync(path: Path) -> None:
+    """Returns when the content of a file, or the names in a folder, are safe on the disk."""
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _clear(path: Path) -> None:
+    """Removes what a process that was killed left of the file."""
+    for left in path.parent.glob(f".part_*_{_literal(path.name)}"):
+        number = left.name.split("_")[1]
+        if not (number.isdecimal() and psutil.pid_exists(int(number))):
+            _discard(left)
+
+
+def _literal(name: str) -> str:
+    """A pattern that matches the name alone."""
+    return name.replace("[", "[[]")
+
+
+def _discard(path: Path) -> None:
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return  # the error that matters is the one already on its way

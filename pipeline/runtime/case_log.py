@@ -1,0 +1,98 @@
+"""Cases with their results as they come: a CSV that is read while it grows, and resumed from.
+
+Every part of a sweep appends to a file of its own. A line counts if it is whole and its check, a
+CRC-32 of what is before it, holds: whatever ends a process, at most the cases under way are lost.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, TextIO
+
+COLUMNS = ("loss", "loss_altered", "min_void_angle", "status")
+
+
+class SweepResult(NamedTuple):
+    """What came of a case; NaN where nothing did, and why."""
+
+    loss: float
+    loss_altered: float
+    min_void_angle: float
+    status: str = "ok"
+
+    @classmethod
+    def failed(cls, why: str) -> SweepResult:
+        """A case without a result."""
+        return cls(float("nan"), float("nan"), float("nan"), why)
+
+
+def header(keys: Sequence[str]) -> list[str]:
+    """The names of the columns: the case's number, what it sets, what came of it, a check."""
+    return ["case", *keys, *COLUMNS, "check"]
+
+
+def known(folder: Path) -> dict[int, SweepResult]:
+    """The results in all files of a folder, by number of the case; damaged lines tell nothing."""
+    found = {}
+    for path in sorted(folder.glob("*.csv")):
+        for number, *_, loss, altered, void, status in csv.reader(_whole_lines(path)):
+            found[int(number)] = SweepResult(float(loss), float(altered), float(void), status)
+    return found
+
+
+def _whole_lines(path: Path) -> Iterator[str]:
+    """The lines of a file whose checks hold, without them; the heading is none."""
+    with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
+        for line in file:
+            told, _, check = line.rpartition(",")
+            if check == f"{_check(told)}\n":
+                yield told
+
+
+def _check(told: str) -> str:
+    return f"{zlib.crc32(told.encode()):08x}"
+
+
+class Casebook:
+    """Appends results to a file, which is begun where there is none; a context manager."""
+
+    def __init__(self, path: Path, keys: Sequence[str]) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _cut_off(path)
+        self._file: TextIO = path.open("a", encoding="utf-8", newline="")
+        if path.stat().st_size == 0:
+            self._file.write(f"{_row(header(keys))}\n")
+
+    def add(self, rows: Iterable[tuple[int, Sequence[object], SweepResult]]) -> None:
+        """Numbers, settings and results of some cases, on the disk when this returns."""
+        for number, setting, found in rows:
+            status = " ".join(found.status.split())
+            told = _row([number, *setting, *map(repr, found[:-1]), status])
+            self._file.write(f"{told},{_check(told)}\n")
+        self._file.flush()
+        os.fsync(self._file.fileno())
+
+    def __enter__(self) -> Casebook:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+
+def _row(cells: Iterable[object]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow(cells)
+    return text.getvalue()
+
+
+def _cut_off(path: Path) -> None:
+    """Removes a last line that a kill left unfinished."""
+    if path.exists():
+        content = path.read_bytes()
+        with path.open("r+b") as file:
+            file.truncate(content.rfind(b"\n") + 1)

@@ -1,0 +1,45 @@
+"""The one place that says how a process of this project runs: one thread, fixed seeds, own caches.
+
+Small systems lose up to thirty times their speed to threads of BLAS and XLA, and results are only
+byte-reproducible without them; work is spread over cores as processes instead. The libraries read
+these variables once, when they are imported, so `pipeline` sets them on its own import.
+"""
+
+from __future__ import annotations
+
+import os
+
+from pipeline.runtime.locations import CACHE
+from pipeline.runtime.source_closure import kernels_hash
+
+RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
+
+ONE_THREAD = {
+    "MKL_NUM_THREADS": "1",
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+}
+REPRODUCIBLE = {
+    "JAX_PLATFORMS": "cpu",
+    "MPLBACKEND": "agg",
+    "PYTHONHASHSEED": "0",
+    "SOURCE_DATE_EPOCH": "1735689600",  # 2025-01-01, the date that files with a date carry
+}
+BOUNDED = {
+    "OPENCV_IO_MAX_IMAGE_PIXELS": str(1 << 27),  # of a picture: more are refused, not allocated
+}
+CACHES = {
+    "JAX_COMPILATION_CACHE_DIR": str(CACHE / "jax"),
+    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1",
+    "MPLCONFIGDIR": str(CACHE / "matplotlib"),
+}
+
+
+def pin() -> None:
+    """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
+    os.environ.update(ONE_THREAD | REPRODUCIBLE | BOUNDED)
+    for name, value in CACHES.items():
+        os.environ.setdefault(name, value)
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        os.environ["NUMBA_CACHE_DIR"] = str(CACHE / "numba" / kernels_hash())

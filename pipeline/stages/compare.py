@@ -1,0 +1,187 @@
+"""Stage: lays a recording beside the simulation of what it shows, and measures how far they are."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.comparison import Compared
+    from pipeline.problem import Problem
+    from pipeline.tracking.frames import Recording
+
+LOG = logging.getLogger(__name__)
+
+DESCRIPTION = """\
+Compare a recording with the simulation of what it shows.
+
+The track is brought into the design's frame and onto the time (or load) of the response by its
+drive; the design is simulated under the measured motion of the units that supports and drive hold,
+with imperfect copies for a band about it; both sides meet at the frames of the track.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.stages.compare", DESCRIPTION)
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the study's design")
+    made.add_argument("--response", type=Path, required=True, metavar="NC", help="its response")
+    made.add_argument(
+        "--recording", type=Path, required=True, metavar="YAML", help="what was filmed"
+    )
+    made.add_argument("--track", type=Path, required=True, metavar="NC", help="its track")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--threads", type=int, default=1, help="copies simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads both sides, compares them, writes the comparison.
+
+    Raises:
+        UserError: the recording and the study do not belong together, or cannot be aligned.
+    """
+    from pipeline import datasets
+    from pipeline.comparison import dataset
+    from pipeline.datasets import provenance
+    from pipeline.tracking.frames import recording as recordings
+
+    asked = problem.load(args.problem, args.preset)
+    recording = recordings.load(args.recording)
+    files = {name: getattr(args, name) for name in ("design", "response", "track")}
+    try:
+        made = compared(asked, recording, args)
+    except UserError as error:
+        error.file = error.file or str(args.recording)
+        raise
+    told = dataset(made)
+    origin = {
+        **provenance.attributes(asked, "compare", parents=files, plan=_plan(made)),
+        "recording": recording.model_dump_json(),
+        "synthetic": made.measurement.track.attrs["synthetic"],
+    }
+    datasets.write(
+        told.assign_attrs(_words(asked, recording, made)), args.out, "comparison", origin
+    )
+    _tell(told)
+
+
+def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> Compared:
+    """Both sides of a recording, at the frames of its track.
+
+    Raises:
+        UserError: they do not belong together, or cannot be aligned.
+    """
+    from pipeline import datasets
+    from pipeline.comparison import (
+        Compared,
+        along,
+        axis,
+        measurement,
+        nominal,
+        pixel_size,
+        quantities,
+        simulation,
+    )
+    from pipeline.datasets import provenance
+    from pipeline.posing import read_design, scene_of, structures_of
+    from pipeline.tracking.geometry import as_built
+
+    design = read_design(asked, args.design)
+    whole = datasets.read(args.response, "response")
+    provenance.check_parent(whole, args.response, "design", args.design)
+    response = chosen(whole, recording)
+    built = as_built(design, recording.structure)
+    measured = measurement(datasets.read(args.track, "track"), built)
+    shown = axis(measured.time, measured.drive, response, static=asked.static)
+    structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
+    way = along(response)
+    inside = measured.compared & (built["roi"].values == 1)
+    every = whole.isel(case=recording.case)
+    return Compared(
+        measurement=measured,
+        axis=shown,
+        simulation=simulation(asked, structure, measured.track, measured.time, way, args.threads),
+        nominal=nominal(response, shown.time),
+        quantities=quantities(asked, every, shown.time, inside),
+        design=built,
+        frequency=np.nan if asked.frequency is None else asked.frequency,
+        level=asked.prediction.level,
+        pixel=(
+            pixel_size(measured.track, np.nanmean(measured.centre, axis=0)),
+            recording.pixel_size or np.nan,
+        ),
+    )
+
+
+def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
+    """The structure and load case of a response that a recording shows.
+
+    Raises:
+        UserError: the response has none such.
+    """
+    from pipeline.virtual_lab import of_structure
+
+    one = of_structure(response, recording.structure)
+    if recording.case >= (cases := one.sizes["case"]):
+        remedy = f"give a number from 0 to {cases - 1}"
+        raise UserError(
+            "the study has no such load case", key="case", value=recording.case, remedy=remedy
+        )
+    return one.isel(case=recording.case)
+
+
+def _plan(made: Compared) -> dict[str, object]:
+    """What was decided, and what is missing."""
+    return {
+        "frames": len(made.measurement.frames),
+        "units_by_use": np.bincount(made.measurement.use, minlength=5).tolist(),
+        "beyond_the_response": int(np.isnan(made.axis.time).sum()),
+        "failures": list(made.simulation.failures),
+    }
+
+
+def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, str]:
+    """The attributes that tell how both sides were brought together."""
+    from pipeline.comparison import words
+
+    return {
+        "title": recording.title or f"{recording.structure} structure",
+        "structure": recording.structure,
+        "case": str(recording.case),
+        **words(asked, made),
+    }
+
+
+def _tell(told: xr.Dataset) -> None:
+    """One line about how far the sides are."""
+    apart = told["nrmse"].sel(side="simulated", estimate="value").values
+    alike = told["correlation"].sel(side="simulated", estimate="value").values
+    LOG.info(
+        "%d frames, %d units; residual %s %% of the motion, correlation %s (ux, uy, theta)",
+        told.sizes["time"],
+        int((told["use"] == 0).sum()),
+        json.dumps([round(100 * float(each), 1) for each in apart]),
+        json.dumps([round(float(each), 4) for each in alike]),
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

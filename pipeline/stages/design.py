@@ -1,0 +1,258 @@
+"""Stage: optimises the cloak of a problem by one method and writes the design with its history."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline import problem
+from pipeline.posing import failures
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from sim.core import Floats
+    from sim.optimise import Evaluate, Evaluation, MmaOptions, Result, SqpOptions
+    from sim.scene import Plan, Scene
+
+LOG = logging.getLogger(__name__)
+
+CONFIRMING = 4
+"""Loads passed for each of the loss when a design's loss is confirmed."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.design",
+        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from"
+        " which the same command resumes after any kind of end.",
+    )
+    made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    told = "the design to start from, where the problem has optimiser.start: study"
+    made.add_argument("--start", type=Path, metavar="NC", help=told)
+    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads the problem, optimises, writes the design.
+
+    Raises:
+        UserError: a fault of the problem, no feasible start, or a start that cannot be simulated
+            or is none of this problem's.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import design_scene, start_of
+    from sim.scene import make_plan
+
+    asked = problem.load(args.problem, args.preset)
+    if asked.designs is not None:
+        raise UserError(
+            "the problem asks for several designs",
+            file=args.problem,
+            key="designs",
+            remedy="name one by its number, as in --preset 1",
+        )
+    scene = design_scene(asked, args.problem.parent)
+    _check_symmetry(scene, args.problem)
+    plan = make_plan(scene, threads=args.threads)
+    LOG.info("%s", plan.describe())
+    start = start_of(asked, scene, args.start, args.problem)
+    result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent, start)
+    LOG.info("stopped: %s", result.reason)
+    made = design_dataset(asked, scene, result)
+    parents = {} if args.start is None else {"start": args.start}
+    origin = provenance.attributes(
+        asked, "design", method=args.method, parents=parents, plan=plan.record()
+    )
+    datasets.write(made, args.out, "design_method", origin)
+
+
+def _check_symmetry(scene: Scene, source: Path) -> None:
+    try:
+        _ = scene.space
+    except ValueError as error:
+        raise UserError(
+            str(error),
+            file=source,
+            key="optimiser.symmetry",
+            value=scene.symmetry,
+            remedy="ask for none, or for one that lattice and cloak have",
+        ) from error
+
+
+def optimise(
+    asked: Problem,
+    scene: Scene,
+    plan: Plan,
+    method: str,
+    source: Path,
+    results: Path,
+    start: Floats | None = None,
+) -> Result:
+    """Runs the optimiser with a journal in ``results`` and a progress bar.
+
+    It starts from the initial lattice, or from the design vector ``start`` (n_variables,).
+    """
+    import numpy as np
+
+    from pipeline.posing import limits_of
+    from pipeline.runtime import source_hash
+    from sim.constraints import ConstraintVector
+    from sim.core import SimulationError
+    from sim.optimise import InfeasibleStartError, Journal, JournalInUseError, minimise
+    from sim.scene import Paths, evaluator
+
+    budget = asked.optimiser.methods.chosen.get(method)
+    if budget is None:
+        raise UserError(
+            f"the problem does not ask for the method {method}",
+            file=source,
+            key="optimiser.methods",
+            remedy=f"add optimiser.methods.{method}.evaluations",
+        )
+    constraints = ConstraintVector(scene.space, limits_of(asked))
+    key = problem.section_hash(asked, "design", method)
+    folder = results / ".journal" / key[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = Paths(folder / f"{method}.paths")
+    with cli.progress(budget.evaluations, f"design by {method}") as bar:
+
+        def show(evaluation: Evaluation) -> None:
+            paths.accept(evaluation)
+            bar.update(loss=evaluation.loss, violation=evaluation.violation)
+
+        try:
+            with Journal(
+                folder / f"{method}.journal", f"{key} {source_hash('pipeline.stages.design')}"
+            ) as journal:
+                return minimise(
+                    method,  # type: ignore[arg-type]
+                    journal.wrap(evaluator(scene, plan, paths)),
+                    constraints,
+                    np.zeros(scene.space.n_variables) if start is None else start,
+                    options=_options(asked, method),
+                    callback=show,
+                    confirm=_from_rest(scene, plan),
+                )
+        except InfeasibleStartError as error:
+            raise failures.infeasible(error, constraints, source) from error
+        except SimulationError as error:
+            tried = failures.Simulated(source, scene, "initial", plan.solver.asked)
+            raise failures.unsolved(error, tried, None) from error
+        except JournalInUseError as error:
+            raise UserError(str(error), file=source) from error
+
+
+def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
+    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
+
+    A path that starts from that of a similar design, or steps far, may pass where it should end.
+    """
+    from sim.quasistatics import StaticSolver
+    from sim.scene import evaluator
+
+    if not isinstance(plan.solver, StaticSolver):
+        return None
+    return evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+
+
+def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
+    from sim.optimise import MmaOptions, SqpOptions
+
+    wanted = asked.optimiser
+    evaluations = wanted.methods.chosen[method].evaluations
+    if method == "mma":
+        return MmaOptions(evaluations=evaluations)
+    return SqpOptions(
+        evaluations=evaluations,
+        radius=wanted.trust_radius,
+        radius_max=wanted.trust_radius_max,
+        kick=wanted.kick,
+        seed=wanted.seed,
+    )
+
+
+def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
+    """The dataset ``design_method`` of an optimisation."""
+    import numpy as np
+    import xarray as xr
+
+    from pipeline.posing import (
+        case_directions,
+        lattice_of,
+        limits_of,
+        loss_units,
+        network_variables,
+        spread,
+        unit_coordinates,
+    )
+    from sim.constraints import KIND_NAMES, margins
+    from sim.structure import overlapping_pairs, shape, smallest_gap
+
+    lattice, history = scene.lattice, result.evaluations
+    intact = lattice_of(asked)
+    vertices = np.asarray(scene.space.vertices(result.x))
+    found = margins(lattice, vertices, limits_of(asked))
+    cases = len(case_directions(asked))
+    nothing = np.full(cases, np.nan)
+
+    def whole(values: Floats) -> Floats:
+        return spread(values, lattice, intact.n_units)
+
+    variables = {
+        **network_variables(asked, scene),
+        "vertices": (("unit", "vertex", "xy"), whole(lattice.padded(vertices))),
+        "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+        "centroid": (("unit", "xy"), whole(np.asarray(shape(lattice, vertices).centroid))),
+        "constraint_margin": (
+            ("constraint",),
+            [found[kind].value if kind in found else np.nan for kind in KIND_NAMES],
+        ),
+        "smallest_gap": ((), smallest_gap(lattice, vertices).distance),
+        "overlaps": ((), len(overlapping_pairs(lattice, vertices))),
+        "loss": (("evaluation",), [e.loss for e in history]),
+        "loss_case": (
+            ("evaluation", "case"),
+            np.stack([nothing if e.failure else e.aux[:cases] for e in history]),
+        ),
+        "violation": (("evaluation",), [e.violation for e in history]),
+        "accepted": (("evaluation",), [int(e.accepted) for e in history]),
+        "design_vector": (("evaluation", "variable"), np.stack([e.x for e in history])),
+        "best_evaluation": ((), result.best),
+        "best_loss": ((), result.loss),
+        "kkt_residual": ((), result.stationarity.residual),
+    }
+    coordinates = {
+        **unit_coordinates(intact),
+        "direction": (("case",), np.rad2deg(case_directions(asked))),
+        "evaluation": (("evaluation",), np.arange(len(history))),
+        "constraint": (("constraint",), list(KIND_NAMES)),
+        "constraint_units": (
+            ("constraint",),
+            ["mm" if kind in ("edge_length", "gap") else "rad" for kind in KIND_NAMES],
+        ),
+    }
+    made = xr.Dataset(variables, coordinates)
+    for name in ("loss", "loss_case", "best_loss"):
+        made[name].attrs["units"] = loss_units(asked)
+    return made
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

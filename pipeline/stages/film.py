@@ -1,0 +1,228 @@
+"""Stage: films a simulated response, so that a study has a recording before a lab has made one."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.runtime import UserError, cli, found_in
+from pipeline.tracking.frames import WORD
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem.sections import VirtualRecording
+    from pipeline.tracking.frames import Recording
+
+LOG = logging.getLogger(__name__)
+
+SYNTHETIC = f"{WORD}: rendered from a simulation, not filmed"
+DESCRIPTION = """\
+Film a simulated response.
+
+  python -m pipeline.stages.film render RECORDING.yaml --response NC --design NC --out VIDEO.mp4
+  python -m pipeline.stages.film weigh RECORDING.yaml --response NC --out LOAD.csv
+  python -m pipeline.stages.film plan [RECORDING.yaml] --response NC [choices]
+
+The first writes the video, beside it VIDEO.yaml, which pipeline.stages.track takes, and
+VIDEO_truth.nc.
+The second writes the log of the recording's load cell, which is to lie beside the video as
+VIDEO_load.csv. Of a recording that has a specimen, both take what pipeline.stages.virtual_specimen
+wrote for the
+response. The third renders short clips with each of the choices, tracks them, and tells what noise
+to expect. Choices that are given several values are tried in every combination.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.stages.film", DESCRIPTION, study=False)
+    commands = made.add_subparsers(dest="command", required=True)
+    render = commands.add_parser("render", help="write a video", allow_abbrev=False)
+    render.add_argument("recording", type=Path, metavar="RECORDING.yaml")
+    render.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    render.add_argument("--out", type=Path, required=True, metavar="VIDEO", help="*.mp4 or *.mkv")
+    weigh = commands.add_parser("weigh", help="write a load cell's log", allow_abbrev=False)
+    weigh.add_argument("recording", type=Path, metavar="RECORDING.yaml")
+    weigh.add_argument("--out", type=Path, required=True, metavar="CSV", help="the log")
+    plan = commands.add_parser("plan", help="what noise to expect", allow_abbrev=False)
+    plan.add_argument("recording", type=Path, nargs="?", metavar="RECORDING.yaml")
+    plan.add_argument("--structure", choices=("intact", "altered", "cloaked"))
+    plan.add_argument("--case", type=int, help="number of the load case")
+    plan.add_argument("--frames", type=int, default=24, help="of each clip (24)")
+    plan.add_argument("--specimen", nargs="+", choices=("dots", "speckle", "bare"))
+    plan.add_argument("--pixels-per-pitch", type=float, nargs="+", metavar="PX")
+    plan.add_argument("--fps", type=float, nargs="+", metavar="HZ")
+    plan.add_argument("--codec", nargs="+", metavar="NAME", help="ffv1, h264, h264-intra, h264:28")
+    plan.add_argument("--marker", type=float, nargs="+", metavar="MM", help="diameter of the dots")
+    plan.add_argument("--csv", type=Path, metavar="FILE", help="also write the table to this file")
+    for command in (render, weigh, plan):
+        command.add_argument("--response", type=Path, required=True, metavar="NC")
+        command.add_argument("--log", type=Path, metavar="FILE", default=argparse.SUPPRESS)
+        command.add_argument("--quiet", action="store_true", default=argparse.SUPPRESS)
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Renders a recording, weighs what it shows, or plans one.
+
+    Raises:
+        UserError: a fault of the files or of the choices.
+    """
+    if args.command == "render":
+        _render(args.recording, args.response, args.design, args.out)
+    elif args.command == "weigh":
+        _weigh(args.recording, args.response, args.out)
+    else:
+        _plan(args)
+
+
+def _plan(args: argparse.Namespace) -> None:
+    import csv
+
+    from pipeline import datasets
+    from pipeline.problem.sections import VirtualRecording
+    from pipeline.runtime import write_atomically
+    from pipeline.tracking.frames import recording as recordings
+    from pipeline.tracking.geometry import of_design
+    from pipeline.virtual_lab import noise_planning, of_structure
+
+    asked = recordings.Recording(virtual=VirtualRecording())
+    if args.recording is not None:
+        asked = recordings.load(args.recording)
+    response = datasets.read(args.response, "response")
+    structure = args.structure or asked.structure
+    case = asked.case if args.case is None else args.case
+    base = noise_planning.Choice(
+        "bare" if asked.specimen == "auto" else asked.specimen,
+        asked.virtual or VirtualRecording(),
+        of_design(of_structure(response, structure)).pitch,
+    )
+    values = (args.specimen, args.pixels_per_pitch, args.fps, args.codec, args.marker)
+    chosen = noise_planning.choices(
+        base, noise_planning.Options(*(tuple(each or ()) for each in values))
+    )
+    rows = []
+    with cli.progress(len(chosen), "planning") as bar:
+        for choice in chosen:
+            found = noise_planning.expected(response, structure, case, choice, args.frames)
+            rows.append({**choice.words, **found.words})
+            bar.update()
+    LOG.info("%s; errors of clips of %d frames", SYNTHETIC, args.frames)
+    for line in noise_planning.table(rows):
+        LOG.info("%s", line)
+    if args.csv is not None:
+        with (
+            write_atomically(args.csv) as aside,
+            aside.open("w", encoding="utf-8", newline="") as file,
+        ):
+            table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            table.writeheader()
+            table.writerows(rows)
+
+
+def _render(path: Path, response: Path, design: Path, out: Path) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.runtime import write_atomically
+    from pipeline.tracking.frames import recording as recordings
+    from pipeline.virtual_lab import encode, ground_truth, prepared
+
+    asked, virtual = _virtual(path)
+    if out.suffix not in virtual.codec.suffixes:
+        raise UserError(
+            f"{virtual.codec.name} does not go into such a file",
+            file=out,
+            remedy=f"name it *{virtual.codec.suffixes[0]}",
+        )
+    parents = {"response": response, "design": design}
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
+    with found_in(path):
+        film = prepared(_shown(asked, response), asked.structure, asked.specimen, virtual)
+    title = asked.title or path.stem
+    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
+    with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
+        encode(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
+    made = ground_truth.assemble_truth(film.response, film.present, film.motion, film.scene.view)
+    datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
+    comments = (
+        SYNTHETIC,
+        "Written by pipeline.stages.film; python -m pipeline.stages.track takes it.",
+    )
+    with write_atomically(out.with_suffix(".yaml")) as aside:
+        text = recordings.text(_described(asked, virtual, out, design), comments)
+        aside.write_text(text, encoding="utf-8")
+
+
+def _weigh(path: Path, response: Path, out: Path) -> None:
+    from pipeline.runtime import write_atomically
+    from pipeline.virtual_lab import log
+
+    asked, virtual = _virtual(path)
+    if virtual.load_cell is None:
+        remedy = "describe the load cell there"
+        raise UserError("no load cell", file=path, key="virtual.load_cell", remedy=remedy)
+    with found_in(path):
+        lines = log(_shown(asked, response), virtual, virtual.load_cell)
+    with write_atomically(out) as aside, aside.open("w", encoding="utf-8") as file:
+        file.write(f"# {SYNTHETIC}\ntime,force\n")
+        file.writelines(f"{time:.4f},{force:.5f}\n" for time, force in lines)
+
+
+def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
+    """A recording and how it is rendered."""
+    from pipeline.tracking.frames import recording as recordings
+
+    asked = recordings.load(path)
+    if asked.virtual is None:
+        remedy = (
+            "track it (python -m pipeline.stages.track), or say under `virtual` how to render it"
+        )
+        raise UserError("a recording that was filmed", file=path, key="video", remedy=remedy)
+    return asked, asked.virtual
+
+
+def _shown(asked: Recording, response: Path) -> xr.Dataset:
+    """What a recording shows: its specimen, or the study's own response at structure and case."""
+    from pipeline import datasets
+    from pipeline.virtual_lab import of_case
+
+    assert asked.virtual is not None
+    if asked.virtual.specimen is not None:
+        return datasets.read(response, "specimen")
+    return of_case(datasets.read(response, "response"), asked.structure, asked.case)
+
+
+def _described(
+    asked: Recording, virtual: VirtualRecording, video: Path, design: Path
+) -> dict[str, object]:
+    """Keys and values of a recording of the rendered video."""
+    cell = virtual.load_cell
+    log = None if cell is None else {"file": f"{video.stem}_load.csv", "offset": cell.offset}
+    return {
+        "title": asked.title or None,
+        "video": video.name,
+        "design": os.path.relpath(design.resolve(), video.resolve().parent),
+        "structure": asked.structure,
+        "case": asked.case,
+        "pixel_size": f"{virtual.camera.pixel_size:g} mm",
+        "thickness": f"{virtual.look.thickness:g} mm",
+        "camera_distance": f"{virtual.camera.distance:g} mm",
+        "load_axis": asked.load_axis,
+        "load_cell": log,
+        "synthetic": True,
+    }
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

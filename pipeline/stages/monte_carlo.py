@@ -1,0 +1,59 @@
+"""Stage: imperfect copies of the shipped design, simulated in parts that are then joined."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.datasets import chunked
+from pipeline.runtime import UserError, cli
+
+LOG = logging.getLogger(__name__)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    return chunked.parser("pipeline.stages.monte_carlo", "Simulate imperfect copies of a design.")
+
+
+def work(args: argparse.Namespace) -> None:
+    """Simulates a part of the copies, or joins all parts."""
+    chunked.work(args, _run, "scatter", "sample")
+
+
+def _run(args: argparse.Namespace) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import flat_vertices, perturbed, read_design, scene_of
+
+    asked = problem.load(args.problem, args.preset)
+    if asked.robustness is None:
+        raise UserError(
+            "the problem asks for no imperfect copies",
+            file=args.problem,
+            key="robustness",
+            remedy="add robustness.samples",
+        )
+    design = read_design(asked, args.design)
+    scene = scene_of(asked, args.problem.parent)
+    vertices = flat_vertices(scene.lattice, design["vertices"])
+    samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]
+    made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
+    LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
+    parents = {"design": args.design}
+    origin = provenance.attributes(asked, "scatter", parents=parents)
+    datasets.write(made, args.out, "scatter", origin)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

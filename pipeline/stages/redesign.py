@@ -1,0 +1,89 @@
+"""Stage: a design by the angle law under contact on distance, optimised again if that matters."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.posing import law_comparison
+from pipeline.problem.sections import Method, Methods
+from pipeline.runtime import cli
+from pipeline.stages.design import design_dataset, optimise
+from pipeline.stages.select import join
+
+if TYPE_CHECKING:
+    from pipeline.problem import Problem
+
+LOG = logging.getLogger(__name__)
+
+METHOD = "sqp"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.redesign",
+        "Evaluate a design with contact on distance; optimise it again, from there, if its loss"
+        " is another under that law. Every evaluation goes to a journal, as in the stage design.",
+    )
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    made.add_argument("--response", type=Path, required=True, metavar="NC", help="its response")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads design and response, writes the design for contact on distance.
+
+    The start is the design, or the initial lattice if the design cannot be simulated.
+
+    Raises:
+        UserError: neither the design nor the initial lattice can be simulated with that contact.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import design_scene, read_design, shipped_vector
+    from sim.scene import make_plan
+
+    asked = problem.load(args.problem, args.preset)
+    design = read_design(asked, args.design)
+    angle, distance = law_comparison.cloak_losses(datasets.read(args.response, "response"))
+    alike = abs(distance - angle) <= law_comparison.DIFFERENCE * angle
+    LOG.info(
+        "loss %.5g by angles, %.5g by distances: %s", angle, distance, "kept" if alike else "again"
+    )
+    posed = again(asked, 1 if alike else asked.optimiser.geometric.evaluations)
+    scene = design_scene(posed, args.problem.parent)
+    plan = make_plan(scene, threads=args.threads)
+    LOG.info("%s", plan.describe())
+    start = None if np.isnan(distance) else shipped_vector(design)
+    result = optimise(posed, scene, plan, METHOD, args.problem, args.out.parent, start)
+    LOG.info("stopped: %s", result.reason)
+    made = join({METHOD: design_dataset(posed, scene, result)}, METHOD)
+    parents = {"design": args.design, "response": args.response}
+    origin = provenance.attributes(asked, "geometric", parents=parents, plan=plan.record())
+    datasets.write(made, args.out, "design", origin)
+
+
+def again(asked: Problem, evaluations: int) -> Problem:
+    """The problem with contact on distance and this budget."""
+    methods = Methods(sqp=Method(evaluations=evaluations))
+    optimiser = asked.optimiser.model_copy(update={"methods": methods})
+    return law_comparison.geometric(asked).model_copy(update={"optimiser": optimiser})
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,167 @@
+"""Stage: what the presets that ask for more than a study's own drive gain over its own design."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import problem
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from sim.scene import Scene
+
+PLAIN = "plain"
+HELD_OUT = 16
+"""Imperfect copies that a loss is evaluated over, none of them known to a design."""
+_SEED = 1000
+
+
+class Gain(NamedTuple):
+    """One preset: what it asks for and the losses under it, as `GAINS` has them."""
+
+    asks: str
+    loads: int
+    copies: int
+    loss_plain: float
+    loss_own: float
+    loss_altered: float
+    price: float
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.robust_gains",
+        "Evaluate the loss of every preset that asks for more than the study's own drive at the"
+        " study's own design and at the preset's.",
+    )
+    told = "the study's own design as plain=NC, and one for each preset"
+    made.add_argument("--designs", nargs="+", required=True, metavar="PRESET=NC", help=told)
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads the designs, evaluates them, writes the gains.
+
+    Raises:
+        UserError: no design of the study itself is given, or none of a preset, or a preset asks
+            for nothing but the study's own drive.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+
+    given = dict(_named(text) for text in args.designs)
+    if PLAIN not in given or len(given) == 1:
+        what = "a design of the study itself and one of a preset are compared"
+        remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
+        raise UserError(what, key="--designs", remedy=remedy)
+    made = gains(args.problem, given)
+    origin = provenance.attributes(problem.load(args.problem), "design", parents=given)
+    datasets.write(made, args.out, "gains", origin)
+
+
+def _named(text: str) -> tuple[str, Path]:
+    name, _, path = text.rpartition("=")
+    return name, Path(path)
+
+
+def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
+    """The dataset ``gains`` of a problem file, from its own design and those of presets.
+
+    Raises:
+        UserError: a preset asks for nothing but the study's own drive.
+    """
+    import xarray as xr
+
+    from pipeline.posing import loss_units
+
+    own = problem.load(path)
+    presets = [name for name in designs if name != PLAIN]
+    with cli.progress(len(presets) + 1, "losses") as bar:
+        drive = _loss(own, path.parent, designs[PLAIN])
+        bar.update()
+        rows = []
+        for name in presets:
+            rows.append(_gain(path, name, designs))
+            bar.update()
+    columns = {
+        name: (("preset",), list(column))
+        for name, column in zip(Gain._fields, zip(*rows, strict=True), strict=True)
+    }
+    made = xr.Dataset({"preset": presets, **columns, "loss_drive": ((), drive)})
+    for name in ("loss_plain", "loss_own", "loss_altered", "price", "loss_drive"):
+        made[name].attrs["units"] = loss_units(own)
+    return made
+
+
+def _gain(path: Path, preset: str, designs: Mapping[str, Path]) -> Gain:
+    """One preset; the copies are others than its design was made with."""
+    asked, drive = problem.load(path, preset), problem.load(path)
+    if not asked.asks_more_than(drive):
+        what, remedy = "the preset asks for nothing but the study's own drive", "leave it out"
+        raise UserError(what, file=path, value=preset, remedy=remedy)
+    robust, held = asked.objective.robust, _held_out(asked)
+    plain, own = (_loss(held, path.parent, designs[name]) for name in (PLAIN, preset))
+    return Gain(
+        asks=asked.title,
+        loads=1 + len(robust.loads if robust else ()),
+        copies=HELD_OUT if robust and robust.copies else 0,
+        loss_plain=plain,
+        loss_own=own,
+        loss_altered=_loss(held, path.parent, None),
+        price=_loss(drive, path.parent, designs[preset]),
+    )
+
+
+def _held_out(asked: Problem) -> Problem:
+    robust = asked.objective.robust
+    if robust is None or not robust.copies:
+        return asked
+    other = robust.model_copy(update={"copies": HELD_OUT, "seed": robust.seed + _SEED})
+    objective = asked.objective.model_copy(update={"robust": other})
+    return asked.model_copy(update={"objective": objective})
+
+
+def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
+    """The loss of a design, or of the structure before any; over the copies, if there are any."""
+    from pipeline.posing import design_scene, flat_vertices, read_design
+
+    scene = design_scene(asked, folder)
+    vertices = scene.lattice.vertices
+    if path is not None:
+        vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
+    shifts = [0.0] if scene.copies is None else scene.copies[:, scene.lattice.group]
+    return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
+
+
+def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
+    """The combined loss of one structure."""
+    from sim.scene import combined, concrete_parameters, make_plan, objective
+    from sim.solvers import base
+
+    plan = make_plan(scene, vertices)
+    values = concrete_parameters(scene, vertices)
+    drives = [scene.drives[case] for case in plan.simulated]
+    motion, *_ = base.forward(plan.solver, values, drives)
+    each = objective(scene)(motion, values)[np.searchsorted(plan.simulated, plan.case_of)]
+    return float(combined(each, scene.weights, scene.sharpness))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

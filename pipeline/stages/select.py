@@ -1,0 +1,92 @@
+"""Stage: ships the better feasible design of several methods, with all their histories."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline import problem
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LOG = logging.getLogger(__name__)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.stages.select", "Choose the feasible design with the lower loss.")
+    made.add_argument("--designs", type=Path, nargs="+", required=True, metavar="NC")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads the designs, writes the better one.
+
+    Raises:
+        UserError: a design of another problem.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+
+    asked = problem.load(args.problem, args.preset)
+    methods = {
+        problem.section_hash(asked, "design", name): name for name in asked.optimiser.methods.chosen
+    }
+    designs = {}
+    for path in args.designs:
+        design = datasets.read(path, "design_method")
+        method = methods.get(design.attrs["problem_hash"])
+        if method is None:
+            raise UserError(
+                "the design is of another problem",
+                file=path,
+                remedy="remove it and run the same command again",
+            )
+        designs[method] = design
+    best = min(designs, key=lambda method: _merit(designs[method]))
+    if overlaps := int(designs[best]["overlaps"]):
+        LOG.warning("warning: %d pairs of units overlap in the shipped design", overlaps)
+    for method, design in designs.items():
+        LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
+    LOG.info("shipped: the design by %s", best)
+    parents = {path.stem: path for path in args.designs}
+    origin = provenance.attributes(asked, "design", parents=parents, plan={"shipped": best})
+    datasets.write(join(designs, best), args.out, "design", origin)
+
+
+def _merit(design: xr.Dataset) -> tuple[int, float]:
+    """Overlapping pairs, found by geometry apart from the constraints, then the loss."""
+    return int(design["overlaps"]), float(design["best_loss"])
+
+
+def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:
+    """Histories of all methods side by side, everything else of the best."""
+    import xarray as xr
+
+    history = [
+        name
+        for name, variable in designs[best].data_vars.items()
+        if "evaluation" in variable.dims or name in ("best_evaluation", "best_loss", "kkt_residual")
+    ]
+    methods = xr.DataArray(list(designs), dims="method", name="method")
+    parts = [design[history] for design in designs.values()]
+    whole = xr.concat(parts, dim=methods, join="outer", fill_value={"accepted": 0})
+    joined = designs[best].drop_vars(["evaluation", *history]).merge(whole)
+    joined.attrs = {"shipped_method": best}
+    return joined
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

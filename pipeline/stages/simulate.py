@@ -1,0 +1,185 @@
+"""Stage: simulates the intact, altered and cloaked structures of a design, with error estimates."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline import problem
+from pipeline.posing import (
+    CaseResult,
+    PosedStructure,
+    Times,
+    failures,
+    law_comparison,
+    measure,
+    structures_of,
+    times_of,
+)
+from pipeline.runtime import cli
+from sim.core import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from sim.core import SimulationError
+    from sim.scene import Plan, Scene
+    from sim.solvers import Case
+
+LOG = logging.getLogger(__name__)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.stages.simulate", "Simulate the structures of a design.")
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--geometric", action="store_true", help="with contact on distance")
+    made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads problem and design, simulates the structures, writes their response.
+
+    Raises:
+        UserError: a structure could not be followed to its end; what was computed is kept.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import read_design, scene_of
+
+    asked = problem.load(args.problem, args.preset)
+    asked = law_comparison.geometric(asked) if args.geometric else asked
+    design = read_design(asked, args.design)
+    scene = scene_of(asked, args.problem.parent)
+    structures = structures_of(scene, design)
+    try:
+        made, plans = response_dataset(asked, structures, args.threads)
+    except StoppedError as stopped:
+        kept = _keep(asked, structures, stopped, args)
+        scene = structures[stopped.name].scene
+        tried = failures.Simulated(args.problem, scene, stopped.name, stopped.asked)
+        raise failures.unsolved(stopped.error, tried, kept) from stopped
+    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
+    datasets.write(made, args.out, "response", origin)
+
+
+class StoppedError(Exception):
+    """A structure whose motion could not be followed to its end."""
+
+    def __init__(self, name: str, error: SimulationError, asked: Floats) -> None:
+        super().__init__(name)
+        self.name, self.error, self.asked = name, error, asked
+
+
+def _keep(
+    asked: Problem,
+    structures: dict[str, PosedStructure],
+    stopped: StoppedError,
+    args: argparse.Namespace,
+) -> Path | None:
+    """Writes the response of a static path as far as all structures can be followed, if at all."""
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+
+    scene, step = structures[stopped.name].scene, stopped.error.step
+    whole = scene.steps or 1
+    reached = 0.0 if not step else stopped.asked[step - 1] / scene.duration
+    steps = int(whole * reached * (1 + 1e-9))
+    if not scene.static or scene.steps is None or steps == 0:
+        return None
+    shorter = {
+        name: each._replace(scene=_until(each.scene, steps)) for name, each in structures.items()
+    }
+    try:
+        made, plans = response_dataset(asked, shorter, args.threads)
+    except StoppedError as again:
+        return _keep(asked, shorter, again, args)
+    out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
+    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
+    datasets.write(made, out, "response", origin)
+    return out
+
+
+def _until(scene: Scene, steps: int) -> Scene:
+    """A static scene whose path ends after so many of its load steps."""
+    assert scene.steps is not None
+    return replace(
+        scene,
+        duration=scene.duration * steps / scene.steps,
+        steps=steps,
+        reference=scene.reference and _until(scene.reference, steps),
+    )
+
+
+def response_dataset(
+    asked: Problem, structures: dict[str, PosedStructure], threads: int
+) -> tuple[xr.Dataset, dict[str, object]]:
+    """The dataset ``response`` of the structures, and the plan of each.
+
+    Raises:
+        StoppedError: a structure could not be followed to its end.
+    """
+    from pipeline.posing import assemble_response
+
+    times = times_of(asked, structures["altered"].scene)
+    measured, plans = measured_cases(structures, times, threads)
+    return assemble_response(asked, structures, times.asked[times.shown], measured), plans
+
+
+def measured_cases(
+    structures: dict[str, PosedStructure], times: Times, threads: int
+) -> tuple[dict[str, list[CaseResult]], dict[str, object]]:
+    """Every case of every structure, and the plan of each structure.
+
+    Raises:
+        UserError: a structure cannot be simulated.
+    """
+    from sim.scene import make_plan
+    from sim.solvers import run_batch
+
+    measured: dict[str, list[CaseResult]] = {}
+    plans: dict[str, object] = {}
+    n_cases = len(structures["altered"].scene.motions)
+    with cli.progress(len(structures) * n_cases, "response") as bar:
+        for name, structure in structures.items():
+            plan = make_plan(structure.scene, structure.vertices, times.asked, every_case=True)
+            plans[name] = plan.record()
+            LOG.info("%s: %s", name, plan.describe())
+            cases = _cases(structure, plan)
+            reduce = measure(structure, times, measured.get("intact"))
+            measured[name] = []
+            for outcome in run_batch(cases, reduce, threads):
+                if outcome.value is None:
+                    assert outcome.error is not None
+                    raise StoppedError(name, outcome.error, times.asked)
+                measured[name].append(outcome.value)
+                bar.update(loss=outcome.value.loss)
+    return measured, plans
+
+
+def _cases(structure: PosedStructure, plan: Plan) -> Iterator[Case]:
+    from sim.scene import concrete_parameters
+    from sim.solvers import Case
+
+    values = concrete_parameters(structure.scene, structure.vertices)
+    return (
+        Case(values, drive, plan.solver, number)
+        for number, drive in enumerate(structure.scene.drives)
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""Stage: small vibrations of a design's structures, and waves in the unit cell of its lattice."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import problem
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.posing import PosedStructure, Variables
+    from pipeline.problem import Problem
+    from pipeline.problem.sections import Spectrum
+    from sim.structure import ConcreteParameters
+    from sim.vibration import Linear
+
+Floats = NDArray[np.float64]
+
+STATES = ("at rest", "loaded")
+_MODE = ("structure", "state", "mode")
+
+
+class Vibrations(NamedTuple):
+    """Of one structure about its equilibria: (state, ...), units along the whole lattice."""
+
+    equilibrium: Floats
+    frequency: Floats
+    mode_shape: Floats
+    transmission: Floats
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.spectrum", "Analyse small vibrations of a design's structures."
+    )
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads problem and design, writes the spectrum.
+
+    Raises:
+        UserError: the problem does not ask for one, or what it asks for cannot be computed.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+
+    asked = problem.load(args.problem, args.preset)
+    if asked.spectrum is None:
+        raise UserError(
+            "the problem asks for no linear analysis",
+            file=args.problem,
+            key="spectrum",
+            remedy="give the section spectrum, with transmission: {from: 5 Hz, to: 200 Hz}",
+        )
+    try:
+        made = spectrum(asked, asked.spectrum, args.problem.parent, args.design)
+    except UserError as error:
+        error.file = error.file or str(args.problem)
+        raise
+    origin = provenance.attributes(asked, "spectrum", parents={"design": args.design})
+    datasets.write(made, args.out, "spectrum", origin)
+
+
+def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr.Dataset:
+    """The dataset ``spectrum`` of a problem and its design.
+
+    Raises:
+        UserError: the lattice has fewer modes, or no unit cell, or it does not hold the strain.
+    """
+    import xarray as xr
+
+    from pipeline.posing import (
+        case_directions,
+        lattice_of,
+        network_variables,
+        read_design,
+        scene_of,
+        spread,
+        structures_of,
+        unit_coordinates,
+        waves,
+    )
+
+    scene = scene_of(asked, folder)
+    structures = structures_of(scene, read_design(asked, design))
+    intact = lattice_of(asked)
+    found = []
+    with cli.progress(len(structures), "linear analysis") as bar:
+        for each in structures.values():
+            found.append(_vibrations(each, wanted, case_directions(asked), intact.n_units))
+            bar.update()
+    vertices = [
+        spread(s.scene.lattice.padded(s.vertices), s.scene.lattice, intact.n_units)
+        for s in structures.values()
+    ]
+    parts = Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
+    band = wanted.transmission
+    variables: Variables = {
+        **network_variables(asked, scene),
+        "vertices": (("structure", "unit", "vertex", "xy"), np.stack(vertices)),
+        "equilibrium": (("structure", "state", "unit", "dof"), parts.equilibrium),
+        "frequency": (_MODE, parts.frequency),
+        "mode_shape": ((*_MODE, "unit", "dof"), parts.mode_shape),
+        "transmission": (("structure", "state", "case", "excitation"), parts.transmission),
+        **waves(asked, wanted),
+    }
+    coordinates: Variables = {
+        **unit_coordinates(intact),
+        "structure": (("structure",), list(structures)),
+        "state": (("state",), list(STATES[: parts.frequency.shape[1]])),
+        "direction": (("case",), np.rad2deg(case_directions(asked))),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+        "mode": (("mode",), np.arange(wanted.modes)),
+        "excitation": (("excitation",), np.linspace(band.start, band.stop, band.points)),
+        "compression": (("compression",), list(wanted.compressions)),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _vibrations(
+    structure: PosedStructure, wanted: Spectrum, directions: Sequence[float], size: int
+) -> Vibrations:
+    """About rest, and about the equilibrium under the full load of a static study."""
+    from pipeline.posing import spread
+    from sim.scene import concrete_parameters
+    from sim.vibration import linearised
+
+    scene, lattice = structure.scene, structure.scene.lattice
+    values = concrete_parameters(scene, structure.vertices)
+    found = []
+    for state in _equilibria(structure, values):
+        made = linearised(scene.topology, values, state)
+        frequency, shape = _modes(made, wanted.modes)
+        sent = _transmission(made, structure, wanted, directions)
+        whole = spread(state, lattice, size), spread(shape, lattice, size, axis=1)
+        found.append(Vibrations(whole[0], frequency, whole[1], sent))
+    return Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
+
+
+def _equilibria(structure: PosedStructure, values: ConcreteParameters) -> list[Floats]:
+    from sim.quasistatics import StaticSolver
+    from sim.solvers import solve_case
+
+    scene = structure.scene
+    found = [np.zeros((scene.lattice.n_units, 3))]
+    if scene.static:
+        solver = StaticSolver(scene.topology, np.array([scene.duration]))
+        loaded, *_ = solve_case(solver, values, scene.drives[0])
+        found.append(loaded[0].reshape(-1, 3))
+    return found
+
+
+def _modes(made: Linear, count: int) -> tuple[Floats, Floats]:
+    from sim.vibration import modes
+
+    try:
+        found = modes(made, count)
+    except ValueError as error:
+        remedy = "ask for fewer"
+        raise UserError(str(error), key="spectrum.modes", value=count, remedy=remedy) from error
+    largest = np.linalg.norm(found.shape[..., :2], axis=-1).max(axis=1)
+    return found.frequency, found.shape / largest[:, None, None]
+
+
+def _transmission(
+    made: Linear, structure: PosedStructure, wanted: Spectrum, directions: Sequence[float]
+) -> Floats:
+    """Root mean square motion (n_cases, n_frequencies) of the region under a unit drive."""
+    from sim.vibration import transmission
+
+    scene = structure.scene
+    unit, dof = np.divmod(made.held, 3)
+    along = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in directions])
+    drives = np.where(np.isin(unit, scene.driven)[:, None], along.T[dof], 0.0)
+    band = wanted.transmission
+    excited = 2 * np.pi * np.linspace(band.start, band.stop, band.points)
+    moved = transmission(made, drives, excited)[:, :, scene.region, :2]
+    return np.asarray(np.sqrt((np.abs(moved) ** 2).sum(axis=-1).mean(axis=-1)).T)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

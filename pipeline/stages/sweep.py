@@ -1,0 +1,156 @@
+"""Stage: the losses of a design and of the altered structure over a sweep, in parts then joined."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import logging
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.datasets import chunked
+from pipeline.problem.sections import sweep_cases
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+    from pipeline.problem.sections import DirectionGroup, Word
+    from pipeline.runtime import Casebook, SweepResult
+
+LOG = logging.getLogger(__name__)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    return chunked.parser(
+        "pipeline.stages.sweep", "Simulate a design at many settings of parameters."
+    )
+
+
+def work(args: argparse.Namespace) -> None:
+    """Computes a part of the cases, or joins all parts."""
+    chunked.work(args, _run, "sweep", "case")
+
+
+def _run(args: argparse.Namespace) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import read_design
+    from pipeline.runtime import case_log, source_hash
+
+    asked = problem.load(args.problem, args.preset)
+    if asked.sweep is None:
+        raise UserError(
+            "the problem asks for no sweep",
+            file=args.problem,
+            key="sweep",
+            remedy="add sweep.grid, sweep.list or sweep.random",
+        )
+    design = read_design(asked, args.design)
+    parents = {"design": args.design}
+    words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.stages.sweep"))
+    key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())
+    folder = args.out.parent / ".journal" / f"sweep_{key.hexdigest()[:16]}"
+    here = sweep_cases.part(asked.sweep, args.chunk, args.chunks)
+    found = case_log.known(folder)
+    path = folder / f"part_{args.chunk}.csv"
+    with case_log.Casebook(path, asked.sweep.keys) as book:
+        LOG.info("results as they come: %s", path)
+        _simulate(args, asked, design["vertices"], here, found, book)
+    made = dataset(asked, [case for group in here for case in group.cases], found)
+    LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
+    origin = provenance.attributes(asked, "sweep", parents=parents)
+    datasets.write(made, args.out, "sweep", origin)
+
+
+def _simulate(
+    args: argparse.Namespace,
+    asked: Problem,
+    vertices: xr.DataArray,
+    groups: Sequence[DirectionGroup],
+    found: dict[int, SweepResult],
+    book: Casebook,
+) -> None:
+    """Adds what is missing to ``found`` and to the casebook."""
+    failed = 0
+    with cli.progress(sum(len(group.numbers) for group in groups), "cases") as bar:
+        for group in groups:
+            if not found.keys() >= set(group.numbers):
+                rows = _results(args, asked, vertices, group)
+                found.update(zip(group.numbers, rows, strict=True))
+                words = [list(each.values()) for each in group.settings]
+                book.add(zip(group.numbers, words, rows, strict=True))
+            for number in group.numbers:
+                failed += found[number].status != "ok"
+                bar.update(failed=failed)
+
+
+def _results(
+    args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: DirectionGroup
+) -> list[SweepResult]:
+    from pipeline.posing import setting_losses
+    from pipeline.runtime import SweepResult
+    from sim.core import SimulationError
+
+    setting = group.together
+    try:
+        found = setting_losses.results(asked, setting, args.problem.parent, vertices, args.threads)
+    except (setting_losses.UnposedError, SimulationError) as error:
+        return [SweepResult.failed(str(error))] * len(group.numbers)
+    if sweep_cases.DIRECTIONS in setting:
+        return found
+    return [setting_losses.mean(found, np.array(asked.drive.case_weights))]
+
+
+def dataset(
+    asked: Problem, cases: Sequence[tuple[int, dict[str, Word]]], found: dict[int, SweepResult]
+) -> xr.Dataset:
+    """The dataset ``sweep`` of some cases."""
+    import xarray as xr
+
+    from pipeline.posing import loss_units
+    from pipeline.problem.sections import taken_apart
+
+    assert asked.sweep is not None
+    keys = asked.sweep.keys
+    numbers = [number for number, _ in cases]
+    words = [[setting[key] for key in keys] for _, setting in cases]
+    values = [[(taken_apart(word) or (np.nan,))[0] for word in row] for row in words]
+    of_case = {
+        name: ("case", [getattr(found[number], name) for number in numbers])
+        for name in ("loss", "loss_altered", "min_void_angle", "status")
+    }
+    both = ("case", "parameter")
+    made = xr.Dataset(
+        {
+            **of_case,
+            "value": (both, np.array(values)),
+            "setting": (both, np.array([[str(word) for word in row] for row in words])),
+        },
+        {
+            "case": numbers,
+            "parameter": list(keys),
+            "parameter_units": (
+                "parameter",
+                [sweep_cases.unit_of(asked.sweep, key) for key in keys],
+            ),
+        },
+    )
+    for name in ("loss", "loss_altered"):
+        made[name].attrs["units"] = loss_units(asked)
+    return made
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,273 @@
+"""Stage: turns the video of a specimen into the motions of its units, with their uncertainty."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline.runtime import UserError, cli, found_in
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.tracking.frames import Recording
+    from pipeline.tracking.motion import Track
+
+LOG = logging.getLogger(__name__)
+
+DESCRIPTION = """\
+Track the units of a specimen through a video.
+
+  python -m pipeline.stages.track RECORDING.yaml --out track.nc [--design NC]
+  python -m pipeline.stages.track init VIDEO --design NC [--pixel-size MM] [--out-dir FOLDER]
+  python -m pipeline.stages.track points POINTS.yaml --out track.nc [--design NC]
+  python -m pipeline.stages.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
+
+The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
+The second proposes a recording YAML, draws the units that it found on the first frame, and says
+what it could not tell. The third reads the points of a commercial DIC system, a CSV that the YAML
+names, instead of a video. The fourth writes NAME_recording.yaml and NAME_design.nc for a described
+test video, which the first then tracks.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser("pipeline.stages.track", DESCRIPTION, study=False)
+    made.add_argument("words", nargs="+", metavar="[COMMAND] FILE", help="what to read")
+    made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
+    made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
+    made.add_argument("--no-report", action="store_true", help="neither overlay nor quality page")
+    made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
+    made.add_argument("--pixel-size", type=float, metavar="MM", help="init: roughly")
+    made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="of the files")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Imports a description, or tracks a recording.
+
+    Raises:
+        UserError: a fault of the files, or a video that does not show the design.
+    """
+    *command, file = args.words
+    known = {"": _track, "init": _init, "points": _points, "import": _import}
+    if (name := " ".join(command)) not in known:
+        remedy = "give one of init, points, import, or a recording alone; see --help"
+        raise UserError("no such command", value=name, remedy=remedy)
+    wanted = {"": "out", "points": "out", "init": "design"}.get(name)
+    if wanted is not None and getattr(args, wanted) is None:
+        usage = f"python -m pipeline.stages.track {name} {file}".replace("  ", " ")
+        remedy = f"{usage} --{wanted} FILE.nc; see --help"
+        raise UserError(f"--{wanted} is wanted", remedy=remedy)
+    known[name](Path(file), args)
+
+
+def _points(path: Path, args: argparse.Namespace) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.tracking.geometry import as_built
+    from pipeline.tracking.output import dic_points, track_table
+
+    asked = dic_points.load(path)
+    source = _design(asked.design, path, args.design)
+    design = as_built(datasets.read(source, "design"), asked.structure)
+    held = path.parent / asked.points
+    with found_in(path):
+        made = dic_points.track(design, dic_points.cloud(held, asked))
+    parents = {"design": source, "points": held}
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    datasets.write(made, args.out, "track", origin)
+    track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+
+
+def _init(video: Path, args: argparse.Namespace) -> None:
+    import cv2
+
+    from pipeline import datasets
+    from pipeline.runtime import write_atomically
+    from pipeline.tracking.frames import WORD, frames, recording, rendered
+    from pipeline.tracking.reference_frame import proposal
+
+    design = datasets.read(args.design, "design")
+    first = next(frames(video, rate=1.0), None)
+    if first is None:
+        raise UserError("the video has no frames", file=video, remedy="give another file")
+    scale = None if args.pixel_size is None else 1 / args.pixel_size
+    found = proposal.propose(first.image, design, scale)
+    out, drawn = (args.out_dir / f"{video.stem}{end}" for end in (".yaml", "_units.png"))
+    if out.exists():
+        raise UserError("there is a recording already", file=out, remedy="remove it, or --out-dir")
+    values = {
+        "title": video.stem,
+        "video": os.path.relpath(video.resolve(), out.resolve().parent),
+        "design": os.path.relpath(args.design.resolve(), out.resolve().parent),
+        "structure": found.structure,
+        "pixel_size": f"{found.pixel_size:.4g} mm",
+        "window": {"start": "0 s"},
+        "synthetic": rendered(video) or None,
+    }
+    note = WORD if rendered(video) else ""
+    with write_atomically(drawn) as aside:
+        aside.write_bytes(
+            cv2.imencode(".png", proposal.picture(first.image, found, note))[1].tobytes()
+        )
+    with write_atomically(out) as aside:
+        comments = ("What the first frame did not tell:", *found.doubts)
+        aside.write_text(recording.text(values, comments), encoding="utf-8")
+    seen = f"{len(found.sighting.unit)} of {found.specimen.count} units, {found.kind}"
+    LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
+    for doubt in found.doubts:
+        LOG.info("not told: %s", doubt)
+
+
+def _import(path: Path, args: argparse.Namespace) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.tracking.frames import import_video
+
+    described = import_video.description(path)
+    shown = import_video.video_of(path) if args.video is None else args.video
+    name, folder = shown.stem, args.out_dir
+    origin = {
+        "problem": "{}",
+        "problem_hash": provenance.file_hash(path),
+        "parents": json.dumps({"description": provenance.file_hash(path)}),
+    }
+    datasets.write(import_video.design(described), folder / f"{name}_design.nc", "design", origin)
+    text = import_video.recording_text(described, shown.resolve(), f"{name}_design.nc")
+    (folder / f"{name}_recording.yaml").write_text(text, encoding="utf-8")
+    LOG.info(
+        "python -m pipeline.stages.track %s --out %s", folder / f"{name}_recording.yaml", "track.nc"
+    )
+
+
+def _track(path: Path, args: argparse.Namespace) -> None:
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.tracking.frames import import_video, load_cell, rendered
+    from pipeline.tracking.frames import recording as recordings
+    from pipeline.tracking.geometry import as_built
+    from pipeline.tracking.output import assemble_track, is_driven, track_table
+
+    if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
+        remedy = (
+            f"python -m pipeline.stages.track init {path} --design NC proposes a recording of it"
+        )
+        raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
+    asked = recordings.load(path)
+    video, source = _sources(asked, path, args.design)
+    design = as_built(datasets.read(source, "design"), asked.structure)
+    if asked.load_axis == "driven displacement" and not is_driven(design).any():
+        remedy = "write `load_axis: time`, or give the design of a study with driven units"
+        raise UserError(
+            "the design has no driven units",
+            file=path,
+            key="load_axis",
+            value=asked.load_axis,
+            remedy=remedy,
+        )
+    parents, force = {"design": source, "video": video}, None
+    if (cell := asked.load_cell) is not None:
+        held = parents["load_cell"] = path.parent / cell.file
+        log = load_cell.read(held, cell)
+    track = followed(asked, design, video, path)
+    if cell is not None:
+        force = load_cell.forces(log, track.start + track.time)
+    made = assemble_track(design, track, force)
+    synthetic = asked.synthetic or rendered(video)
+    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
+    datasets.write(made, args.out, "track", origin)
+    track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    if isinstance(track.ended, KeyboardInterrupt):
+        LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
+        raise track.ended
+    if not args.no_report:
+        _report(args.out, video)
+    if track.ended is not None:
+        raise track.ended
+    if cell is not None:
+        load_cell.check(log, track.start + track.time, held, cell)
+
+
+def _report(track: Path, video: Path) -> None:
+    """Runs the stage that draws overlay and quality."""
+    folder = track.with_name(f"{track.stem}_report")
+    words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
+    command = [sys.executable, "-m", "reports.products.tracking.build", *words]
+    if subprocess.run(command, check=False).returncode:
+        remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
+        raise UserError("the report could not be made", file=folder, remedy=remedy)
+
+
+def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:
+    """The files of the video and of the design."""
+    if asked.video is None:
+        remedy = "render it first, with pipeline.stages.film, and track the YAML beside the video"
+        raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
+    return path.parent / asked.video, _design(asked.design, path, study)
+
+
+def _design(named: str | None, path: Path, study: Path | None) -> Path:
+    """The design that a YAML names, or that of its study."""
+    if named is not None:
+        return path.parent / named
+    if study is None:
+        remedy = "add the path of the specimen's design dataset, or give --design"
+        raise UserError("no design is named", file=path, key="design", remedy=remedy)
+    return study
+
+
+def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) -> Track:
+    """The track of a recording, told about in a line at its end.
+
+    Raises:
+        UserError: naming the recording's file where the video does not show the design.
+    """
+    from pipeline.tracking.frames import frames, length, uneven
+    from pipeline.tracking.geometry import of_design
+    from pipeline.tracking.motion import follow
+    from pipeline.tracking.reference_frame import Setup
+
+    end = np.inf if asked.window.end is None else asked.window.end
+    shown = frames(video, asked.window.start, end, asked.frame_rate)
+    scale = None if asked.pixel_size is None else 1 / asked.pixel_size
+    with found_in(source):
+        setup = Setup(
+            asked.thickness, asked.camera_distance, asked.specimen, asked.turned, asked.mirrored
+        )
+        with cli.progress(length(video), "tracking") as bar:
+            track = follow(shown, of_design(design), scale, bar.update, setup)
+    if uneven(track.time):
+        LOG.warning("warning: the frame rate varies; times are the file's own stamps")
+    lost = float(np.mean(track.quality != 0))
+    LOG.info(
+        "%d frames, %d units; %.2f %% not seen; median uncertainty %.4f mm, %.3f deg;"
+        " %d timing faults",
+        len(track.time),
+        track.quality.shape[1],
+        100 * lost,
+        np.nanmedian(track.sigma[..., :2]),
+        np.rad2deg(np.nanmedian(track.sigma[..., 2])),
+        np.count_nonzero(track.timing),
+    )
+    return track
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""Stage: a design under finer steps of load or time, and other contact, beside those of the run."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.posing import (
+    AS_RUN,
+    UNSTABLE,
+    CaseResult,
+    Numbers,
+    assemble_verification,
+    time_refinement,
+)
+from pipeline.runtime import UserError, cli
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.problem import Problem
+
+LOG = logging.getLogger(__name__)
+
+Table = dict[str, list[CaseResult]]
+
+FINER = (2, 10)
+"""How many times more load steps the loss is checked with."""
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.verify",
+        "Check a design with finer steps of load or time, and another contact.",
+    )
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Simulates the structures of a design under every variant of the problem."""
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import read_design
+
+    asked = problem.load(args.problem, args.preset)
+    if asked.static and asked.horizon.steps is None:
+        raise UserError(
+            "the loss of this problem is not taken on load steps",
+            file=args.problem,
+            key="horizon.steps",
+            remedy="give horizon.steps, or leave the check out",
+        )
+    design = read_design(asked, args.design)
+    made = checks(asked, args.problem.parent, design, args.threads)
+    origin = provenance.attributes(asked, "verify", parents={"design": args.design})
+    datasets.write(made, args.out, "verification", origin)
+
+
+def variants(asked: Problem) -> dict[str, Problem]:
+    """The problem as run first, then otherwise alike ones; all show the loads of the run."""
+    steps = asked.horizon.steps
+    assert steps is not None
+    shown = asked.response.model_copy(update={"samples": steps + 1})
+    as_run = asked.model_copy(update={"response": shown})
+    finer = {f"{times} x load steps": steps * times for times in FINER}
+    return {
+        AS_RUN: as_run,
+        **{
+            name: as_run.model_copy(
+                update={"horizon": asked.horizon.model_copy(update={"steps": count})}
+            )
+            for name, count in finer.items()
+        },
+    }
+
+
+def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
+    """The dataset ``verification``; a variant that cannot be simulated keeps its reason."""
+    from pipeline.posing import loss_units
+
+    found, status = (
+        _finer_loads(asked, folder, design, threads)
+        if asked.static
+        else time_refinement.trials(asked, folder, design)
+    )
+    made = assemble_verification(found, status)
+    made["loss"].attrs["units"] = loss_units(asked)
+    return made
+
+
+def _finer_loads(
+    asked: Problem, folder: Path, design: xr.Dataset, threads: int
+) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
+    """Numbers by check and structure of a path of equilibria, and why a check has none."""
+    from pipeline.posing import scene_of, structures_of, times_of
+    from pipeline.stages.simulate import measured_cases
+
+    posed = variants(asked)
+    tables: dict[str, Table] = {}
+    status = dict.fromkeys(posed, "ok")
+    for name, variant in posed.items():
+        structures = structures_of(scene_of(variant, folder), design)
+        times = times_of(variant, structures["altered"].scene)
+        try:
+            tables[name], _ = measured_cases(structures, times, threads)
+        except UserError as error:
+            if name == AS_RUN:
+                raise
+            LOG.warning("%s: %s", name, error.what)
+            status[name] = error.what
+    as_run = tables[AS_RUN]
+    found = {
+        name: {
+            structure: _numbers(cases, as_run[structure], _share(asked, posed[name]))
+            for structure, cases in table.items()
+        }
+        for name, table in tables.items()
+    }
+    return found, status
+
+
+def _share(asked: Problem, variant: Problem) -> float:
+    """What makes the loss of a variant comparable: that of mimicking is a sum over the steps."""
+    mimics = asked.objective.target == "intact" and asked.objective.kind == "displacement"
+    assert asked.horizon.steps is not None
+    assert variant.horizon.steps is not None
+    return float(np.sqrt(asked.horizon.steps / variant.horizon.steps)) if mimics else 1.0
+
+
+def _numbers(cases: list[CaseResult], as_run: list[CaseResult], share: float) -> Numbers:
+    apart = [
+        np.linalg.norm((one.displacement - other.displacement)[..., :2], axis=-1).max()
+        for one, other in zip(cases, as_run, strict=True)
+    ]
+    return Numbers(
+        loss=share * float(np.mean([case.loss for case in cases])),
+        departure=float(max(apart)),
+        min_void_angle=min(float(case.observables.void_angle.min()) for case in cases),
+        gap=min(float(np.nanmin(case.gap)) for case in cases),
+        overlaps=max(int(np.nanmax(case.overlapping)) for case in cases),
+        contact_pairs=max(int(case.observables.contact_pairs[-1]) for case in cases),
+        unstable=sum(int((case.stability == UNSTABLE).sum()) for case in cases),
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,175 @@
+"""Stage: simulates the specimen of a virtual recording, off its design as those of labs are."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pipeline import problem
+from pipeline.runtime import UserError, cli, found_in
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.posing import PosedStructure
+    from pipeline.problem import Problem
+    from pipeline.tracking.frames import Recording
+    from sim.core import Floats
+    from sim.scene import Scene
+
+
+def parser() -> argparse.ArgumentParser:
+    """The stage's command line."""
+    made = cli.parser(
+        "pipeline.stages.virtual_specimen", "Simulate the specimen of a virtual recording."
+    )
+    made.add_argument("recording", type=Path, metavar="RECORDING.yaml")
+    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
+    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads problem, design and recording, simulates the specimen, writes what it does.
+
+    Raises:
+        UserError: the recording has no specimen, or it cannot be made or simulated.
+    """
+    from pipeline import datasets
+    from pipeline.datasets import provenance
+    from pipeline.posing import read_design, scene_of, structures_of
+    from pipeline.tracking.frames import recording as recordings
+
+    recording = recordings.load(args.recording)
+    asked = problem.load(args.problem, args.preset)
+    held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
+    with found_in(args.recording):
+        made = dataset(asked, held, recording)
+    origin = provenance.attributes(asked, "simulate", parents={"design": args.design})
+    told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
+    datasets.write(made, args.out, "specimen", origin | told)
+
+
+def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recording) -> xr.Dataset:
+    """The dataset ``specimen``: what a recording's specimen does under its load case.
+
+    Args:
+        asked: the problem.
+        held: the structures as designed, by name.
+        recording: which of them is made, how, and under which case.
+
+    Raises:
+        UserError: the recording has no specimen, or it cannot be made or simulated.
+    """
+    from pipeline.virtual_lab import specimen
+
+    virtual = recording.virtual
+    if virtual is None or virtual.specimen is None:
+        remedy = "describe the specimen there"
+        raise UserError("the recording has no specimen", key="virtual.specimen", remedy=remedy)
+    structure = _asked_for(held, recording)
+    times = _times(asked, structure.scene, virtual.specimen.unload)
+    made = specimen(structure, recording.case, virtual.specimen, times[-1])
+    return _described(asked, held["altered"].scene, made, recording.case, times)
+
+
+def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedStructure:
+    """The structure that a recording shows."""
+    structure = held.get(recording.structure)
+    if structure is None:
+        remedy = f"give one of: {', '.join(held)}"
+        what = "the study has no such structure"
+        raise UserError(what, key="structure", value=recording.structure, remedy=remedy)
+    cases = len(structure.scene.motions)
+    if recording.case >= cases:
+        remedy = f"give a number from 0 to {cases - 1}"
+        raise UserError(
+            "the study has no such case", key="case", value=recording.case, remedy=remedy
+        )
+    return structure
+
+
+def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
+    """When the specimen is looked at: as the response, and as often again on the way back."""
+    from pipeline.posing import times_of
+
+    wanted = times_of(asked, scene)
+    times = wanted.asked[wanted.shown]
+    if not unload:
+        return times
+    if not scene.static:
+        remedy = "leave it out: a motion in time comes back by itself"
+        raise UserError("no static load", key="virtual.specimen.unload", remedy=remedy)
+    return np.concatenate([times, 2 * times[-1] - times[-2::-1]])
+
+
+def _described(
+    asked: Problem, altered: Scene, made: PosedStructure, case: int, times: Floats
+) -> xr.Dataset:
+    import xarray as xr
+
+    from pipeline.posing import (
+        case_directions,
+        lattice_of,
+        network_variables,
+        spread,
+        unit_coordinates,
+    )
+
+    scene, vertices = made
+    intact, lattice = lattice_of(asked), scene.lattice
+    motion, force = _simulated(made, times)
+    drive = motion[:, scene.driven, :2].mean(axis=1)
+    variables = {
+        **network_variables(asked, altered),
+        "vertices": (
+            ("unit", "vertex", "xy"),
+            spread(lattice.padded(vertices), lattice, intact.n_units),
+        ),
+        "displacement": (("time", "unit", "dof"), spread(motion, lattice, intact.n_units, 1)),
+        "drive_displacement": (("time", "xy"), drive),
+        "drive_force": (("time", "xy"), force),
+    }
+    coordinates = {
+        **unit_coordinates(intact),
+        "direction": ((), np.rad2deg(case_directions(asked)[case])),
+        "time": (("time",), times),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    return xr.Dataset(variables, coordinates)
+
+
+def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
+    """Displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
+    from sim.core import SimulationError
+    from sim.energy import observe
+    from sim.scene import concrete_parameters, make_plan
+    from sim.solvers import solve_case
+
+    scene, vertices = made
+    values = concrete_parameters(scene, vertices)
+    try:
+        plan = make_plan(scene, vertices, times)
+        motion = solve_case(plan.solver, values, scene.drives[0])[0]
+    except SimulationError as error:
+        remedy = "give another seed, or smaller tolerances"
+        raise UserError(
+            f"the specimen cannot be simulated: {error}", key="virtual.specimen", remedy=remedy
+        ) from error
+    motion = motion.reshape(len(times), -1, 3)
+    reaction = observe(scene.topology, values, motion).reaction
+    return motion, reaction[:, scene.driven, :2].sum(axis=1)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

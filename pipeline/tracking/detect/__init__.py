@@ -1,0 +1,5 @@
+"""Finds units in a picture from nothing: blobs, markings, orientation."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,87 @@
+"""Fits the templates of all units to a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.runtime import Floats, Mask, Picture, Singles
+from pipeline.tracking.fit import patch_correlation
+from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, room
+from pipeline.tracking.fit.patch_correlation import Fits, FitStart, Templates
+from pipeline.tracking.fit.template import plane_of
+from pipeline.tracking.geometry import Camera
+
+FULL_STEPS = 8
+
+
+class Fitter:
+    """A camera and what it should see.
+
+    Attributes:
+        camera: the camera.
+        templates: the units' looks.
+        full: (units,) information of each unit seen whole; zero until a first frame is fitted.
+    """
+
+    def __init__(self, camera: Camera, templates: Templates, plane: Singles | None = None) -> None:
+        self.camera, self.templates = camera, templates
+        self.plane = plane_of(camera) if plane is None else plane
+        self.full = np.zeros(len(templates.centre))
+
+    def start(self, gain: float) -> tuple[Floats, Floats]:
+        """Pose and photometry to start from: at rest, all with the same gain."""
+        units = len(self.templates.centre)
+        return np.zeros((units, 3)), np.tile([gain, 0.0, 0.0, 0.0], (units, 1))
+
+    def fit(
+        self,
+        image: Picture,
+        pose: Floats,
+        photometry: Floats,
+        chosen: Mask | None = None,
+        tight: Floats | None = None,
+        noise: Floats | None = None,
+    ) -> Fits:
+        """Poses of the chosen units, NaN for the others and for those that cannot be fitted.
+
+        Args:
+            image: the frame.
+            pose: (units, 3) where to start.
+            photometry: (units, 4) gain, offset and slopes to start from.
+            chosen: (units,) which to fit; by default all.
+            tight: (units,) scale of the residuals, where photometry and pose are nearly known and
+                part of the unit may be hidden.
+            noise: (units,) residuals to expect, over the gain, where the pose is nearly known.
+        """
+        units, place = len(pose), self.templates.centre + pose[:, :2]
+        jacobian = self.camera.jacobian(place)
+        scale = np.sqrt(np.abs(_determinant(jacobian)))
+        start = FitStart(
+            np.concatenate([pose, photometry], axis=1),
+            self.camera.project(place),
+            self.templates.reach * scale * 1.03 + 1,
+            scale,
+            self.full,
+            np.zeros(units) if noise is None else noise,
+            np.zeros(units) if tight is None else tight,
+        )
+        wanted = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
+        wanted = wanted if chosen is None else wanted & chosen
+        out = np.full((units, patch_correlation.WIDTH), np.nan)
+        if wanted.any():
+            across = int(2 * start.radius[wanted].max()) // SIZE + 3
+            scene = FramePixels(self._padded(image), self.plane)
+            patch_correlation.fit(
+                scene, self.templates, start, wanted, FULL_STEPS, room(across**2), out
+            )
+        return patch_correlation.unpack(out)
+
+    def _padded(self, image: Picture) -> Singles:
+        """The image on whole blocks."""
+        out = np.zeros(self.plane.shape[:2], np.float32)
+        out[: image.shape[0], : image.shape[1]] = image
+        return out
+
+
+def _determinant(matrices: Floats) -> Floats:
+    return matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]

@@ -1,0 +1,304 @@
+"""Rigid-patch image correlation: Gauss-Newton on the pose of each unit in the specimen's plane.
+
+The raw pixels of a frame are compared with the template of a unit, seen through the camera: no
+frame is interpolated, so its noise is not either. Four photometric unknowns (gain, offset and its
+slopes) go along with the three of the pose; weights of Geman and McClure take care of what does not
+belong to the unit.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.runtime import Floats, Mask, Singles, compiled, inlined
+from pipeline.tracking.fit.normal_equations import (
+    SIZE,
+    UNKNOWNS,
+    FramePixels,
+    Room,
+    TemplateArrays,
+    gather,
+)
+from pipeline.tracking.fit.small_cholesky import invert
+from pipeline.tracking.fit.template_cells import TemplateCells, unfold
+
+POSE = 3
+WIDTH = UNKNOWNS + 23
+_STRIDE = 1.4
+_NEAR = 0.3  # px, of a step that leads to where the unit is
+_LONGEST = 3.0  # px in one step
+_STILL = 0.025  # px, of a step after which there is none
+_FLOOR = 0.04
+"""Smallest scale of the robust weights, in contrasts of the unit; or so many times the noise: """
+_SCALE = 4.0
+_UNKNOWN = 1e6
+
+
+class Templates(NamedTuple):
+    """What the units look like in their own frames, and where they rest.
+
+    Attributes:
+        brightness: (units, rows, columns) at the nodes, y up.
+        weight: (units, rows, columns) of the nodes, zero outside the unit and near the rim.
+        half: the grids reach from -half to half, mm.
+        step: distance of the nodes, mm.
+        centre: (units, 2) place at rest, mm.
+        contrast: (units,) standard deviation of the brightness within the weight.
+        reach: (units,) largest radius of the weight, mm.
+        cells: between the nodes.
+    """
+
+    brightness: Singles
+    weight: Singles
+    half: float
+    step: float
+    centre: Floats
+    contrast: Floats
+    reach: Floats
+    cells: TemplateCells
+
+
+class FitStart(NamedTuple):
+    """Where the fits of a frame start, and what is known before.
+
+    Attributes:
+        state: (units, 7) pose and photometry.
+        middle: (units, 2) pixel at the middle of each unit.
+        radius: (units,) of the patch, px.
+        scale: (units,) px/mm.
+        full: (units,) information of a unit that is seen whole, zero if unknown.
+        noise: (units,) residuals to expect, over the gain; zero if unknown.
+        tight: (units,) scale of the robust weights in the end, whatever the residuals; zero to fit
+            the photometry first and to let the residuals decide.
+    """
+
+    state: Floats
+    middle: Floats
+    radius: Floats
+    scale: Floats
+    full: Floats
+    noise: Floats
+    tight: Floats
+
+
+class Aim(NamedTuple):
+    """One unit of a `FitStart`, with its contrast and the largest number of full steps."""
+
+    contrast: float
+    scale: float
+    radius: float
+    noise: float
+    tight: float
+    most: int
+
+
+class Fits(NamedTuple):
+    """Poses found in a frame.
+
+    Attributes:
+        pose: (units, 3) displacement in mm and rotation in rad.
+        photometry: (units, 4) gain, offset and its slopes over `half`.
+        curvature: (units, 3, 3) covariance of the pose for residuals of standard deviation one.
+        scatter: (units, 3, 3) covariance from the scores of blocks of pixels, which may be
+            correlated within.
+        noise: (units,) weighted standard deviation of the residuals.
+        share: (units,) part of the information that robust weights and the image's edge left.
+        blocks: (units,) number of blocks.
+        last: (units,) length of the last step, px.
+        information: (units,) sum of the squared gradients of the template, weighted.
+    """
+
+    pose: Floats
+    photometry: Floats
+    curvature: Floats
+    scatter: Floats
+    noise: Floats
+    share: Floats
+    blocks: Floats
+    last: Floats
+    information: Floats
+
+
+@inlined
+def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> None:
+    """Rows and columns around a pixel, within the image, on the grid of blocks."""
+    box[0] = max(0, math.floor((middle[1] - radius) / SIZE) * SIZE)
+    box[1] = min(shape[0], math.ceil(middle[1] + radius) + 1)
+    box[2] = max(0, math.floor((middle[0] - radius) / SIZE) * SIZE)
+    box[3] = min(shape[1], math.ceil(middle[0] + radius) + 1)
+
+
+@inlined
+def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
+    """The Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
+    step[:] = 0.0
+    for j in range(first, UNKNOWNS):
+        total = 0.0
+        for block in range(len(scores)):
+            total += scores[block, j]
+        for i in range(first, UNKNOWNS):
+            step[i] += inverse[i, j] * total
+
+
+@inlined
+def _hold_pose(matrix: Floats) -> None:
+    """Takes the pose out of the normal equations."""
+    for i in range(POSE):
+        matrix[i, :] = 0.0
+        matrix[:, i] = 0.0
+        matrix[i, i] = 1.0
+
+
+@inlined
+def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -> float:
+    """The scale of the robust weights: wide until the unit has found its place."""
+    if aim.tight > 0.0:
+        return max(0.5 * scale, aim.tight)
+    least = _FLOOR * aim.contrast * gain
+    if aim.noise > 0.0 and moved < _NEAR:
+        return max(_SCALE * aim.noise * gain, least)
+    return min(scale, max(_SCALE * math.sqrt(room.sums[4] / room.sums[3]), least))
+
+
+@inlined
+def _stride(sums: Floats) -> float:
+    """By how much a step of fixed robust weights is too short, for they change with it."""
+    return min(sums[1] / max(sums[2], 1e-9), _STRIDE)
+
+
+@inlined
+def _descend(
+    scene: FramePixels,
+    look: TemplateArrays,
+    aim: Aim,
+    box: Floats,
+    state: Floats,
+    inverse: Floats,
+    room: Room,
+) -> tuple[float, int]:
+    """Improves the state of one unit.
+
+    Returns:
+        Length of the last step in px, negative if it failed, and number of blocks.
+    """
+    step, factor = np.empty(UNKNOWNS), np.zeros((UNKNOWNS, UNKNOWNS))
+    blind, new = aim.tight == 0.0, aim.tight == 0.0 and aim.noise == 0.0
+    moved, count = -1.0, 0
+    scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
+    for turn in range(0 if new else 1, aim.most + 1):
+        every = 4 if turn == 0 else (2 if turn == 1 and blind else 1)
+        count = gather(scene, look, state, box, every, 1 / (scale * scale), room)
+        if turn == 0:
+            _hold_pose(room.matrix)
+        if not (room.sums[3] > 20 / every and invert(room.matrix, factor, inverse)):
+            return -1.0, count
+        _stepped(inverse, room.scores[:count], POSE if turn == 0 else 0, step)
+        moved = max(math.hypot(step[0], step[1]) * aim.scale, abs(step[2]) * aim.radius)
+        stride = _stride(room.sums) if moved < _NEAR else 1.0
+        state += step * min(stride, _LONGEST / max(moved, 1e-9))
+        before, gain = scale, abs(state[3])
+        scale = aim.contrast * gain if turn == 0 else _next_scale(scale, moved, gain, aim, room)
+        if turn > 0 and every == 1 and moved < _STILL and scale > 0.7 * before:
+            break
+    return moved, count
+
+
+@inlined
+def _summarise(
+    state: Floats, inverse: Floats, room: Room, count: int, full: float, moved: float, out: Floats
+) -> None:
+    """Writes a unit's row as `unpack` reads it."""
+    out[:] = 0.0
+    out[:UNKNOWNS] = state
+    part, sums = np.empty(POSE), room.sums
+    for block in range(count):
+        for i in range(POSE):
+            part[i] = 0.0
+            for j in range(UNKNOWNS):
+                part[i] += inverse[i, j] * room.scores[block, j]
+        for i in range(POSE):
+            for j in range(POSE):
+                out[UNKNOWNS + 9 + 3 * i + j] += part[i] * part[j]
+    for i in range(POSE):
+        for j in range(POSE):
+            out[UNKNOWNS + 3 * i + j] = inverse[i, j]
+    gain = state[3] * state[3]
+    out[UNKNOWNS + 18] = math.sqrt(sums[4] / sums[3])
+    out[UNKNOWNS + 19] = sums[1] / max(full * gain, sums[0])
+    out[UNKNOWNS + 20] = count
+    out[UNKNOWNS + 21] = moved
+    out[UNKNOWNS + 22] = sums[0] / gain
+
+
+@compiled
+def fit(
+    scene: FramePixels,
+    templates: Templates,
+    start: FitStart,
+    chosen: Mask,
+    most: int,
+    room: Room,
+    out: Floats,
+) -> None:
+    """Fits all chosen units; fills out (units, 30) in the order of `unpack`.
+
+    Args:
+        scene: the frame.
+        templates: the units.
+        start: where to start.
+        chosen: (units,) which to fit.
+        most: largest number of full steps.
+        room: for the largest of the units.
+        out: filled; NaN where a unit cannot be fitted.
+    """
+    inverse = np.zeros((UNKNOWNS, UNKNOWNS))
+    box, state = np.empty(4), np.empty(UNKNOWNS)
+    nodes = np.zeros((*templates.weight.shape[1:], 4), np.float32)
+    for unit in range(len(chosen)):
+        out[unit] = np.nan
+        if not chosen[unit]:
+            continue
+        _box(scene.image.shape, start.middle[unit], start.radius[unit], box)
+        if box[1] - box[0] < 4 or box[3] - box[2] < 4:
+            continue
+        cells = templates.cells
+        unfold(templates.brightness[unit], templates.weight[unit], cells.span[unit], nodes)
+        look = TemplateArrays(
+            nodes,
+            cells.kind[unit],
+            templates.half,
+            templates.step,
+            templates.centre[unit, 0],
+            templates.centre[unit, 1],
+            templates.reach[unit] + 0.71 * SIZE / start.scale[unit],
+        )
+        state[:] = start.state[unit]
+        aim = Aim(
+            templates.contrast[unit],
+            start.scale[unit],
+            start.radius[unit],
+            start.noise[unit],
+            start.tight[unit],
+            most,
+        )
+        moved, count = _descend(scene, look, aim, box, state, inverse, room)
+        if moved >= 0.0:
+            _summarise(state, inverse, room, count, start.full[unit], moved, out[unit])
+
+
+def unpack(out: Floats) -> Fits:
+    """The columns of `fit`'s output by name."""
+    return Fits(
+        out[:, :POSE],
+        out[:, POSE:UNKNOWNS],
+        out[:, UNKNOWNS : UNKNOWNS + 9].reshape(-1, 3, 3),
+        out[:, UNKNOWNS + 9 : UNKNOWNS + 18].reshape(-1, 3, 3),
+        out[:, UNKNOWNS + 18],
+        out[:, UNKNOWNS + 19],
+        out[:, UNKNOWNS + 20],
+        out[:, UNKNOWNS + 21],
+        out[:, UNKNOWNS + 22],
+    )

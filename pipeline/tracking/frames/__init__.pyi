@@ -1,0 +1,13 @@
+from . import csv_columns as csv_columns
+from . import import_video as import_video
+from . import load_cell as load_cell
+from . import recording as recording
+from .recording import Recording as Recording
+from .recording import load as load
+from .video import BrokenOffError as BrokenOffError
+from .video import Frame as Frame
+from .video import frames as frames
+from .video import length as length
+from .video import uneven as uneven
+from .video_origin import WORD as WORD
+from .video_origin import rendered as rendered

@@ -1,0 +1,155 @@
+"""YAML files that describe test videos, to a recording and a design dataset of this project."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pipeline.problem.reading import told, yaml_file
+from pipeline.runtime import Floats, Ints, UserError
+
+_WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
+
+
+class _Described(BaseModel):
+    """What is taken from a description; the rest of it is of no concern here."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
+
+    name: str
+    kind: str = ""
+    grid: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=2, max_length=2)]
+    spacing_mm: Annotated[float, Field(gt=0.0)]
+    ligament_gap_mm: Annotated[float, Field(gt=0.0)]
+    bias_angle_deg: Annotated[float, Field(gt=-45.0, lt=45.0)]
+    approx_px_per_mm: Annotated[float, Field(gt=0.0)] | None = None
+    fps: Annotated[float, Field(gt=0.0)] | None = None
+
+
+VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
+
+
+def description(path: Path) -> dict[str, Any]:
+    """The description of a video.
+
+    Raises:
+        UserError: not such a description.
+    """
+    document = yaml_file.read(path)
+    data = document.data
+    missing = sorted(_WANTED - data.keys())
+    if missing:
+        raise UserError(
+            f"not a description of a test video: it lacks {', '.join(missing)}",
+            file=path,
+            remedy="give a YAML with the grid of the specimen, or write a recording by hand",
+        )
+    try:
+        _Described.model_validate(data)
+    except ValidationError as error:
+        raise told(error, document, data, None) from error
+    return data
+
+
+def video_of(path: Path) -> Path:
+    """The video beside its description, or the folder of pictures of that name.
+
+    Raises:
+        UserError: there is none.
+    """
+    for suffix in (*VIDEOS, ""):
+        if (video := path.with_suffix(suffix)).exists():
+            return video
+    raise UserError("no video beside it", file=path, remedy="name it with --video")
+
+
+def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
+    """The recording's YAML."""
+    lines = [
+        f"title: {described.get('kind', described['name'])!r}",
+        f"video: {str(video)!r}",
+        f"design: {design}",
+        "synthetic: true",
+    ]
+    if scale := described.get("approx_px_per_mm"):
+        lines.append(f"pixel_size: {1 / scale:.4g} mm")
+    if video.is_dir() and (rate := described.get("fps")):
+        lines.append(f"frame_rate: {rate:g} Hz")
+    return "\n".join(lines) + "\n"
+
+
+def design(described: dict[str, Any]) -> xr.Dataset:
+    """The specimen as a design without history.
+
+    Units are turned by +bias where i + j is even: the mirror image of the lattices of this
+    project. Ids count i + columns j and the origin is unit (0, 0), as everywhere here.
+    """
+    columns, rows = described["grid"]
+    spacing, gap = float(described["spacing_mm"]), float(described["ligament_gap_mm"])
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
+    slope = np.where((i + j) % 2 == 0, 1.0, -1.0) * np.tan(np.deg2rad(described["bias_angle_deg"]))
+    right = (spacing - gap) / 2 * np.stack([np.ones_like(slope), slope], axis=1)
+    top = np.stack([-right[:, 1], right[:, 0]], axis=1)
+    centre = np.stack([i, j], axis=1) * spacing
+    vertices = centre[:, None] + np.stack([right, top, -right, -top], axis=1)
+    joint, corner = _ligaments(columns, rows)
+    units = len(centre)
+    zeros = np.zeros(units, np.int8)
+    variables = {
+        "region": (("unit",), zeros),
+        "roi": (("unit",), zeros),
+        "support": (("unit",), zeros),
+        "ligament_unit": (("ligament", "end"), joint),
+        "ligament_vertex": (("ligament", "end"), corner),
+        "vertices": (("unit", "vertex", "xy"), vertices),
+        "vertices_initial": (("unit", "vertex", "xy"), vertices),
+        "centroid": (("unit", "xy"), centre),
+        "smallest_gap": ((), _smallest_gap(vertices, joint)),
+        "overlaps": ((), 0),
+        **_no_history(),
+    }
+    coordinates = {
+        "unit": (("unit",), np.arange(units)),
+        "i": (("unit",), i),
+        "j": (("unit",), j),
+        "xy": (("xy",), ["x", "y"]),
+        "direction": (("case",), [0.0]),
+        "method": (("method",), ["none"]),
+        "evaluation": (("evaluation",), [0]),
+        "constraint": (("constraint",), ["gap"]),
+        "constraint_units": (("constraint",), ["mm"]),
+    }
+    return xr.Dataset(variables, coordinates).assign_attrs(shipped_method="none")
+
+
+def _no_history() -> dict[str, tuple[tuple[str, ...], Any]]:
+    nothing = np.full((1, 1), np.nan)
+    return {
+        "constraint_margin": (("constraint",), [np.nan]),
+        "loss": (("method", "evaluation"), nothing),
+        "loss_case": (("method", "evaluation", "case"), nothing[..., None]),
+        "violation": (("method", "evaluation"), nothing),
+        "accepted": (("method", "evaluation"), np.ones((1, 1), np.int8)),
+        "design_vector": (("method", "evaluation", "variable"), nothing[..., None]),
+        "best_evaluation": (("method",), [0]),
+        "best_loss": (("method",), [0.0]),
+        "kkt_residual": (("method",), [np.nan]),
+    }
+
+
+def _ligaments(columns: int, rows: int) -> tuple[Ints, Ints]:
+    """Units and vertices (right, top, left, bottom) that the ligaments join."""
+    unit = np.arange(columns * rows).reshape(rows, columns)
+    along = np.stack([unit[:, :-1].ravel(), unit[:, 1:].ravel()], axis=1)
+    up = np.stack([unit[:-1].ravel(), unit[1:].ravel()], axis=1)
+    corner = np.concatenate([np.tile([0, 2], (len(along), 1)), np.tile([1, 3], (len(up), 1))])
+    return np.concatenate([along, up]), corner
+
+
+def _smallest_gap(vertices: Floats, joint: Ints) -> float:
+    first, last = vertices[joint[:, 0]], vertices[joint[:, 1]]
+    return float(np.linalg.norm(first[:, :, None] - last[:, None], axis=-1).min())

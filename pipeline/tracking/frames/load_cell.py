@@ -1,0 +1,80 @@
+"""Forces that were logged beside a video, at the times of its frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.runtime import Floats, UserError
+from pipeline.tracking.frames import csv_columns
+from pipeline.tracking.frames.recording import LoadCellLog
+
+
+class Log(NamedTuple):
+    """A load cell's log on the clock of the video's file: times (lines,) in s, forces in N."""
+
+    clock: Floats
+    force: Floats
+
+
+def read(path: Path, cell: LoadCellLog) -> Log:
+    """The log of a load cell.
+
+    Args:
+        path: the file.
+        cell: its columns, and the time of the video's first frame on its clock.
+
+    Raises:
+        UserError: it cannot be read, or runs backwards.
+    """
+    clock, force = csv_columns.read(path, (cell.time, cell.force)).T
+    if (np.diff(clock) <= 0).any():
+        remedy = "sort it by time, each time once"
+        raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
+    return Log(clock - cell.offset, force)
+
+
+def forces(log: Log, time: Floats) -> Floats:
+    """The force (frames,) in N at the frames, linear between the log's lines, NaN beyond them.
+
+    Where the log is finer than the video, it is averaged over the frame's interval first, so that
+    no noise of the load cell is folded into the frames.
+
+    Args:
+        log: of the load cell.
+        time: (frames,) since the file's first frame, s.
+    """
+    inside = (time >= log.clock[0]) & (time <= log.clock[-1])
+    return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
+
+
+def check(log: Log, time: Floats, path: Path, cell: LoadCellLog) -> None:
+    """Refuses a log that holds nothing of the video.
+
+    Raises:
+        UserError: telling both spans of time.
+    """
+    if log.clock[-1] < time[0] or log.clock[0] > time[-1]:
+        raise UserError(
+            f"the log (from {log.clock[0]:.6g} s to {log.clock[-1]:.6g} s of the video's time) and"
+            f" the frames (from {time[0]:.6g} s to {time[-1]:.6g} s) do not overlap: the track is"
+            " kept, without forces",
+            file=path,
+            key="load_cell.offset",
+            value=cell.offset,
+            remedy="give the time of the video's first frame on the log's clock",
+        )
+
+
+def _smooth(clock: Floats, force: Floats, time: Floats) -> Floats:
+    """Means over an interval of a frame about each, or plain values where the log is coarser."""
+    interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if interval <= 2 * float(np.median(np.diff(clock))):
+        return np.interp(time, clock, force)
+    area = np.concatenate([[0.0], np.cumsum(np.diff(clock) * (force[1:] + force[:-1]) / 2)])
+    first = np.clip(time - interval / 2, clock[0], clock[-1])
+    last = np.clip(time + interval / 2, clock[0], clock[-1])
+    gained = np.interp(last, clock, area) - np.interp(first, clock, area)
+    return gained / (last - first)

@@ -1,0 +1,132 @@
+"""The YAML file of a recording: which video shows which design, and how to read it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import yaml
+from pydantic import Field, model_validator
+
+from pipeline.problem.fields import (
+    Angle,
+    Delay,
+    Duration,
+    Frequency,
+    Gap,
+    Length,
+    Section,
+    exactly_one,
+    fault,
+)
+from pipeline.problem.reading import section
+from pipeline.problem.sections import VirtualRecording
+
+
+class Window(Section):
+    """The part of the video that is tracked; its first frame shows the specimen at rest.
+
+    Attributes:
+        start: since the file's first frame.
+        end: likewise; by default that of the file.
+    """
+
+    start: Delay = 0.0
+    end: Duration | None = None
+
+    @model_validator(mode="after")
+    def _forwards(self) -> Self:
+        if self.end is not None and self.end <= self.start:
+            what = f"it ends at {self.end:g} s, where it starts at {self.start:g} s"
+            raise fault(what, "let it end after it starts")
+        return self
+
+
+class LoadCellLog(Section):
+    """Forces that were logged beside the video, with a clock of their own.
+
+    Attributes:
+        file: a CSV with a heading, as seen from the recording's own file.
+        time: name of the column of times, s.
+        force: name of the column of forces, N.
+        offset: time of the video's first frame on the log's clock, s.
+    """
+
+    file: str = Field(min_length=1)
+    time: str = "time"
+    force: str = "force"
+    offset: float = 0.0
+
+
+class Recording(Section):
+    """What was filmed.
+
+    Attributes:
+        title: one line about it.
+        video: the file, as seen from the recording's own, or a folder of pictures.
+        virtual: how it is rendered, in place of a video.
+        design: the design dataset of the specimen, likewise; a study's own need not be named.
+        structure: which of the design's structures it is.
+        case: number of the study's load case that it was under.
+        presets: of the study whose report shows it too: those of its lattice.
+        specimen: what the units show; `auto` finds out.
+        pixel_size: roughly, in the specimen's plane; without it, the units are looked for in
+            several sizes.
+        thickness: of the units, if their side walls show: bare ones a few millimetres thick do.
+        camera_distance: from the specimen's middle; without it, thick units tell it roughly.
+        turned: how far the specimen is turned in the picture, counter-clockwise, where its lattice
+            does not tell.
+        mirrored: whether it is seen from behind, likewise.
+        frame_rate: of a folder of pictures, which have no times of their own.
+        window: of time, since the file's first frame.
+        load_axis: what courses are drawn over; a track holds both.
+        load_cell: forces logged beside it.
+        synthetic: whether the video was rendered, not filmed.
+    """
+
+    title: str = ""
+    video: Annotated[str, Field(min_length=1)] | None = None
+    virtual: VirtualRecording | None = None
+    design: Annotated[str, Field(min_length=1)] | None = None
+    structure: Literal["intact", "altered", "cloaked"] = "cloaked"
+    case: Annotated[int, Field(ge=0, strict=True)] = 0
+    presets: tuple[str, ...] = ()
+    specimen: Literal["auto", "dots", "speckle", "bare"] = "auto"
+    pixel_size: Length | None = None
+    thickness: Gap = 0.0
+    camera_distance: Length | None = None
+    turned: Angle | None = None
+    mirrored: bool | None = None
+    frame_rate: Frequency | None = None
+    window: Window = Window()
+    load_axis: Literal["time", "driven displacement"] = "time"
+    load_cell: LoadCellLog | None = None
+    synthetic: bool = False
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        exactly_one(self, "video", "virtual")
+        return self
+
+
+def load(path: Path) -> Recording:
+    """The recording in a YAML file.
+
+    Raises:
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    return section(path, Recording)
+
+
+def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
+    """The YAML of a recording, after lines of comment.
+
+    Args:
+        values: keys and their values, as they stand in the file; those that are None are left out.
+        comments: without their `#`.
+    """
+    given = {key: value for key, value in values.items() if value is not None}
+    lines = [f"# {comment}" for comment in comments]
+    return "\n".join(
+        [*lines, yaml.safe_dump(given, sort_keys=False, allow_unicode=True, width=100)]
+    )

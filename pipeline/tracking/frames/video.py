@@ -1,0 +1,209 @@
+"""Frames of a video, or of a folder of pictures, one after the other, with their times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import av
+import numpy as np
+
+from pipeline.runtime import Floats, Picture, UserError
+from pipeline.tracking.frames.image_folder import brightness, images, pictures
+
+_READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
+"""Formats whose first plane is the brightness in 8 bit, as it is."""
+
+_ROUNDED = 0.5
+"""Part of an interval by which steady frames may differ: some containers count milliseconds."""
+
+_ALONE = {
+    "protocol_whitelist": "file",
+    "format_whitelist": "mov,mp4,matroska,webm,avi,asf,mpeg,mpegts,mxf,ogg,flv,nut,gif,h264,hevc",
+}
+"""Kinds of files that hold what they show: playlists name others, and may wait for more."""
+
+_LARGEST = 1 << 27
+"""Pixels of a frame."""
+
+_ALL = 0.95
+"""A video with less of the frames than this that its file promises breaks off."""
+
+
+class BrokenOffError(UserError):
+    """A video that ends too early: the frames before are whole, and their track is kept."""
+
+
+def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
+    """A file that holds no more than so many frames, the last one at a time in s."""
+    until = math.floor(1000 * time) / 1000
+    return BrokenOffError(
+        f"the video breaks off after {count} frames, which are tracked: {why}",
+        file=path,
+        key="video",
+        remedy=f"copy the file again, or end there: `window: {{end: {until:g} s}}`",
+    )
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture of the video.
+
+    Attributes:
+        index: from zero.
+        time: since the file's first frame, s, by the file's time stamps.
+        image: (rows, columns) brightness, from 0 to 255.
+    """
+
+    index: int
+    time: float
+    image: Picture
+
+
+def frames(
+    path: Path, start: float = 0.0, end: float = float("inf"), rate: float | None = None
+) -> Iterator[Frame]:
+    """Decodes the video once, in sequence; nothing but the present frame is held.
+
+    Args:
+        path: the video, or a folder of pictures.
+        start: of the time window, s; the first frame of the file is at zero.
+        end: of the time window, s.
+        rate: frames per second of a folder of pictures.
+
+    Raises:
+        UserError: no such file, or none that can be read; a folder without a rate.
+        BrokenOffError: after the frames that there are, if it breaks off or changes its size.
+    """
+    if not path.is_dir():
+        yield from _even(path, _filmed(path, start, end))
+        return
+    if rate is None:
+        remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
+        raise UserError("pictures have no times", file=path, key="frame_rate", remedy=remedy)
+    shown = _pictured(path, rate)
+    yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
+
+
+def length(path: Path) -> int:
+    """Number of frames as the file has it, at least one; the window and faults may make it less."""
+    if path.is_dir():
+        return len(pictures(path))
+    try:
+        with _opened(path) as container:
+            stream = container.streams.video[0]
+            return max(1, round(_promised(container, stream, float(stream.average_rate or 0))))
+    except (av.FFmpegError, FileNotFoundError, IndexError):
+        return 1
+
+
+def uneven(time: Floats) -> bool:
+    """Whether frames (frames,) s come at intervals that differ by more than stamps are rounded."""
+    interval = np.diff(time)
+    return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
+
+
+def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
+    """The frames as long as they are of one size."""
+    size, time = None, 0.0
+    for frame in shown:
+        size = frame.image.shape if size is None else size
+        if frame.image.shape != size:
+            raise broken_off(path, "it changes its size", frame.index, time)
+        time = frame.time
+        yield frame
+
+
+def _pictured(path: Path, rate: float) -> Iterator[Frame]:
+    count = 0
+    try:
+        for count, image in enumerate(images(path), start=1):
+            yield Frame(count - 1, (count - 1) / rate, image)
+    except UserError as error:
+        if count == 0:
+            raise
+        raise broken_off(path, f"{error.file} cannot be read", count, (count - 1) / rate) from error
+
+
+def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
+    try:
+        with _opened(path) as container:
+            yield from _decoded(container, path, start, end)
+    except FileNotFoundError as error:
+        raise UserError("no such video", file=path, key="video", remedy="check the path") from error
+    except av.FFmpegError as error:
+        remedy = "give a video that ffprobe can read; copy the file again if it is broken"
+        raise UserError(
+            f"not a readable video: {error.strerror}", file=path, key="video", remedy=remedy
+        ) from error
+
+
+def _opened(path: Path) -> av.container.InputContainer:
+    """The file itself: neither an address that its name may be, nor others that it may name."""
+    if path.exists() and not path.is_file():
+        raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
+    return av.open(f"file:{path}", options=_ALONE)
+
+
+def _decoded(
+    container: av.container.InputContainer, path: Path, start: float, end: float
+) -> Iterator[Frame]:
+    if not container.streams.video:
+        raise UserError("the file holds no video", file=path, remedy="give a video file")
+    stream = container.streams.video[0]
+    if stream.width * stream.height > _LARGEST:
+        size = f"{stream.width} x {stream.height}"
+        remedy = "give a smaller one, or one that is not broken"
+        raise UserError(f"frames of {size} pixels are too large", file=path, remedy=remedy)
+    first: float | None = None
+    index, time = 0, 0.0
+    decoded = iter(container.decode(stream))
+    while time < end:
+        try:
+            frame = next(decoded, None)
+        except av.FFmpegError as error:
+            if index == 0:
+                raise
+            raise broken_off(path, str(error.strerror), index, time) from error
+        if frame is None:
+            if index < _ALL * _promised(container, stream, index / max(time, 1e-9)):
+                raise broken_off(path, "the file should go on", index, time)
+            return
+        stamp = _nominal(stream, index) if frame.pts is None else float(frame.time)
+        first = stamp if first is None else first
+        time = stamp - first
+        if time > end:
+            return
+        if time >= start:
+            yield Frame(index, time, _upright(frame))
+        index += 1
+
+
+def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:
+    """How many frames there are as the file has it; zero where it does not tell."""
+    if stream.frames or len(container.streams) > 1 or not container.duration:
+        return float(stream.frames)
+    return rate * container.duration / av.time_base - 1
+
+
+def _nominal(stream: av.VideoStream, index: int) -> float:
+    return index / float(stream.average_rate or 1)
+
+
+def _upright(frame: av.VideoFrame) -> Picture:
+    """The brightness as players show it: a phone tells how it was held."""
+    image, quarters = _brightness(frame), round(frame.rotation / 90)
+    return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
+
+
+def _brightness(frame: av.VideoFrame) -> Picture:
+    if max(part.bits for part in frame.format.components) > 8:
+        return brightness(frame.to_ndarray(format="gray16le"))
+    if frame.format.name not in _READY:
+        return brightness(frame.to_ndarray(format="gray"))
+    plane = frame.planes[0]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+    return np.ascontiguousarray(rows[:, : plane.width])

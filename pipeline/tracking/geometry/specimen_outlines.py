@@ -1,0 +1,105 @@
+"""What the tracker knows of a specimen: its units' outlines at rest and who is joined to whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from pipeline.datasets.tables import TABLES
+from pipeline.runtime import Floats, Ints, Mask
+
+
+@dataclass(frozen=True)
+class SpecimenOutlines:
+    """The units that a video shows, in the specimen's frame.
+
+    Attributes:
+        ids: (units,) ids in the design; absent units are left out.
+        centre: (units, 2) centroids at rest, mm.
+        outline: (units, vertices, 2) vertices at rest relative to the centroid, counter-clockwise,
+            NaN padded, mm.
+        joint: (ligaments, 2) pairs of joined units, as places in `ids`.
+        joined: (units, vertices) whether a ligament ends at the vertex.
+    """
+
+    ids: Ints
+    centre: Floats
+    outline: Floats
+    joint: Ints
+    joined: Mask
+
+    @property
+    def count(self) -> int:
+        """Number of units."""
+        return len(self.ids)
+
+    @cached_property
+    def area(self) -> Floats:
+        """(units,) areas of the outlines, mm^2."""
+        return np.array([_area(self.polygon(unit)) for unit in range(self.count)])
+
+    @cached_property
+    def radius(self) -> Floats:
+        """(units,) distance of the farthest vertex from the centroid, mm."""
+        return np.nanmax(np.linalg.norm(self.outline, axis=2), axis=1)
+
+    @cached_property
+    def pitch(self) -> float:
+        """Median distance of joined units, mm."""
+        ends = self.centre[self.joint]
+        return float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+
+    @cached_property
+    def neighbours(self) -> list[Ints]:
+        """Units joined to each unit."""
+        pairs = np.concatenate([self.joint, self.joint[:, ::-1]])
+        return [pairs[pairs[:, 0] == unit, 1] for unit in range(self.count)]
+
+    def polygon(self, unit: int) -> Floats:
+        """Vertices of a unit relative to its centroid, without padding, mm."""
+        outline = self.outline[unit]
+        return outline[~np.isnan(outline[:, 0])]
+
+
+def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
+    """The design with the vertices of one of its structures: intact, altered or cloaked."""
+    if structure == "cloaked":
+        return design
+    vertices = design["vertices_initial"]
+    if structure == "altered":
+        void = TABLES["design"]["region"].flags["void"]
+        vertices = vertices.where(design["region"] != void)
+    return design.assign(vertices=vertices)
+
+
+def of_design(design: xr.Dataset) -> SpecimenOutlines:
+    """The specimen of a design dataset; units without vertices are absent."""
+    vertices = design["vertices"].transpose("unit", "vertex", "xy").values
+    present = ~np.isnan(vertices[:, 0, 0])
+    place = np.cumsum(present) - 1
+    units = design["ligament_unit"].values
+    kept = present[units].all(axis=1)
+    joined = np.zeros(vertices.shape[:2], dtype=bool)
+    joined[units[kept].ravel(), design["ligament_vertex"].values[kept].ravel()] = True
+    centre = np.stack([_centroid(shape[~np.isnan(shape[:, 0])]) for shape in vertices[present]])
+    return SpecimenOutlines(
+        design["unit"].values[present],
+        centre,
+        vertices[present] - centre[:, None],
+        place[units[kept]],
+        joined[present],
+    )
+
+
+def _area(polygon: Floats) -> float:
+    following = np.roll(polygon, -1, axis=0)
+    return float(np.sum(polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]) / 2)
+
+
+def _centroid(polygon: Floats) -> Floats:
+    following = np.roll(polygon, -1, axis=0)
+    cross = polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]
+    return ((polygon + following) * cross[:, None]).sum(axis=0) / (3 * cross.sum())

@@ -1,0 +1,5 @@
+"""Follows the specimen from frame to frame, with the uncertainty of its motion."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,129 @@
+"""What units of a specimen do together: a few shapes, whose amplitudes change in time.
+
+Neighbours share most of them. Those of a structure with rough motions they do not share, but then
+these stand far above what noise alone makes up.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.runtime import Floats, Ints, Mask
+
+_MOST = 30
+_SMOOTH = 0.75
+"""Correlation of neighbours in a singular vector that is a shape of motion."""
+_ABOVE = 3.0
+"""Or how far its singular value is above white noise: a codec's noise drifts, and so stands out."""
+_EMERGING = 2.858
+"""Singular value, over the median, of a shape that is told from white noise (Gavish and Donoho,
+IEEE Trans. Inf. Theory 60 (2014) 5040)."""
+_FILLINGS = 12
+_DIFFERENCES = tuple(
+    np.array(row, float) for row in ([1, -2, 1], [1, -4, 6, -4, 1], [1, -6, 15, -20, 15, -6, 1])
+)
+_LITTLE_MORE = 1.3
+_JOLT = 3.0
+
+
+class Shapes(NamedTuple):
+    """Motions taken apart.
+
+    Attributes:
+        amplitude: (frames, n).
+        shape: (n, units).
+        rest: (frames, units) what is left.
+    """
+
+    amplitude: Floats
+    shape: Floats
+    rest: Floats
+
+
+def apart(motion: Floats, near: Ints, noise: float) -> Shapes:
+    """The shapes of one degree of freedom.
+
+    What is missing is filled in time first, then by the shapes themselves, until it stays.
+
+    Args:
+        motion: (frames, units), NaN where missing.
+        near: (units, k) the nearest ones of each.
+        noise: standard deviation that the motions have at least.
+    """
+    known = np.isfinite(motion)
+    full = _filled(motion)
+    for _ in range(1 if known.all() else _FILLINGS):
+        left, values, right = np.linalg.svd(full, full_matrices=False)
+        floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
+        count = _leading(values / floor, right[: min(_MOST, len(values) // 2)], near)
+        amplitude, shape = left[:, :count] * values[:count], right[:count]
+        low = amplitude @ shape
+        full = np.where(known, motion, low)
+    return Shapes(amplitude, shape, full - low)
+
+
+def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
+    """How many of the first singular vectors are shapes of motion."""
+    for count, (above, vector) in enumerate(zip(height, vectors, strict=False)):
+        if above < _ABOVE and abs(_likeness(vector, near)) < _SMOOTH:
+            return count
+    return len(vectors)
+
+
+def _filled(motion: Floats) -> Floats:
+    """Missing values by those before and after, in time."""
+    out = motion.copy()
+    frames = np.arange(len(motion))
+    for unit in np.nonzero(~np.isfinite(motion).all(axis=0))[0]:
+        known = np.isfinite(motion[:, unit])
+        out[:, unit] = np.interp(frames, frames[known], motion[known, unit]) if known.any() else 0.0
+    return out
+
+
+def _likeness(shape: Floats, near: Ints) -> float:
+    """Correlation of a field over the units with the mean of the nearest ones."""
+    around = shape[near].mean(axis=1)
+    scale = np.sqrt((shape @ shape) * (around @ around))
+    return float(shape @ around / scale) if scale > 0 else 0.0
+
+
+def leverage(columns: Floats) -> Floats:
+    """Share (n,) of each row's freedom that a fit of the columns takes."""
+    return np.sum(np.linalg.qr(columns)[0] ** 2, axis=1)
+
+
+def steadiness(amplitude: Floats) -> float:
+    """Share of what stays the same in all frames that the amplitudes (frames, n) can take up."""
+    basis = np.linalg.qr(amplitude)[0]
+    return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
+
+
+def rough(amplitude: Floats, steady: Mask) -> Floats:
+    """What amplitudes (frames, n) are off polynomials through those beside, in one frame's noise.
+
+    The order is the lowest that leaves little more than the next ones: more is motion. A jolt is
+    motion too, so values are held to a few times the usual; frames at the ends are as the next.
+    """
+    found = [_differences(amplitude, steady, weights) for weights in _DIFFERENCES]
+    usual = np.array([np.nanmedian(np.abs(one), axis=0) / 0.6745 for one in found])
+    usual = np.nan_to_num(usual)
+    out = np.empty_like(amplitude)
+    for column in range(amplitude.shape[1]):
+        order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
+        values, most = found[order][:, column], _JOLT * usual[order, column]
+        known = np.nonzero(np.isfinite(values))[0]
+        if len(known):
+            values = np.interp(np.arange(len(values)), known, values[known])
+        out[:, column] = np.clip(np.nan_to_num(values), -most, most)
+    return out
+
+
+def _differences(amplitude: Floats, steady: Mask, weights: Floats) -> Floats:
+    out = np.full_like(amplitude, np.nan)
+    reach = len(weights) // 2
+    for frame in range(reach, len(amplitude) - reach):
+        if steady[frame - reach + 1 : frame + reach + 1].all():
+            out[frame] = weights @ amplitude[frame - reach : frame + reach + 1]
+    return out / np.linalg.norm(weights)

@@ -1,0 +1,100 @@
+"""Where units are likely to be: from their own past, and from how their neighbours moved."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.runtime import Floats, Mask
+from pipeline.tracking.geometry import rigid_motion
+
+_NEAREST = 6
+
+
+class Neighbourhood:
+    """Predicts units from those about them that were found.
+
+    Args:
+        centre: (units, 2) places at rest, mm.
+    """
+
+    def __init__(self, centre: Floats) -> None:
+        self._centre = centre
+
+    def carried(self, known: Floats, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Poses of the wanted units if they moved rigidly with the nearest good ones.
+
+        Args:
+            known: (units, 3) poses that all had before.
+            found: (units, 3) poses of the good ones now.
+            good: (units,) which those are.
+            wanted: (units,) whose poses to predict.
+
+        Returns:
+            (units, 3), NaN where nothing is known.
+        """
+        out = np.full_like(known, np.nan)
+        base = good & np.isfinite(known[:, 0])
+        if base.sum() < 3:
+            return out
+        places = np.nonzero(base)[0]
+        old, new = (self._centre + pose[:, :2] for pose in (known, found))
+        tree = cKDTree(old[places])
+        for unit in np.nonzero(wanted & np.isfinite(known[:, 0]))[0]:
+            near = places[tree.query(old[unit], k=min(_NEAREST, len(places)))[1]]
+            turn, shift = rigid_motion(old[near], new[near])
+            cos, sin = np.cos(turn), np.sin(turn)
+            moved = np.array([[cos, -sin], [sin, cos]]) @ old[unit] + shift
+            out[unit] = (*(moved - self._centre[unit]), known[unit, 2] + turn)
+        return out
+
+    def stretched(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Displacements (units, 2) of the wanted units if they moved affinely with the good ones.
+
+        Other than `carried` it needs no past, and so does not drift while a unit is hidden.
+        """
+        out = np.full((len(found), 2), np.nan)
+        places = np.nonzero(good)[0]
+        if len(places) < _NEAREST:
+            return out
+        tree = cKDTree(self._centre[places])
+        for unit in np.nonzero(wanted)[0]:
+            near = places[tree.query(self._centre[unit], k=min(2 * _NEAREST, len(places)))[1]]
+            rows = np.column_stack([self._centre[near] - self._centre[unit], np.ones(len(near))])
+            out[unit] = np.linalg.lstsq(rows, found[near, :2], rcond=None)[0][2]
+        return out
+
+    def turned(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Size (units,) of the rotation of the good units about each wanted one, median, rad."""
+        out = np.full(len(found), np.nan)
+        places = np.nonzero(good)[0]
+        if len(places) < _NEAREST:
+            return out
+        tree = cKDTree(self._centre[places])
+        for unit in np.nonzero(wanted)[0]:
+            near = places[tree.query(self._centre[unit], k=_NEAREST)[1]]
+            out[unit] = np.median(np.abs(found[near, 2]))
+        return out
+
+    def strayed(self, found: Floats, good: Mask, most: float) -> Mask:
+        """Which good units are farther than ``most`` (mm) from where their neighbours carry them.
+
+        Only the nearest ones vote, and an affine map of them, so that strain is no stray.
+        """
+        out = np.zeros(len(found), dtype=bool)
+        places = np.nonzero(good)[0]
+        if len(places) < 9:
+            return out
+        now = self._centre + found[:, :2]
+        tree = cKDTree(self._centre[places])
+        near = places[tree.query(self._centre[places], k=9)[1][:, 1:]]
+        rows = np.concatenate([self._centre[near], np.ones((*near.shape, 1))], axis=2)
+        offset = rows - np.append(self._centre[places], np.zeros((len(places), 1)), axis=1)[:, None]
+        normal = np.einsum("uki,ukj->uij", offset, offset) + 1e-6 * np.eye(3)
+        right = np.einsum("uki,ukj->uij", offset, now[near])
+        expected = np.linalg.solve(normal, right)[:, 2]
+        middle = np.median(
+            now[near] - np.einsum("uki,uij->ukj", offset, np.linalg.solve(normal, right)), axis=1
+        )
+        out[places] = np.linalg.norm(now[places] - expected - middle, axis=1) > most
+        return out

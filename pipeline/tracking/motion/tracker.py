@@ -1,0 +1,238 @@
+"""The units of a specimen from frame to frame: predicted, fitted, judged, and found again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.runtime import Floats, Ints, Mask, Picture
+from pipeline.tracking.detect import Recovery
+from pipeline.tracking.fit import Fits, Fitter, Walls
+from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.motion.prediction import Neighbourhood
+
+GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
+"""Quality of a unit in a frame, and the reason why it is missing."""
+
+_SETTLED = 0.3
+"""Last Gauss-Newton step of a fit that found its place, px."""
+_SHARE = 0.35
+"""Least part of a unit's information that a fit needs; less if photometry and place are known."""
+_SHARE_KNOWN = 0.18
+_GAIN = (0.12, 4.0)
+"""Gain, against the reference frame's, between which a unit can be seen."""
+_GLARE = 0.4
+_MISFIT = 0.15
+"""Residuals of a good fit, in contrasts of the unit; or so many times the reference frame's: """
+_NOISIER = 4.0
+_STRAY = 0.25
+"""A unit so far from where its neighbours carry it is another one, or none, pitches."""
+_TIGHT = 6.0
+_FEW = 0.9
+"""Where so much less units are found than in the frame before, the specimen may have jumped."""
+_ROUNDS = 40
+_RETRIES = 4
+
+
+class TrackedFrame(NamedTuple):
+    """A frame's outcome.
+
+    Attributes:
+        fits: poses and what is known of them; NaN where not found.
+        quality: (units,) GOOD or the reason.
+    """
+
+    fits: Fits
+    quality: Ints
+
+
+class Tracker:
+    """Follows all units through frames given in sequence.
+
+    Args:
+        specimen: the units.
+        fitter: the camera and the units' looks; the first frame is its reference.
+        recovery: finds the lattice where prediction fails.
+        walls: of thick units.
+    """
+
+    def __init__(
+        self,
+        specimen: SpecimenOutlines,
+        fitter: Fitter,
+        recovery: Recovery,
+        walls: Walls | None = None,
+    ) -> None:
+        self._fitter, self._recovery, self._walls = fitter, recovery, walls
+        self._pitch = specimen.pitch
+        self._neighbours = Neighbourhood(specimen.centre)
+        self._centre, self._radius = specimen.centre, specimen.radius
+        self._pose, self._photometry = fitter.start(1.0)
+        self._velocity = np.zeros_like(self._pose)
+        self._gain = np.empty(0)
+        self._limit = np.empty(0)
+        self._noise = np.empty(0)
+        self._usual = np.zeros(specimen.count)
+        self._seen = 0
+
+    def step(self, image: Picture) -> TrackedFrame:
+        """Finds the units in the next frame."""
+        ahead = self._pose + self._velocity
+        if self._walls is not None:
+            self._walls.follow(ahead)
+        found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
+        fits = Fits(*(values.copy() for values in found))
+        first = not len(self._gain)
+        if first:
+            self._refer(fits)
+        good = self._judged(fits, _SHARE)
+        good = self._completed(image, fits, good)
+        jumped = good.sum() < _FEW * self._seen
+        if jumped:
+            fits, good = self._recovered(image, fits, good)
+        self._seen = int(good.sum())
+        quality = self._reasons(fits, good)
+        for values in fits:
+            values[~good] = np.nan
+        self._remember(fits, good, first or jumped)
+        return TrackedFrame(fits, quality)
+
+    def _refer(self, fits: Fits) -> None:
+        """Takes the first frame as what a unit seen whole looks like."""
+        gain = np.abs(fits.photometry[:, 0])
+        relative = fits.noise / gain
+        usual = np.nanmedian(relative)
+        self._gain = np.where(np.isfinite(gain), gain, 1.0)
+        self._noise = np.fmax(np.where(np.isfinite(relative), relative, usual), usual)
+        contrast = self._fitter.templates.contrast
+        self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
+        self._fitter.full = np.nan_to_num(fits.information)
+
+    def _judged(self, fits: Fits, share: float) -> Mask:
+        gain = fits.photometry[:, 0]
+        relative = gain / self._gain
+        with np.errstate(invalid="ignore", divide="ignore"):
+            fitting = fits.noise / np.abs(gain) < self._limit
+        seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
+        return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
+
+    def _completed(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+        """Looks for what is missing, where the good ones say."""
+        if not good.any():
+            return good
+        return self._uncover(image, fits, self._spread(image, fits, good))
+
+    def _recovered(self, image: Picture, fits: Fits, good: Mask) -> tuple[Fits, Mask]:
+        """Tries all units anew where the lattice is found; keeps what is more."""
+        again, new = Fits(*(values.copy() for values in fits)), np.zeros_like(good)
+        for guess in self._recovery.guesses(image, self._pose):
+            new = self._tried(image, again, new, (guess, self._photometry, None, _SHARE))
+        new = self._completed(image, again, new)
+        return (again, new) if new.sum() > good.sum() else (fits, good)
+
+    def _spread(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+        """Tries the units that were not found where their neighbours would have carried them."""
+        for _ in range(_ROUNDS):
+            good &= ~self._neighbours.strayed(fits.pose, good, _STRAY * self._pitch)
+            guess = self._neighbours.carried(self._pose, fits.pose, good, ~good)
+            wanted = np.isfinite(guess[:, 0])
+            if not wanted.any():
+                break
+            photometry = self._photometry * self._brighter(fits, good)
+            again = self._fitter.fit(image, guess, photometry, wanted)
+            new = self._judged(again, _SHARE) & wanted
+            if not new.any():
+                break
+            _take(fits, again, new)
+            good |= new
+        return good
+
+    def _uncover(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+        """Tries those again that may be hidden in part: place and brightness are known."""
+        photometry = self._photometry * self._brighter(fits, good)
+        tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
+        for _ in range(_RETRIES):
+            if good.all():
+                break
+            before = int(good.sum())
+            for guess in self._guesses(fits, good):
+                for least, scale in ((_SHARE, None), (_SHARE_KNOWN, tight)):
+                    good = self._tried(image, fits, good, (guess, photometry, scale, least))
+            if good.sum() == before:
+                break
+        return good
+
+    def _tried(
+        self,
+        image: Picture,
+        fits: Fits,
+        good: Mask,
+        trial: tuple[Floats, Floats, Floats | None, float],
+    ) -> Mask:
+        """Fits what is not good from a guess and keeps what is judged well and has not strayed."""
+        guess, photometry, tight, least = trial
+        wanted = ~good & np.isfinite(guess[:, 0])
+        if not wanted.any():
+            return good
+        again = self._fitter.fit(image, guess, photometry, wanted, tight)
+        new = self._judged(again, least) & wanted
+        both = Fits(*(values.copy() for values in fits))
+        _take(both, again, new)
+        new &= ~self._neighbours.strayed(both.pose, good | new, _STRAY * self._pitch)
+        _take(fits, again, new)
+        return good | new
+
+    def _guesses(self, fits: Fits, good: Mask) -> Iterator[Floats]:
+        """Poses that hidden units may have: carried on, or stretched with those that are seen.
+
+        Units of these lattices turn with or against their neighbours, so both are tried.
+        """
+        carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
+        ahead = self._pose + self._velocity
+        if self._walls is not None:
+            self._walls.follow(ahead)
+        yield np.where(np.isfinite(carried), carried, ahead)
+        yield ahead
+        place = self._neighbours.stretched(fits.pose, good, ~good)
+        turn = self._neighbours.turned(fits.pose, good, ~good)
+        for angle in (turn, -turn, np.zeros_like(turn)):
+            yield np.column_stack([place, angle])
+
+    def _brighter(self, fits: Fits, good: Mask) -> float:
+        """How much brighter the frame is than the one before."""
+        if not good.any():
+            return 1.0
+        return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
+
+    def _reasons(self, fits: Fits, good: Mask) -> Ints:
+        place = self._centre + self._pose[:, :2]
+        middle = self._fitter.camera.project(place)
+        width, height = self._fitter.camera.size
+        inside = (middle > 0).all(axis=1) & (middle < [width - 1, height - 1]).all(axis=1)
+        relative = fits.photometry[:, 0] / self._gain
+        reasons = np.full(len(good), HIDDEN)
+        reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > _SHARE)] = POOR_FIT
+        reasons[(relative < _GLARE) & (fits.photometry[:, 1] > 0)] = GLARE
+        reasons[~inside] = OUT_OF_FRAME
+        reasons[good] = GOOD
+        return reasons
+
+    def _remember(self, fits: Fits, good: Mask, still: bool) -> None:
+        carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
+        lost = np.where(np.isfinite(carried), carried, self._pose)
+        pose = np.where(good[:, None], fits.pose, lost)
+        self._velocity = np.where(good[:, None] & (not still), pose - self._pose, 0.0)
+        self._photometry = np.where(
+            good[:, None], fits.photometry, self._photometry * self._brighter(fits, good)
+        )
+        relative = fits.noise / np.abs(fits.photometry[:, 0])
+        if not still:
+            self._usual = np.where(good, relative, self._usual)
+        self._pose = pose
+
+
+def _take(fits: Fits, other: Fits, chosen: Mask) -> None:
+    for values, new in zip(fits, other, strict=True):
+        values[chosen] = new[chosen]

@@ -1,0 +1,111 @@
+"""Standard uncertainties that hold: from the image, scaled by what the motions themselves show.
+
+A codec moves whole units by errors that leave no trace in a frame's residuals. But it moves each by
+its own, while the specimen moves in a few shapes. What is left of the motions without these is
+noise, and tells by how much the image's own figure is too small: frame by frame, and unit by unit.
+A codec also shows whole frames a little before or after their time; the shapes' amplitudes, which
+go on smoothly, tell this. What the reference frame's own error adds to all frames alike, shapes
+may take up; that frame stands alone in the file, so the image tells it.
+"""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.runtime import Floats, Ints, Mask, Reals
+from pipeline.tracking.motion import motion_modes
+
+_PARAMETERS = 7
+_LEAST_FRAMES = 8
+_MOST_FRAMES = 400
+_OUTLIER = 25.0
+_CHI_SQUARE = 0.455
+"""Median of the square of a normal variable."""
+_PRIOR = 10.0
+"""Weight, in samples, of the belief that a unit or frame is as all others are."""
+_USUAL = 6.0
+"""By how much codecs make variances larger than the image tells, and the weight of this belief in
+frames: few frames do not show how their errors drift."""
+_USUAL_FRAMES = 2.0
+_LEAST_FREEDOM = 0.2
+_OWN = 0.3
+
+
+def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
+    """Standard deviations (..., 3) from the covariance of blocks, corrected for what was fitted."""
+    freedom = blocks / np.maximum(blocks - _PARAMETERS, 1)
+    variance = np.einsum("...ii->...i", scatter) * freedom[..., None]
+    return np.sqrt(variance)
+
+
+def calibrated(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
+    """The standard uncertainties, scaled so that they tell the scatter of the motions.
+
+    Args:
+        motion: (frames, units, 3) poses, NaN where missing.
+        sigma: (frames, units, 3) their uncertainties by the image.
+        centre: (units, 2) places at rest.
+        steady: (frames,) which follow the frame before at the usual distance in time.
+
+    Returns:
+        (frames, units, 3); with too few frames to tell, a usual multiple of the image's own.
+    """
+    near = cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:]
+    out = np.empty_like(sigma)
+    parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
+    for part in (slice(frames[0], frames[-1] + 1) for frames in parts):
+        for dof in range(motion.shape[2]):
+            calm = _calmed(sigma[part, :, dof].astype(float))
+            factor = _factor(motion[part, :, dof].astype(float), calm, near, steady[part])
+            out[part, :, dof] = calm * factor
+    return out
+
+
+def _calmed(sigma: Floats) -> Floats:
+    """The image's figures, each drawn near to what is usual for its frame and its unit.
+
+    A figure comes from some tens of blocks and scatters by a fifth, most of which says nothing.
+    """
+    told = np.log(sigma)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # nothing is seen in some frames
+        frame = np.nanmedian(told, axis=1, keepdims=True)
+        unit = np.nanmedian(told - frame, axis=0, keepdims=True)
+    return np.exp(frame + unit + _OWN * (told - frame - unit))
+
+
+def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
+    """By how much (frames, units) the uncertainties of one degree of freedom are too small."""
+    usual = np.full(motion.shape, np.sqrt(_USUAL))
+    if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
+        return usual
+    found = motion_modes.apart(motion, near, float(np.nanmedian(sigma)))
+    ratio = _ratio(np.isfinite(motion), sigma, found, steady)
+    if not np.isfinite(ratio).any():
+        return usual
+    level = float(np.nanmean(ratio))
+    by_frame = _shrunk(ratio, level, 1)
+    by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
+    belief = (level * len(ratio) + _USUAL * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
+    reference = motion_modes.steadiness(found.amplitude)
+    return np.sqrt(by_frame[:, None] * by_unit[None, :] * belief / level + reference)
+
+
+def _ratio(known: Mask, sigma: Floats, found: motion_modes.Shapes, steady: Mask) -> Floats:
+    """Squared noise over the image's variance (frames, units), NaN where there is none to see."""
+    by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
+    freedom = (1 - by_frame)[:, None] * (1 - by_unit)
+    jitter = motion_modes.rough(found.amplitude, steady) @ found.shape
+    spread = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM) + jitter**2
+    ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
+    if not np.isfinite(ratio).any():
+        return ratio
+    return np.minimum(ratio, _OUTLIER * np.nanmedian(ratio) / _CHI_SQUARE)
+
+
+def _shrunk(ratio: Floats, level: float, axis: int) -> Floats:
+    count = np.isfinite(ratio).sum(axis=axis)
+    return (np.nansum(ratio, axis=axis) + _PRIOR * level) / (count + _PRIOR)

@@ -1,0 +1,194 @@
+"""Points with displacements, as commercial DIC systems export them, to motions of the units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+import shapely
+import xarray as xr
+from pydantic import Field
+
+from pipeline.datasets.tables import TABLES
+from pipeline.problem.fields import Angle, Coordinate, Section
+from pipeline.problem.reading import section
+from pipeline.runtime import Floats, Ints, UserError
+from pipeline.tracking.frames import csv_columns as columns
+from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
+from pipeline.tracking.output.track_dataset import absent, labelled, spread
+
+_FINEST = 1e-4  # mm, standard deviation of the best points
+_LEAST = 3  # points of a unit
+
+Name = Annotated[str, Field(min_length=1)]
+
+
+class Columns(Section):
+    """Names of the columns.
+
+    Attributes:
+        time: in s.
+        x: place at rest, mm.
+        y: likewise.
+        ux: displacement, mm.
+        uy: likewise.
+    """
+
+    time: Name = "time"
+    x: Name = "x"
+    y: Name = "y"
+    ux: Name = "u"
+    uy: Name = "v"
+
+
+class Points(Section):
+    """A file of points, and how its axes lie on the specimen.
+
+    Attributes:
+        title: one line about it.
+        points: the CSV, as seen from this file: one line a point and time.
+        columns: their names.
+        origin: place of unit (0, 0)'s lattice point on the file's axes.
+        rotation: of the specimen's x axis on the file's axes, counter-clockwise.
+        flipped: whether the file's y axis points downwards.
+        design: the design dataset, likewise; or --design.
+        structure: which of the design's structures it is.
+        synthetic: whether it was computed, not measured.
+    """
+
+    title: str = ""
+    points: Name
+    columns: Columns = Columns()
+    origin: tuple[Coordinate, Coordinate] = (0.0, 0.0)
+    rotation: Angle = 0.0
+    flipped: bool = False
+    design: Name | None = None
+    structure: Literal["intact", "altered", "cloaked"] = "cloaked"
+    synthetic: bool = False
+
+
+class Cloud(NamedTuple):
+    """Points in the specimen's frame, one row a point and time.
+
+    Attributes:
+        time: (rows,) s.
+        place: (rows, 2) at rest, mm.
+        moved: (rows, 2) displacement, mm.
+    """
+
+    time: Floats
+    place: Floats
+    moved: Floats
+
+
+def load(path: Path) -> Points:
+    """The description in a YAML file.
+
+    Raises:
+        UserError: naming the file, the key, the value and the remedy.
+    """
+    return section(path, Points)
+
+
+def cloud(path: Path, asked: Points) -> Cloud:
+    """The points of a file in the specimen's frame.
+
+    Raises:
+        UserError: the file cannot be read, or lacks a column.
+    """
+    names = asked.columns
+    table = columns.read(path, (names.time, names.x, names.y, names.ux, names.uy))
+    cos, sin = np.cos(asked.rotation), np.sin(asked.rotation)
+    upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
+    turn = np.array([[cos, -sin], [sin, cos]])
+    place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn
+    return Cloud(table[:, 0], place, table[:, 3:5] * upright @ turn)
+
+
+def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
+    """The dataset ``track`` of points: a robust rigid fit for each unit and time.
+
+    A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
+    how far they are from moving rigidly.
+
+    Args:
+        design: as built.
+        seen: the points.
+
+    Raises:
+        UserError: hardly a unit bears points.
+    """
+    specimen = of_design(design)
+    unit = _bearer(specimen, seen.place)
+    bearing = len(np.unique(unit[unit >= 0]))
+    if bearing < max(3, specimen.count // 10):
+        low, high = seen.place.min(axis=0), seen.place.max(axis=0)
+        raise UserError(
+            f"{bearing} of {specimen.count} units bear points, which reach from"
+            f" ({low[0]:.1f}, {low[1]:.1f}) to ({high[0]:.1f}, {high[1]:.1f}) mm of the specimen",
+            key="origin",
+            remedy="give origin, rotation and flipped so that the points lie on the units",
+        )
+    time, frame = np.unique(seen.time, return_inverse=True)
+    motion = np.full((len(time), specimen.count, 3), np.nan)
+    sigma = np.full_like(motion, np.nan)
+    order = np.lexsort((unit, frame))
+    order = order[unit[order] >= 0]
+    key = frame[order] * specimen.count + unit[order]
+    for rows in np.split(order, np.flatnonzero(np.diff(key)) + 1):
+        if len(rows) >= _LEAST:
+            at = frame[rows[0]], unit[rows[0]]
+            before = seen.place[rows] - specimen.centre[unit[rows[0]]]
+            motion[at], sigma[at] = _fitted(before, before + seen.moved[rows])
+    return _dataset(design, time - time[0], motion, sigma)
+
+
+def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
+    """The unit (rows,) on which each point lies at rest, -1 for none."""
+    faces = [
+        shapely.Polygon(specimen.centre[unit] + specimen.polygon(unit))
+        for unit in range(specimen.count)
+    ]
+    points, units = shapely.STRtree(faces).query(shapely.points(place), predicate="within")
+    out = np.full(len(place), -1)
+    out[points] = units
+    return out
+
+
+def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
+    """Pose and its standard uncertainty (3,), from points relative to the centroid at rest."""
+    turn, shift, weight = robust_motion(before, after, _FINEST)
+    cos, sin = np.cos(turn), np.sin(turn)
+    rest = after - before @ np.array([[cos, sin], [-sin, cos]]) - shift
+    count = weight.sum()
+    middle = weight @ before / count
+    arm = weight @ ((before - middle) ** 2).sum(axis=1)
+    freedom = max(2 * count - 3, 1.0)
+    variance = max(float(weight @ (rest**2).sum(axis=1)) / freedom, _FINEST**2)
+    lever = middle[::-1] ** 2  # the centroid lies aside from the middle of the points
+    place = variance * (1 / count + lever / arm)
+    return np.array([*shift, turn]), np.sqrt([*place, variance / arm])
+
+
+def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) -> xr.Dataset:
+    present = np.isfinite(design["vertices"].values[:, 0, 0])
+    hidden = TABLES["track"]["quality"].flags["hidden"]
+    quality = np.where(np.isfinite(motion[..., 0]), 0, hidden).astype(np.int8)
+    pose, frames = ("time", "unit", "dof"), ("time",)
+    unknown = np.full(len(time), np.nan)
+    variables = {
+        "displacement": (pose, spread(motion, present, np.nan)),
+        "sigma": (pose, spread(sigma, present, np.nan)),
+        "quality": (pose[:2], spread(quality, present, absent())),
+        "timing": (frames, np.zeros(len(time), np.int8)),
+        "frame": (frames, np.arange(len(time))),
+        "load_force": (frames, unknown),
+        "camera_homography": (("row", "column"), np.full((3, 3), np.nan)),
+        "camera_centre": (("xy",), np.full(2, np.nan)),
+        "camera_radial": (("power",), np.full(2, np.nan)),
+        "camera_residual": (("unit", "xy"), np.full((len(present), 2), np.nan)),
+        "image_size": (("xy",), np.zeros(2, int)),
+        "blur": ((), np.nan),
+    }
+    return labelled(design, time, variables)

@@ -1,0 +1,82 @@
+"""A track as a dataset with the names and shapes of a response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from pipeline.datasets.tables import TABLES
+from pipeline.runtime import Floats, Mask
+from pipeline.tracking.motion import Track
+
+_MOTION = ("time", "unit", "dof")
+
+
+def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None) -> xr.Dataset:
+    """The dataset ``track``: units as in the design, those that are absent without motion.
+
+    Args:
+        design: as built.
+        track: of the units that are present.
+        force: (frames,) of the load cell, N.
+    """
+    present = np.isfinite(design["vertices"].values[:, 0, 0])
+    camera, pixel = track.calibration.camera, track.calibration.pixel
+    residual = np.full((design.sizes["unit"], 2), np.nan)
+    residual[present] = track.calibration.residual
+    variables = {
+        "displacement": (_MOTION, spread(track.displacement, present, np.nan)),
+        "sigma": (_MOTION, spread(track.sigma, present, np.nan)),
+        "quality": (_MOTION[:2], spread(track.quality, present, absent())),
+        "timing": (("time",), track.timing.astype(np.int8)),
+        "frame": (("time",), track.frame),
+        "load_force": (("time",), np.full(len(track.time), np.nan) if force is None else force),
+        "camera_homography": (("row", "column"), camera.homography),
+        "camera_centre": (("xy",), camera.centre),
+        "camera_radial": (("power",), camera.radial),
+        "camera_residual": (("unit", "xy"), residual),
+        "image_size": (("xy",), np.array(camera.size)),
+        "blur": ((), track.calibration.blur / pixel),
+    }
+    return labelled(design, track.time, variables)
+
+
+def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
+    """Variables of a track with the labels of the design's units, and how far these are driven."""
+    coordinates = {
+        **{name: design[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), time),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
+    driven = made["displacement"].values[:, is_driven(design), :2]
+    return made.assign_coords(drive_displacement=(("time", "xy"), mean_seen(driven)))
+
+
+def is_driven(design: xr.Dataset) -> Mask:
+    """Which units (units,) of the design are driven."""
+    flag = TABLES["design"]["support"].flags["driven"]
+    return np.asarray(design["support"].values == flag)
+
+
+def mean_seen(motion: Floats) -> Floats:
+    """Mean (frames, 2) over those of the units (frames, units, 2) that are seen; NaN without."""
+    seen = np.isfinite(motion[..., :1])
+    total = np.where(seen, motion, 0.0).sum(axis=1)
+    return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
+
+
+def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
+    """Values (frames, present units, ...) over all units."""
+    if present.all():
+        return values
+    out = np.full((values.shape[0], len(present), *values.shape[2:]), fill, values.dtype)
+    out[:, present] = values
+    return out
+
+
+def absent() -> int:
+    """The quality of a unit that the structure does not have."""
+    return TABLES["track"]["quality"].flags["absent"]

@@ -1,0 +1,164 @@
+"""A first look at a video: which units it shows, what is on them, and what it does not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import xarray as xr
+
+from pipeline.runtime import Floats, Image, Picture, UserError
+from pipeline.tracking.detect import Sighting, shown_on
+from pipeline.tracking.geometry import SpecimenOutlines, as_built, of_design
+from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, calibrate
+from pipeline.tracking.reference_frame.recognition import (
+    agreeing,
+    ambiguous,
+    check,
+    inside,
+    recognised,
+)
+
+_CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
+_GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
+
+
+class Proposal(NamedTuple):
+    """What the first frame shows.
+
+    Attributes:
+        structure: the design's structure that fits best.
+        specimen: its units.
+        sighting: where they are.
+        kind: dots, speckle or bare.
+        pixel_size: mm.
+        doubts: what could not be told, in words.
+    """
+
+    structure: str
+    specimen: SpecimenOutlines
+    sighting: Sighting
+    kind: str
+    pixel_size: float
+    doubts: tuple[str, ...]
+
+
+def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) -> Proposal:
+    """Looks for every structure of the design in a frame.
+
+    Raises:
+        UserError: none is there.
+    """
+    seen, refused = [], []
+    for name, specimen in _structures(design):
+        try:
+            seen.append(_candidate(image, name, specimen, px_per_mm))
+        except UserError as error:
+            refused.append(error)
+    if not seen:
+        raise refused[0]
+    best = max(seen, key=_share)
+    specimen, calibration = best.specimen, best.calibration
+    sighting = replace(best.ways[0], camera=calibration.camera)
+    check(specimen, sighting, calibration)
+    like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
+    kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
+    doubts = tuple(_doubts(best, like))
+    return Proposal(best.name, specimen, sighting, kind, calibration.pixel, doubts)
+
+
+class _Candidate(NamedTuple):
+    """A structure of the design, and how it is seen."""
+
+    name: str
+    specimen: SpecimenOutlines
+    ways: list[Sighting]
+    calibration: CameraCalibration
+
+
+def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
+    """Every structure of the design that differs from those before."""
+    tried: list[SpecimenOutlines] = []
+    for name in ("cloaked", "altered", "intact"):
+        specimen = of_design(as_built(design, name))
+        if not any(
+            np.array_equal(specimen.ids, one.ids) and _alike(specimen, one) for one in tried
+        ):
+            tried.append(specimen)
+            yield name, specimen
+
+
+def _candidate(
+    image: Picture, name: str, specimen: SpecimenOutlines, px_per_mm: float | None
+) -> _Candidate:
+    ways = recognised(image, specimen, px_per_mm, Setup())
+    return _Candidate(name, specimen, ways, calibrate(image, specimen, ways[0], Setup()))
+
+
+def _alike(one: SpecimenOutlines, other: SpecimenOutlines) -> bool:
+    return np.array_equal(one.outline, other.outline, equal_nan=True)
+
+
+def _share(one: _Candidate) -> float:
+    """Part of the units that are as this structure has them, less what it does not have."""
+    there = inside(one.specimen, one.calibration)
+    fitting = agreeing(one.specimen, one.calibration.outlines) & there
+    return float(fitting.sum() / max(there.sum(), 1)) - _more(one) / one.specimen.count
+
+
+def _more(one: _Candidate) -> int:
+    """Patches of a unit's size that are none of the structure's units."""
+    return one.ways[0].blobs - len(one.ways[0].unit)
+
+
+def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
+    if like:
+        yield f"structure: as many units fit {' and '.join(like)}; say which was built"
+    if more := _more(best):
+        yield f"{more} patches of a unit's size that this structure does not have"
+    if missing := best.specimen.count - len(best.ways[0].unit):
+        yield f"{missing} units were not found at first sight (orange in the picture); tracking"
+        yield "  looks for them again"
+    if doubt := ambiguous(best.ways):
+        yield f"turned, mirrored: {doubt}"
+    yield "window: whether the specimen is at rest in the first frame"
+    yield "case: under which load case of the study it was"
+    yield "load_axis: time, or driven displacement; load_cell: none was named"
+
+
+def picture(image: Picture, found: Proposal, note: str = "") -> Image:
+    """The frame with the outlines of all units and their ids; orange where none was found.
+
+    Args:
+        image: the frame.
+        found: what it shows.
+        note: stands in its corner.
+    """
+    scale = 2 if max(image.shape) < 1000 else 1
+    grey = np.asarray(image, np.uint8)
+    drawn = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    drawn = cv2.cvtColor(drawn, cv2.COLOR_GRAY2BGR)
+    seen = np.isin(np.arange(found.specimen.count), found.sighting.unit)
+    for unit, number in enumerate(found.specimen.ids):
+        colour = _GOOD if seen[unit] else _MISSING
+        corners = found.specimen.centre[unit] + found.specimen.polygon(unit)
+        outline = _at(found.sighting.camera.project(corners), scale)
+        cv2.polylines(drawn, [outline], True, colour, 2, cv2.LINE_AA)
+        x, y = _at(found.sighting.camera.project(found.specimen.centre[unit]), scale).tolist()
+        _centred(drawn, str(number), (x, y), colour)
+    _centred(drawn, note, (60, 16), _MISSING)
+    return np.asarray(drawn, np.uint8)
+
+
+def _at(pixels: Floats, scale: int) -> np.ndarray:
+    return np.round((pixels + 0.5) * scale - 0.5).astype(np.int32)
+
+
+def _centred(image: np.ndarray, text: str, at: tuple[int, int], colour: tuple[int, ...]) -> None:
+    (wide, high), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.4, 1)
+    origin = (at[0] - wide // 2, at[1] + high // 2)
+    for ink, width in (((255, 255, 255), 3), (colour, 1)):
+        cv2.putText(image, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.4, ink, width, cv2.LINE_AA)

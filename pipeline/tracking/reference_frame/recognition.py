@@ -1,0 +1,155 @@
+"""The specimen in a first frame: where its design has it, or refused with what is there instead."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+
+from pipeline.runtime import Mask, Picture, UserError
+from pipeline.tracking.detect import Sighting, lies, placed, sight, told
+from pipeline.tracking.fit import Fits
+from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, alike
+
+LOG = logging.getLogger(__name__)
+
+_DARK = 8.0
+_SCALE = 0.15
+_ENOUGH = 0.6
+"""Least part of the units that a first look must find."""
+_FAR = 0.15
+_TURNED = np.deg2rad(8.0)
+_MISFIT = 4.0
+"""An outline is another one if it lies so many pitches from where the design has it, is turned so
+far, or fits so many times worse than is usual."""
+_MARKED = 0.3
+"""Residuals over contrast that marks on a face may cause."""
+_STRANGE = 0.1
+"""Most part of the units whose outlines may be others."""
+_QUARTER = np.pi / 4
+
+
+def recognised(
+    image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None, setup: Setup
+) -> list[Sighting]:
+    """The specimen in a first frame: all ways to see it that its outlines do not tell apart.
+
+    Raises:
+        UserError: it is not there, or not at this scale, or not as the set-up says.
+    """
+    if float(np.ptp(image)) < _DARK:
+        raise UserError(
+            "the first frame is black or without contrast",
+            key="window.start",
+            remedy="start where the specimen is lit",
+        )
+    found = sight(image, specimen, px_per_mm)
+    if px_per_mm is not None and not _shown(found, specimen):
+        anywhere = sight(image, specimen, None)
+        if _shown(anywhere, specimen):
+            _check_scale(anywhere[0], specimen, px_per_mm)
+            found = anywhere
+    if not _shown(found, specimen):
+        raise _another(told(found[0], specimen))
+    return _as_told(alike(image, specimen, found), setup)
+
+
+def ambiguous(ways: list[Sighting]) -> str:
+    """What to say where there are several ways to see a specimen; nothing if there is one."""
+    if len(ways) == 1:
+        return ""
+    others = "; ".join(placed(way.camera) for way in ways[1:])
+    return (
+        f"the specimen is taken to be {placed(ways[0].camera)}; its lattice would look the same"
+        f" {others}: say `turned` and `mirrored` in the recording if it is"
+    )
+
+
+def check(specimen: SpecimenOutlines, sighting: Sighting, calibration: CameraCalibration) -> None:
+    """Refuses a first frame whose outlines are others than the design's.
+
+    Raises:
+        UserError: telling how many units were found, and where.
+    """
+    there = inside(specimen, calibration)
+    strange = there & ~agreeing(specimen, calibration.outlines)
+    if strange.sum() > _STRANGE * there.sum():
+        raise _another(f"{told(sighting, specimen)}; {_named(specimen, strange)}")
+    if not there.all():
+        LOG.warning(
+            "warning: %d units reach out of the first frame; where a whole row does, the lattice"
+            " may lie a unit aside from where it is taken to be",
+            np.count_nonzero(~there),
+        )
+    if strange.any():
+        LOG.warning("warning: %s in the first frame", _named(specimen, strange))
+
+
+def agreeing(specimen: SpecimenOutlines, outlines: Fits) -> Mask:
+    """Which units (units,) have the outlines that they have by design, and where it has them."""
+    ratio = outlines.noise / np.abs(outlines.photometry[:, 0])
+    near = np.linalg.norm(outlines.pose[:, :2], axis=1) < _FAR * specimen.pitch
+    upright = np.abs(outlines.pose[:, 2]) < _TURNED
+    usual = max(_MISFIT * float(np.nanmedian(ratio)), _MARKED)
+    return np.asarray(near & upright & (ratio < usual))
+
+
+def inside(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
+    """Which units (units,) lie whole in the picture."""
+    middle = calibration.camera.project(specimen.centre)
+    reach = specimen.radius[:, None] / calibration.pixel
+    last = np.array(calibration.camera.size) - 1
+    return np.asarray(((middle > reach) & (middle < last - reach)).all(axis=1))
+
+
+def _named(specimen: SpecimenOutlines, strange: Mask) -> str:
+    ids = ", ".join(map(str, specimen.ids[strange][:8])) + (", ..." if strange.sum() > 8 else "")
+    return f"{strange.sum()} units are hidden or not as the design has them ({ids})"
+
+
+def _another(seen: str) -> UserError:
+    return UserError(
+        f"the first frame does not show this design: {seen}",
+        key="design",
+        remedy="give the design of the specimen, its structure and its pixel_size, and start the"
+        " window where all of it is seen, at rest",
+    )
+
+
+def _shown(found: list[Sighting], specimen: SpecimenOutlines) -> bool:
+    return len(found[0].unit) >= _ENOUGH * specimen.count
+
+
+def _as_told(found: list[Sighting], setup: Setup) -> list[Sighting]:
+    """Those of the ways to see it that are as the set-up says.
+
+    Raises:
+        UserError: none is.
+    """
+    kept = []
+    for one in found:
+        turn, behind = lies(one.camera)
+        off = 0.0 if setup.turned is None else np.angle(np.exp(1j * (turn - setup.turned)))
+        if abs(off) < _QUARTER and setup.mirrored in (None, behind):
+            kept.append(one)
+    if not kept:
+        raise UserError(
+            f"the specimen is seen otherwise: {'; '.join(placed(one.camera) for one in found)}",
+            key="turned" if setup.turned is not None else "mirrored",
+            remedy="correct it, or leave it out",
+        )
+    return kept
+
+
+def _check_scale(found: Sighting, specimen: SpecimenOutlines, px_per_mm: float) -> None:
+    """Refuses a pixel size far from that which shows the specimen."""
+    jacobian = found.camera.jacobian(specimen.centre)
+    size = float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
+    if abs(np.log(size / px_per_mm)) > _SCALE:
+        raise UserError(
+            f"the specimen is there, but pixels measure about {1 / size:.3g} mm on it",
+            key="pixel_size",
+            value=f"{1 / px_per_mm:.3g} mm",
+            remedy="correct it, or leave it out",
+        )

@@ -1,0 +1,58 @@
+"""Where the camera stands, and what that makes of the specimen's plane and its depth."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.problem.sections import Viewing
+from pipeline.runtime import Floats
+from pipeline.tracking.geometry import Camera
+
+
+class Viewpoint(NamedTuple):
+    """A camera in front of the specimen.
+
+    Attributes:
+        camera: of the plane of the units' faces.
+        eye: (3,) centre of projection in the specimen's frame, z towards the camera, mm.
+    """
+
+    camera: Camera
+    eye: Floats
+
+    def behind(self, points: Floats, depth: float) -> Floats:
+        """Places (..., 2) in the faces' plane where points so far behind it are seen, mm."""
+        foot, height = self.eye[:2], self.eye[2]
+        return foot + (points - foot) * (height / (height + depth))
+
+
+def viewpoint(asked: Viewing, middle: Floats) -> Viewpoint:
+    """The camera that looks at ``middle`` (2,) of the specimen, mm.
+
+    A pinhole with radial distortion: the focal length follows from distance and pixel size. It
+    leans over by the tilt about x, then y, and is rolled about its axis.
+    """
+    turn = _turn(asked.roll, 2) @ _turn(asked.tilt[1], 1) @ _turn(asked.tilt[0], 0)
+    rotation = np.diag([1.0, -1.0, -1.0]) @ turn
+    target = np.append(middle, 0.0)
+    shift = np.array([0.0, 0.0, asked.distance]) - rotation @ target
+    columns, rows = asked.image
+    centre = (np.array([columns, rows]) - 1) / 2
+    focal = asked.distance / asked.pixel_size
+    inner = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
+    homography = inner @ np.column_stack([rotation[:, :2], shift])
+    camera = Camera(
+        homography / homography[2, 2], centre, np.array(asked.distortion), (columns, rows)
+    )
+    return Viewpoint(camera, -rotation.T @ shift)
+
+
+def _turn(angle: float, axis: int) -> Floats:
+    cos, sin = np.cos(angle), np.sin(angle)
+    out = np.eye(3)
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    out[first, first] = out[second, second] = cos
+    out[first, second], out[second, first] = -sin, sin
+    return out

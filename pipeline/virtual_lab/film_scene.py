@@ -1,0 +1,127 @@
+"""The specimen as the camera sees it at one instant: nested polygons with their shades.
+
+Board; before it the side walls and the ligaments, which are one shade and therefore one region;
+before these the faces; on the faces the marks. Each lies within the one before it, so exact
+coverages with the differences of the shades add up to the picture.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from pipeline.problem.sections import UnitAppearance
+from pipeline.runtime import Floats, Ints
+from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.virtual_lab.camera_pose import Viewpoint
+from pipeline.virtual_lab.coverage import NestedPolygons
+from pipeline.virtual_lab.face_marks import Marks
+
+_PIECE = 2.0  # longest piece of an edge, mm: the lens bends edges
+_CORNERS = 32  # of a disc
+
+
+class FilmScene(NamedTuple):
+    """What is filmed.
+
+    Attributes:
+        specimen: the units.
+        ligament: (ligaments, 2, 2) unit and vertex, as places in the specimen, at either end.
+        marks: on the faces.
+        look: shades and thickness.
+        view: the camera.
+    """
+
+    specimen: SpecimenOutlines
+    ligament: Ints
+    marks: Marks
+    look: UnitAppearance
+    view: Viewpoint
+
+
+class _Layer(NamedTuple):
+    points: Floats
+    sizes: Ints
+    shade: float
+
+
+def seen(scene: FilmScene, pose: Floats) -> NestedPolygons:
+    """All polygons, in pixels, with the shades they add to the board's.
+
+    Args:
+        scene: what is filmed.
+        pose: (units, 3) displacements in mm and rotations in rad.
+    """
+    look = scene.look
+    corners = _placed(scene.specimen.outline, np.arange(len(pose)), pose, scene.specimen.centre)
+    faces = np.array([shapely.Polygon(each[~np.isnan(each[:, 0])]) for each in corners])
+    layers = [
+        _layer(_sides(scene, faces, corners), look.side - look.board),
+        _layer(faces, look.face - look.side),
+        _discs(scene, pose),
+    ]
+    sizes = np.concatenate([layer.sizes for layer in layers])
+    return NestedPolygons(
+        scene.view.camera.project(np.concatenate([layer.points for layer in layers])),
+        np.concatenate([[0], np.cumsum(sizes)]),
+        np.concatenate([np.full(len(layer.sizes), layer.shade) for layer in layers]),
+    )
+
+
+def _placed(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
+    """Points (n, m, 2) relative to the centroids of units (n,), where these have gone."""
+    cos, sin = np.cos(pose[unit, 2, None]), np.sin(pose[unit, 2, None])
+    x, y = points[..., 0], points[..., 1]
+    turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    return np.asarray(turned + (centre + pose[:, :2])[unit, None])
+
+
+def _sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
+    """The one region of faces, side walls and ligaments, as polygons."""
+    parts = [faces]
+    if depth := scene.look.thickness:
+        parts += _walls(scene, corners, depth)
+    if width := scene.look.ligament:
+        end = corners[scene.ligament[..., 0], scene.ligament[..., 1]]
+        parts.append(shapely.buffer(shapely.linestrings(end), width / 2, cap_style="flat"))
+    return np.array([shapely.union_all(np.concatenate(parts))])
+
+
+def _walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
+    """The backs of the units and the walls below their edges, as seen in the faces' plane."""
+    back = scene.view.behind(corners, depth)
+    backs, walls = [], []
+    for front, rear in zip(corners, back, strict=True):
+        there = ~np.isnan(front[:, 0])
+        backs.append(shapely.Polygon(rear[there]))
+        walls.append(_walls_below(front[there], rear[there]))
+    return [np.array(backs), shapely.convex_hull(shapely.multipoints(np.concatenate(walls)))]
+
+
+def _walls_below(front: Floats, rear: Floats) -> Floats:
+    """Corners (edges, 4, 2) of the wall below every edge."""
+    return np.stack([front, np.roll(front, -1, axis=0), np.roll(rear, -1, axis=0), rear], axis=1)
+
+
+def _layer(shapes: Floats, shade: float) -> _Layer:
+    """Rings of polygons, counter-clockwise, holes the other way."""
+    cut = shapely.orient_polygons(shapely.segmentize(shapes, _PIECE))
+    rings = shapely.get_rings(shapely.get_parts(cut))
+    sizes = shapely.get_num_coordinates(rings) - 1
+    points = shapely.get_coordinates(rings)
+    closing = np.cumsum(sizes + 1) - 1
+    return _Layer(np.delete(points, closing, axis=0), sizes, shade)
+
+
+def _discs(scene: FilmScene, pose: Floats) -> _Layer:
+    """The marks as polygons of their area."""
+    marks = scene.marks
+    angle = 2 * np.pi / _CORNERS * np.arange(_CORNERS)
+    swell = np.sqrt(angle[1] / np.sin(angle[1]))
+    circle = swell * np.column_stack([np.cos(angle), np.sin(angle)])
+    discs = marks.centre[:, None] + marks.diameter[:, None, None] / 2 * circle
+    places = _placed(discs, marks.unit, pose, scene.specimen.centre)
+    sizes = np.full(len(discs), _CORNERS)
+    return _Layer(places.reshape(-1, 2), sizes, scene.look.mark - scene.look.face)

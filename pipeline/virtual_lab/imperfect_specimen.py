@@ -1,0 +1,134 @@
+"""Specimens of a structure as a lab has them: off their design, and driven as shakers drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from pipeline.posing import PosedStructure, drawn
+from pipeline.problem.sections import Making, Shaking
+from pipeline.runtime import UserError
+from sim.core import Numbers
+from sim.scene import Scene
+from sim.solvers import MotionLaw
+
+Floats = NDArray[np.float64]
+
+STREAM = 2
+"""First word of the seeds of all draws here, so that no predicted specimen equals one of them."""
+SAMPLES = 1001
+"""Of the planned motion, to find its largest displacement."""
+
+
+class Shaken(NamedTuple):
+    """A drive that is not quite the planned one (``sim.solvers.loads.MotionLaw``).
+
+    Attributes:
+        planned: the motion that was asked for.
+        place: (n_units, 2) of the driven units from their middle, mm.
+        largest: (2,) the planned motion's largest displacement, mm.
+        turning: when a static load is taken off again, s; past the end if it is not.
+        end: of the motion, s.
+        gain, turn, cross, tilt, drift, delay: see ``Shaking``.
+    """
+
+    planned: MotionLaw
+    place: Numbers
+    largest: Numbers
+    turning: float
+    end: float
+    gain: float
+    turn: float
+    cross: float
+    tilt: float
+    drift: Numbers
+    delay: float
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, n_units, 3) at the given times, s."""
+        since = jnp.maximum(jnp.asarray(times) - self.delay, 0.0)
+        planned = self.planned(jnp.minimum(since, 2 * self.turning - since))
+        amplitude = jnp.hypot(*self.largest)
+        along = jnp.asarray(self.largest) / amplitude
+        far = planned[:, :2] @ along / amplitude
+        bent = planned[:, :2] + self.cross * amplitude * far[:, None] ** 2 * _left(along)
+        path = self.gain * bent @ _turned(self.turn).T
+        path += jnp.asarray(times)[:, None] / self.end * jnp.asarray(self.drift)
+        angle = self.tilt * far
+        cos, sin = jnp.cos(angle)[:, None, None] - 1, jnp.sin(angle)[:, None, None]
+        place = jnp.asarray(self.place)
+        swung = cos * place + sin * _left(place)
+        rotation = jnp.broadcast_to((planned[:, 2] + angle)[:, None], swung.shape[:2])
+        return jnp.concatenate([path[:, None] + swung, rotation[..., None]], axis=2)
+
+
+def _left(vector: Array) -> Array:
+    """Vectors (..., 2) turned by a right angle counter-clockwise."""
+    return jnp.stack([-vector[..., 1], vector[..., 0]], axis=-1)
+
+
+def _turned(angle: float) -> Array:
+    cos, sin = jnp.cos(angle), jnp.sin(angle)
+    return jnp.array([[cos, -sin], [sin, cos]])
+
+
+def specimen(structure: PosedStructure, case: int, asked: Making, end: float) -> PosedStructure:
+    """A specimen of a structure under one of its load cases.
+
+    Args:
+        structure: as designed.
+        case: number of the load case.
+        asked: in what the specimen differs.
+        end: of its motion, s.
+
+    Raises:
+        UserError: its units would overlap.
+    """
+    scene, copy = drawn(*structure, asked, (STREAM, asked.seed))
+    if not copy.sound:
+        remedy = "give another seed, or smaller tolerances"
+        raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
+    made = replace(
+        scene,
+        lattice=replace(scene.lattice, vertices=copy.vertices),
+        motions=(shaken(scene, case, asked.drive, end, asked.unload),),
+        weights=np.ones(1),
+        duration=end,
+        frequency=None,
+        reference=None,
+        symmetry="none",
+    )
+    return PosedStructure(made, copy.vertices)
+
+
+def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) -> Shaken:
+    """The drive of a load case as the specimen has it.
+
+    Args:
+        scene: of the structure.
+        case: number of the load case.
+        asked: in what the drive differs.
+        end: of the motion, s.
+        unload: whether the load is taken off again in the second half.
+    """
+    planned = scene.motions[case]
+    path = np.asarray(planned(np.linspace(0, scene.duration, SAMPLES)))[:, :2]
+    site = scene.lattice.site[scene.driven]
+    return Shaken(
+        planned,
+        site - site.mean(axis=0),
+        path[np.hypot(*path.T).argmax()],
+        end / 2 if unload else end,
+        end,
+        asked.gain,
+        asked.turn,
+        asked.cross,
+        asked.tilt,
+        np.array(asked.drift),
+        asked.delay,
+    )

@@ -1,0 +1,202 @@
+"""What noise a planned set-up will have: short clips are rendered, tracked, and compared."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from pipeline.problem.sections import Codec, VirtualRecording
+from pipeline.runtime import Floats, Reals, UserError
+from pipeline.tracking.frames import frames
+from pipeline.tracking.motion import follow
+from pipeline.tracking.reference_frame import Setup
+from pipeline.virtual_lab.filming import Filming, of_case, prepared
+from pipeline.virtual_lab.video_writer import encode
+
+LEAST = 16
+RESTING = 6  # frames before the motion
+_DEG = 180 / np.pi
+
+
+class Choice(NamedTuple):
+    """One set-up: what is filmed and how."""
+
+    specimen: str
+    setup: VirtualRecording
+    pitch: float
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """The set-up in columns of a table."""
+        camera, codec = self.setup.camera, self.setup.codec
+        look = self.setup.look
+        markers = {"dots": look.dots.diameter, "speckle": look.speckle.diameter}
+        return {
+            "specimen": self.specimen,
+            "px_per_pitch": f"{self.pitch / camera.pixel_size:.3g}",
+            "mm_per_px": f"{camera.pixel_size:.3g}",
+            "image": "x".join(map(str, camera.image)),
+            "fps": f"{self.setup.rate:g}",
+            "codec": codec.name if codec.name == "ffv1" else f"{codec.name} crf {codec.crf}",
+            "marker_mm": f"{markers.get(self.specimen, 0):g}",
+        }
+
+
+class Expected(NamedTuple):
+    """What a set-up gives: errors and stated uncertainties (3,) in px, px and deg.
+
+    Attributes:
+        rmse: root mean square of the error of x, y and rotation.
+        sigma: median of the stated standard uncertainty.
+        lost: part of the units and frames that were not found.
+        pixel: size of a pixel, mm.
+    """
+
+    rmse: Floats
+    sigma: Floats
+    lost: float
+    pixel: float
+
+    @property
+    def words(self) -> Mapping[str, str]:
+        """The same in columns of a table."""
+        named = {"rmse": self.rmse, "sigma": self.sigma}
+        told: dict[str, str] = {}
+        for name, (x, y, turn) in named.items():
+            shift = np.hypot(x, y) / np.sqrt(2)
+            told |= {f"{name}_px": f"{shift:.3g}", f"{name}_mm": f"{shift * self.pixel:.3g}"}
+            told[f"{name}_deg"] = f"{turn:.3g}"
+        return told | {"lost_percent": f"{100 * self.lost:.3g}"}
+
+
+class Options(NamedTuple):
+    """Values to try in every combination; none leaves the base's own.
+
+    Attributes:
+        specimens: dots, speckle or bare.
+        scales: pixels per pitch; the image grows along.
+        rates: frames per second.
+        codecs: names, as for `codec`.
+        markers: diameters of dots or speckles, mm.
+    """
+
+    specimens: tuple[str, ...]
+    scales: tuple[float, ...]
+    rates: tuple[float, ...]
+    codecs: tuple[str, ...]
+    markers: tuple[float, ...]
+
+
+def choices(base: Choice, tried: Options) -> list[Choice]:
+    """Every combination of the options.
+
+    Raises:
+        UserError: a value that makes no sense.
+    """
+    for values in (tried.scales, tried.rates, tried.markers):
+        if any(not 0 < value < np.inf for value in values):
+            remedy = "give numbers greater than zero"
+            raise UserError("not a set-up that can be tried", value=list(values), remedy=remedy)
+    columns = (
+        tried.specimens or (base.specimen,),
+        tried.scales or (base.pitch / base.setup.camera.pixel_size,),
+        tried.rates or (base.setup.rate,),
+        [codec(name) for name in tried.codecs] or (base.setup.codec,),
+        tried.markers or (None,),
+    )
+    return [_chosen(base, *values) for values in itertools.product(*columns)]
+
+
+def codec(name: str) -> Codec:
+    """The codec of a name such as ffv1, h264, h264-intra or h264:28 (constant rate factor).
+
+    Raises:
+        UserError: no such name.
+    """
+    kind, _, quality = name.replace("-", " ").partition(":")
+    try:
+        return Codec.model_validate({"name": kind, "crf": int(quality or 14)})
+    except ValueError as error:
+        remedy = "give ffv1, h264, h264-intra, or with a rate factor from 0 to 51, as h264:28"
+        raise UserError("no such codec", key="--codec", value=name, remedy=remedy) from error
+
+
+def _chosen(
+    base: Choice, specimen: str, scale: float, rate: float, chosen: Codec, marker: float | None
+) -> Choice:
+    camera, look = base.setup.camera, base.setup.look
+    pixel = base.pitch / scale
+    image = tuple(2 * round(side * camera.pixel_size / pixel / 2) for side in camera.image)
+    if marker is not None:
+        look = look.model_copy(
+            update={
+                "dots": look.dots.model_copy(update={"diameter": marker}),
+                "speckle": look.speckle.model_copy(update={"diameter": marker}),
+            }
+        )
+    update = {
+        "camera": camera.model_copy(update={"pixel_size": pixel, "image": image}),
+        "rate": rate,
+        "codec": chosen,
+        "look": look,
+    }
+    return Choice(specimen, base.setup.model_copy(update=update), base.pitch)
+
+
+def expected(
+    response: xr.Dataset, structure: str, case: int, choice: Choice, count: int
+) -> Expected:
+    """Renders a clip of so many frames, tracks it, and compares with its truth.
+
+    Raises:
+        UserError: the response cannot be filmed so, or the units are not found.
+    """
+    if count < LEAST:
+        raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
+    one = of_case(response, structure, case)
+    film = prepared(one, structure, choice.specimen, _clip(choice.setup, count))
+    camera = choice.setup.camera
+    known = Setup(choice.setup.look.thickness, camera.distance)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"clip{choice.setup.codec.suffixes[0]}"
+        encode(path, film.images(), choice.setup.rate, choice.setup.codec, {})
+        units = film.scene.specimen
+        track = follow(frames(path), units, 1 / camera.pixel_size, setup=known)
+    return _compared(film, track.displacement, track.sigma)
+
+
+def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
+    """The set-up with a few frames at rest and then the motion's beginning."""
+    resting = min(RESTING, count // 2)
+    length = (count - resting) / setup.rate
+    end = setup.start + length
+    if setup.duration is None:
+        return setup.model_copy(update={"still": resting / setup.rate, "end": end})
+    return setup.model_copy(update={"still": resting / setup.rate, "duration": length})
+
+
+def _compared(film: Filming, found: Reals, sigma: Reals) -> Expected:
+    pixel = film.asked.camera.pixel_size
+    scale = np.array([1 / pixel, 1 / pixel, _DEG])
+    error = (found - film.motion.pose[: len(found)]) * scale
+    return Expected(
+        np.sqrt(np.nanmean(error**2, axis=(0, 1))),
+        np.nanmedian(sigma * scale, axis=(0, 1)),
+        float(np.isnan(error[..., 0]).mean()),
+        pixel,
+    )
+
+
+def table(rows: Sequence[Mapping[str, str]]) -> Iterator[str]:
+    """Lines of a table of words, in columns."""
+    names = list(rows[0])
+    width = {name: max(len(name), *(len(row[name]) for row in rows)) for name in names}
+    yield "  ".join(name.rjust(width[name]) for name in names)
+    for row in rows:
+        yield "  ".join(row[name].rjust(width[name]) for name in names)

@@ -1,0 +1,85 @@
+"""Writes frames as a video: the same frames give the same bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+
+from pipeline.problem.sections import Codec
+from pipeline.runtime import Image, write_atomically
+
+_TICKS = 90000  # per second: a usual clock of containers
+
+
+def encode(
+    path: Path, images: Iterable[Image], rate: float, codec: Codec, labels: dict[str, str]
+) -> None:
+    """Writes the video, whole or not at all.
+
+    Args:
+        path: the file; its name should have one of the codec's `suffixes`.
+        images: grey, (rows, columns), or in colour, (rows, columns, 3), which ffv1 does not take.
+        rate: frames per second.
+        codec: how to store them.
+        labels: metadata of the file: title, comment.
+    """
+    with (
+        write_atomically(path) as aside,
+        av.open(str(aside), "w", options={"fflags": "+bitexact"}) as container,
+    ):
+        container.metadata.update(labels)
+        _write(container, images, rate, codec)
+
+
+def _write(
+    container: av.container.OutputContainer, images: Iterable[Image], rate: float, codec: Codec
+) -> None:
+    stream = None
+    for index, image in enumerate(images):
+        lossless = codec.name == "ffv1"
+        planes = image if lossless else _planes(image)
+        if stream is None:
+            stream = _stream(container, planes, rate, codec)
+        frame = av.VideoFrame.from_ndarray(planes, format="gray" if lossless else "yuv420p")
+        frame.pts, frame.time_base = round(index * _TICKS / rate), Fraction(1, _TICKS)
+        container.mux(stream.encode(frame))
+    if stream is not None:
+        container.mux(stream.encode(None))
+
+
+def _planes(image: Image) -> Image:
+    """Brightness and, below it, colour at half the resolution; sides are made even."""
+    odd = [(0, side % 2) for side in image.shape[:2]] + [(0, 0)] * (image.ndim - 2)
+    even = np.pad(image, odd, mode="edge")
+    if even.ndim == 3:
+        return np.asarray(cv2.cvtColor(even, cv2.COLOR_RGB2YUV_I420), np.uint8)
+    grey = np.round(16 + even * (219 / 255)).astype(np.uint8)
+    colour = np.full((even.shape[0] // 2, even.shape[1]), 128, np.uint8)
+    return np.concatenate([grey, colour])
+
+
+def _stream(
+    container: av.container.OutputContainer, planes: Image, rate: float, codec: Codec
+) -> av.VideoStream:
+    lossless = codec.name == "ffv1"
+    stream = container.add_stream(
+        "ffv1" if lossless else "libx264", rate=Fraction(rate).limit_denominator(1001)
+    )
+    rows, stream.width = planes.shape
+    stream.height = rows if lossless else rows * 2 // 3
+    stream.time_base = Fraction(1, _TICKS)
+    stream.codec_context.time_base = stream.time_base
+    stream.pix_fmt = "gray" if lossless else "yuv420p"
+    stream.thread_count = 1
+    if not lossless:
+        steady = "mbtree=0:weightp=0"  # with these, x264 does not always give the same bytes
+        stream.options = {"crf": str(codec.crf), "preset": "medium", "x264-params": steady}
+        if codec.name == "h264 intra":
+            stream.options = {**stream.options, "g": "1"}
+    stream.codec_context.flags |= av.codec.context.Flags.bitexact
+    return stream

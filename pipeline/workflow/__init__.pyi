@@ -1,0 +1,1 @@
+from .movie_list import showing as showing

@@ -1,0 +1,56 @@
+"""The calibrations, as the workflow sees them: what each depends on.
+
+A calibration is a file experiments/calibration/NAME.yaml. It names measured files beside it, or
+tells how they are computed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from snakemake.iocontainers import Wildcards
+
+from pipeline.calibration.inputs import Calibration, TrackedMotion
+from pipeline.problem.reading import section
+from pipeline.runtime import ROOT, UserError
+
+_FOLDER = "experiments/calibration"
+
+
+def calibrations(root: Path = ROOT) -> list[str]:
+    """The names of all calibrations."""
+    return sorted(path.stem for path in (root / _FOLDER).glob("*.yaml"))
+
+
+def measurements(wildcards: Wildcards) -> dict[str, str]:
+    """The files that a fit depends on: its YAML, measured files and problems; or computed ones."""
+    source = f"{_FOLDER}/{wildcards.calibration}.yaml"
+    asked = _described(source)
+    if asked is not None and asked.virtual is not None:
+        folder = f"results/calibration/{wildcards.calibration}/data"
+        return {"folder": folder, **problems_of(wildcards)}
+    sets = asked.data if asked is not None else ()
+    named = {each.name: f"{_FOLDER}/{each.file}" for each in sets if each.file is not None}
+    return {"description": source, **named, **problems_of(wildcards)}
+
+
+def problems_of(wildcards: Wildcards) -> dict[str, str]:
+    """The problems of the studies that tracks are of, each by the name of its set."""
+    asked = _described(f"{_FOLDER}/{wildcards.calibration}.yaml")
+    sets = asked.data if asked is not None else ()
+    tracks = [each for each in sets if isinstance(each, TrackedMotion)]
+    return {f"problem_{each.name}": f"{_FOLDER}/{each.problem}" for each in tracks}
+
+
+def description(wildcards: Wildcards) -> str:
+    """The YAML that a fit takes."""
+    found = measurements(wildcards)
+    return found.get("description") or f"{found['folder']}/calibration.yaml"
+
+
+def _described(source: str) -> Calibration | None:
+    """The calibration; None for one that cannot be read, of which the stage will tell why."""
+    try:
+        return section(ROOT / source, Calibration)
+    except UserError:
+        return None

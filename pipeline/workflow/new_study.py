@@ -1,0 +1,129 @@
+"""Makes a study of one's own: a commented problem file that builds as it is."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import re
+import shutil
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from string import Template
+from textwrap import indent
+
+from pipeline.runtime import UserError, cli
+
+LOG = logging.getLogger(__name__)
+
+TEMPLATES = Path(__file__).parent / "templates"
+_DISC = "disc:\n  centre: centre\n  radius: 45 mm # 3 spacings"
+_SMALL_DISC = "disc:\n  radius: 18 mm"
+_IMAGE = (
+    "image: # what is dark on a light ground; PNG, JPG or SVG\n"
+    "  file: {file}\n"
+    "  width: 120 mm # 8 spacings; the height follows\n"
+    "  centre: centre # or [142.5 mm, 142.5 mm]\n"
+    "  orientation: 0 deg # counter-clockwise\n"
+    "loose: remove # units that the void cuts off from the rest; or refuse"
+)
+_SMALL_IMAGE = "image:\n  width: 45 mm"
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    made = cli.parser(
+        "pipeline.workflow.new_study",
+        "Make experiments/NAME/problem.yaml, commented and ready to build with `make NAME`.",
+        study=False,
+    )
+    made.add_argument("name", help="of the study: letters, digits and underscores")
+    made.add_argument(
+        "--kind",
+        choices=("static", "dynamic"),
+        default="static",
+        help="a void under slow compression, or a shaken unit (default: %(default)s)",
+    )
+    made.add_argument(
+        "--image", type=Path, metavar="FILE", help="shape of the void (PNG, JPG, SVG); is copied"
+    )
+    made.add_argument(
+        "--folder",
+        type=Path,
+        default=Path("experiments"),
+        help="where the studies are (default: %(default)s)",
+    )
+    return made
+
+
+def work(args: argparse.Namespace) -> None:
+    """Writes the study's folder, whole or not at all.
+
+    Raises:
+        UserError: a bad name, a study of that name, or an image that shows no shape.
+    """
+    from pipeline import problem
+
+    folder = args.folder / args.name
+    _check(args, folder)
+    aside = args.folder / f".{args.name}.part"
+    shutil.rmtree(aside, ignore_errors=True)
+    try:
+        aside.mkdir(parents=True)
+        if args.image is not None:
+            shutil.copyfile(args.image, aside / args.image.name)
+        made = aside / "problem.yaml"
+        made.write_text(text(args.name, args.kind, args.image), encoding="utf-8")
+        for preset in (None, "quick"):
+            problem.load(made, preset)
+        aside.rename(folder)
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+    LOG.info("made %s; a draft: make %s@quick", folder / "problem.yaml", args.name)
+
+
+def text(name: str, kind: str, image: Path | None) -> str:
+    """The problem file of a new study."""
+    if image is None:
+        void, small = _DISC, _SMALL_DISC
+    else:
+        void, small = _IMAGE.format(file=image.name), _SMALL_IMAGE
+    template = (TEMPLATES / f"{kind}.yaml").read_text(encoding="utf-8")
+    return Template(template).substitute(
+        name=name,
+        title=name.replace("_", " ").capitalize(),
+        void=indent(void, "  "),
+        quick=indent(small, "      "),
+    )
+
+
+def _check(args: argparse.Namespace, folder: Path) -> None:
+    if re.fullmatch(r"[A-Za-z]\w*", args.name, re.ASCII) is None:
+        remedy = "begin with a letter; use letters, digits and underscores"
+        raise UserError("not a name for a study", key="name", value=args.name, remedy=remedy)
+    if folder.exists():
+        remedy = "choose another name, or edit the problem file there"
+        raise UserError("there is a study of this name", file=folder, remedy=remedy)
+    if args.image is None:
+        return
+    if args.kind == "dynamic":
+        remedy = "leave --image out, or take --kind static"
+        raise UserError("the dynamic template has no void", key="--image", remedy=remedy)
+    if re.fullmatch(r"[\w.-]+", args.image.name) is None:
+        remedy = "rename it: letters, digits, and . - _ between them"
+        raise UserError("not a name for an image", file=args.image, remedy=remedy)
+    from pipeline.problem.outlines import ImageError, read_outlines
+
+    try:
+        read_outlines(args.image)
+    except ImageError as error:
+        raise UserError(error.what, file=args.image, remedy=error.remedy) from error
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return cli.run(work, parser(), argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

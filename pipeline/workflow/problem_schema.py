@@ -1,0 +1,88 @@
+"""The JSON schema of problem files, for editors that complete and check while one types."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.runtime import cli
+
+DEFAULT = Path("experiments/problem.schema.json")
+_OVERLAY = "Overlay"
+
+
+def schema() -> dict[str, Any]:
+    """The schema of a problem file, presets included."""
+    from pipeline.problem import Problem
+
+    whole = _without_working_units(Problem.model_json_schema(mode="validation"))
+    sections = whole.pop("$defs")
+    overlay = _overlaid({key: value for key, value in whole.items() if key != "title"})
+    overlays = {name + _OVERLAY: _overlaid(section) for name, section in sections.items()}
+    whole["properties"]["presets"] = {
+        "description": "keys laid over those above: mappings merge, others replace, null removes",
+        "type": "object",
+        "additionalProperties": {"$ref": f"#/$defs/Problem{_OVERLAY}"},
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **whole,
+        "$defs": {**sections, **overlays, f"Problem{_OVERLAY}": overlay},
+    }
+
+
+def text() -> str:
+    """The schema as it is committed."""
+    return json.dumps(schema(), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _without_working_units(node: Any) -> Any:  # noqa: ANN401  (any JSON)
+    """Defaults of quantities are floats in working units, which a file may not hold: leave them."""
+    if isinstance(node, list):
+        return [_without_working_units(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    hidden = "default" if node.get("type") == "string" and "examples" in node else None
+    return {key: _without_working_units(value) for key, value in node.items() if key != hidden}
+
+
+def _overlaid(node: Any) -> Any:  # noqa: ANN401  (any JSON)
+    """The schema of a part of what `node` describes: nothing is required, null removes a key."""
+    if isinstance(node, list):
+        return [_overlaid(item) for item in node]
+    if not isinstance(node, dict):
+        return f"{node}{_OVERLAY}" if str(node).startswith("#/$defs/") else node
+    part = {key: _overlaid(value) for key, value in node.items() if key not in _STRICT}
+    if "oneOf" in part:  # parts of several kinds of drive look alike
+        part["anyOf"] = part.pop("oneOf")
+    if part.get("additionalProperties") is False:  # of another kind, whose keys it removes
+        part["additionalProperties"] = {"type": "null"}
+    if isinstance(properties := part.get("properties"), dict):
+        part["properties"] = {
+            key: {"anyOf": [value, {"type": "null"}]} for key, value in properties.items()
+        }
+    return part
+
+
+_STRICT = ("required", "discriminator", "default")
+
+
+def _work(args: argparse.Namespace) -> None:
+    args.out.write_text(text(), encoding="utf-8")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the schema; returns the exit code."""
+    parser = cli.parser("pipeline.workflow.problem_schema", str(__doc__), study=False)
+    parser.add_argument(
+        "--out", type=Path, default=DEFAULT, help="the file to write (default: %(default)s)"
+    )
+    return cli.run(_work, parser, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,108 @@
+"""The recordings of the studies, as the workflow sees them: what each depends on.
+
+A recording is a file experiments/STUDY/recordings/NAME.yaml. It names a video beside it, or tells
+how the virtual lab films the study's own response.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from snakemake.iocontainers import Wildcards
+
+from pipeline.runtime import ROOT, UserError
+from pipeline.tracking.frames import Recording, load
+
+RECORDINGS = "_recordings"
+"""Ends the targets that render and track the recordings of a study."""
+
+
+def recording_pages(study: str, root: Path = ROOT) -> list[str]:
+    """The quality reports of all recordings of a study, such as fig2 or fig2@quick."""
+    folder = root / "experiments" / study.partition("@")[0] / "recordings"
+    names = sorted(path.stem for path in folder.glob("*.yaml"))
+    return [f"results/{study}/recordings/{name}/index.html" for name in names]
+
+
+def shown_recordings(study: str, root: Path = ROOT) -> list[str]:
+    """Names of the recordings that the report of a study, or of a preset of it, shows.
+
+    One that was filmed takes the place of those that are virtual and show the same structure under
+    the same load case. One that cannot be read is shown too: its stage will tell why.
+    """
+    name, _, preset = study.partition("@")
+    folder = root / "experiments" / name / "recordings"
+    found = {path.stem: _read(path) for path in sorted(folder.glob("*.yaml"))}
+    shown = {
+        stem: asked
+        for stem, asked in found.items()
+        if asked is None or not preset or preset in asked.presets
+    }
+    filmed = {_shows(asked) for asked in shown.values() if asked and asked.virtual is None}
+    return [
+        stem
+        for stem, asked in shown.items()
+        if asked is None or asked.virtual is None or _shows(asked) not in filmed
+    ]
+
+
+def _shows(asked: Recording) -> tuple[str, int]:
+    return asked.structure, asked.case
+
+
+def comparisons(wildcards: Wildcards) -> list[str]:
+    """The datasets of the recordings that the report of a study shows."""
+    study = f"{wildcards.name}{wildcards.preset}"
+    names = shown_recordings(study)
+    return [f"results/{study}/recordings/{name}/comparison.nc" for name in names]
+
+
+def compared(wildcards: Wildcards) -> dict[str, str]:
+    """The recording's YAML that a comparison depends on, as it is tracked."""
+    return {"recording": tracked(wildcards)["recording"]}
+
+
+def tracked(wildcards: Wildcards) -> dict[str, str]:
+    """The files that tracking a recording depends on: its YAML, video, design, load cell."""
+    asked = described(wildcards)
+    study = f"results/{wildcards.name}{wildcards.preset}"
+    if asked is None or asked.virtual is not None:
+        stem = f"{study}/recordings/{wildcards.recording}"
+        files = {
+            "recording": f"{stem}.yaml",
+            "video": f"{stem}.mp4",
+            "design": f"{study}/design.nc",
+        }
+        weighed = asked is not None and asked.virtual is not None and asked.virtual.load_cell
+        return files | {"load_cell": f"{stem}_load.csv"} if weighed else files
+    folder = Path(_source(wildcards)).parent
+    beside = {"video": asked.video, "design": asked.design}
+    if asked.load_cell is not None:
+        beside["load_cell"] = asked.load_cell.file
+    named = {key: str(folder / file) for key, file in beside.items() if file is not None}
+    return {"recording": _source(wildcards), "design": f"{study}/design.nc", **named}
+
+
+def filmed(wildcards: Wildcards) -> str:
+    """What a virtual recording shows: its specimen, or the study's own response."""
+    asked = described(wildcards)
+    study = f"results/{wildcards.name}{wildcards.preset}"
+    if asked is None or asked.virtual is None or asked.virtual.specimen is None:
+        return f"{study}/response.nc"
+    return f"{study}/recordings/{wildcards.recording}_specimen.nc"
+
+
+def described(wildcards: Wildcards) -> Recording | None:
+    """The recording; None for one that cannot be read, of which the stage will tell why."""
+    return _read(ROOT / _source(wildcards))
+
+
+def _read(path: Path) -> Recording | None:
+    try:
+        return load(path)
+    except UserError:
+        return None
+
+
+def _source(wildcards: Wildcards) -> str:
+    return f"experiments/{wildcards.name}/recordings/{wildcards.recording}.yaml"

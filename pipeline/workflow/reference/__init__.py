@@ -1,0 +1,1 @@
+"""Writes the pages of keys and datasets from their definitions."""

@@ -1,0 +1,185 @@
+"""Which studies and figures there are below experiments/, and what builds them.
+
+Nothing heavy is imported here: this is the time one waits for "nothing to be done".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from pipeline.problem import Problem
+from pipeline.problem.reading import joint_figure, load, overlaid, preset_names, yaml_file
+from pipeline.problem.sections import design_count, numbered
+from pipeline.runtime import ROOT, UserError
+from pipeline.workflow.movie_list import MOVIES
+from pipeline.workflow.recordings import RECORDINGS
+
+PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", RECORDINGS)
+"""Ends of the targets of a study beside its report."""
+ALL = "all"  # the target that builds every figure of the paper
+
+
+@dataclass(frozen=True, order=True)
+class Study:
+    """One study, with one preset of its problem file or with none ("")."""
+
+    name: str
+    preset: str = ""
+
+    @classmethod
+    def parse(cls, text: str) -> Study:
+        """Reads "fig2" or "fig2@edge3"."""
+        name, _, preset = text.partition("@")
+        return cls(name, preset)
+
+    def __str__(self) -> str:
+        return f"{self.name}@{self.preset}" if self.preset else self.name
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Names under which a command line may ask for the study."""
+        return (str(self), f"{self.name}_{self.preset}") if self.preset else (self.name,)
+
+    @property
+    def problem(self) -> str:
+        """Path of the problem file, from the root of the repository."""
+        return f"experiments/{self.name}/problem.yaml"
+
+    @property
+    def options(self) -> str:
+        """Options by which a stage finds the problem."""
+        return f"--problem {self.problem}" + (f" --preset {self.preset}" if self.preset else "")
+
+
+FRAMED = (Study("fig2"),)
+"""From which the framework is drawn, Figure 1."""
+
+
+@cache
+def families(root: Path = ROOT) -> Mapping[Study, list[Study]]:
+    """Every study below experiments/, each followed by its presets, with their several designs.
+
+    A file that is no YAML counts as a study without presets: the stage that reads it tells why.
+    """
+    found = {}
+    for path in sorted(root.glob("experiments/*/problem.yaml")):
+        content = yaml_file.skimmed(path)
+        presets = content.pop("presets", None)
+        for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
+            whole = overlaid(content, laid if isinstance(laid, dict) else {})
+            names = (numbered(str(preset), k + 1) for k in range(design_count(whole)))
+            study = Study(path.parent.name, str(preset))
+            found[study] = [Study(study.name, name) for name in names]
+    return found
+
+
+def studies(root: Path = ROOT) -> list[Study]:
+    """Every study with its presets and designs."""
+    return [each for study, designs in families(root).items() for each in (study, *designs)]
+
+
+@cache
+def joints(root: Path = ROOT) -> Mapping[str, list[Study]]:
+    """The studies of every figure of several, by target; with each preset that all of them have.
+
+    A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
+    """
+    found: dict[str, list[Study]] = {}
+    for path in sorted(root.glob("experiments/*/figure.yaml")):
+        name = path.parent.name
+        try:
+            members = joint_figure.load(path).studies
+        except UserError:
+            members = ()
+        presets = [set(preset_names(path.parents[1] / m / "problem.yaml")) for m in members]
+        for preset in ("", *sorted(set.intersection(*presets) if presets else ())):
+            found[str(Study(name, preset))] = [Study(member, preset) for member in members]
+    return found
+
+
+@cache
+def together() -> Mapping[str, list[Study]]:
+    """The studies of every page of several, by target."""
+    several = {str(study): designs for study, designs in families().items() if designs}
+    return {**joints(), **several}
+
+
+def targets() -> dict[str, str]:
+    """What every target builds: the folder of a study or of a figure of several."""
+    single = {target: str(study) for study in studies() for target in study.targets}
+    return single | {figure: figure for figure in together()}
+
+
+def figures() -> list[str]:
+    """The studies that are figures of the paper, by their names."""
+    return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
+
+
+def movies() -> dict[str, list[Study]]:
+    """The movies whose studies are there, with these studies."""
+    there = {study.name for study in studies()}
+    return {
+        name: [Study(each) for each in shown]
+        for name, shown in MOVIES.items()
+        if there.issuperset(shown)
+    }
+
+
+def asked_for(words: Collection[str]) -> list[Study]:
+    """The studies that the words of a command line name, by target or by a file of theirs.
+
+    A preset counts even if its problem file has none of that name: reading the problem tells so.
+    """
+    by_target = {target: study for study in studies() for target in study.targets}
+    names = {study.name for study in by_target.values()}
+    several = together()
+    words = [*words, *(figures() if ALL in words else ())]
+    words = [_without_product(word) for word in words]
+    found = [study for word in words for study in several.get(word, ())]
+    for word in words:
+        study = by_target.get(word) or Study.parse(word.removeprefix("results/").partition("/")[0])
+        if study.name in names:
+            found.append(study)
+    return found
+
+
+def _without_product(word: str) -> str:
+    return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
+
+
+def check_names(study: Study, root: Path = ROOT) -> None:
+    """Refuses names that targets and files cannot have: of the study, its preset, its recordings.
+
+    Raises:
+        UserError: one has more than letters, digits and underscores.
+    """
+    folder = root / "experiments" / study.name
+    preset = study.preset.partition(".")[0]
+    recordings = sorted((folder / "recordings").glob("*.yaml"))
+    named = [
+        ("a study", study.name, folder),
+        *([("a preset", preset, folder / "problem.yaml")] if preset else []),
+        *(("a recording", path.stem, path) for path in recordings),
+    ]
+    for what, name, path in named:
+        if not re.fullmatch(r"\w+", name):
+            raise UserError(
+                f"the name of {what} may have letters, digits and underscores only",
+                file=path.relative_to(root),
+                value=name,
+                remedy=f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}",
+            )
+
+
+@cache
+def problem_of(study: Study) -> Problem:
+    """The problem of a study.
+
+    Raises:
+        UserError: the problem file is wrong; tells where and what to do.
+    """
+    return load(study.problem, study.preset or None)

@@ -1,0 +1,5 @@
+"""Holds what all pages share: style, tables, options of commands."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

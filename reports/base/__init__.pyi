@@ -1,0 +1,9 @@
+from . import style as style
+from .command_options import drawn as drawn
+from .command_options import joined as joined
+from .csv_table import Table as Table
+from .style import ALTERED as ALTERED
+from .style import GREY as GREY
+from .style import INTACT as INTACT
+from .style import MM_PER_INCH as MM_PER_INCH
+from .style import PALE as PALE

@@ -1,1 +1,0 @@
-"""The page on benchmarks: run time against error, growth, what is skipped, optimisers, tracking."""

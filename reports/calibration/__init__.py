@@ -1,1 +1,0 @@
-"""Figures of calibrations: the fit beside the data, and what the data determine."""

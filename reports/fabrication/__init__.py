@@ -1,1 +1,0 @@
-"""The page of what is built: pictures of the written files, their list, and how to make them."""

@@ -1,0 +1,165 @@
+"""Facts that any design and any response have: evaluations, margins, gaps, overlaps, stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from pipeline.problem import Problem
+from reports.facts import measures
+from reports.facts.fact_records import Fact, number, percent, share, within
+from reports.study import RigidUnits
+
+JUMPED = 2
+"""Flag of a stable state that the path came to by a jump."""
+
+_MARGINS = {
+    "edge_length": "Edge lengths",
+    "block_angle": "Block angles",
+    "void_angle": "Void angles",
+    "convexity": "Convexity",
+    "gap": "Gaps",
+}
+
+
+def history_facts(design: xr.Dataset) -> Iterator[Fact]:
+    """Evaluations, best feasible loss and optimality of every method."""
+    for method in design["method"].values:
+        history = design.sel({"method": method})
+        loss = history["loss"].values
+        count, best = int(np.isfinite(loss).sum()), float(history["best_loss"])
+        name, at = str(method).upper(), int(history["best_evaluation"])
+        unit = design["best_loss"].attrs["units"]
+        soon = measures.first_within(loss[:count], best, 0.9)
+        note = f"best feasible after {at}, 90 % of the way after {soon}"
+        yield number(f"evaluations_{method}", f"Evaluations, {name}", count, note=note)
+        note = "shipped" if method == design.attrs.get("shipped_method") else "not shipped"
+        label = f"Best feasible loss, {name}"
+        yield number(f"best_{method}", label, best, unit, digits=3, note=note)
+        violation = float(history["violation"].isel(evaluation=at))
+        label = f"Largest constraint violation of it, {name}"
+        yield number(f"violation_{method}", label, violation, digits=2, note="scaled; 0: feasible")
+        residual = float(history["kkt_residual"])
+        yield number(f"kkt_{method}", f"KKT residual, {name}", residual, digits=2)
+
+
+def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
+    """What the solver's tolerance leaves of errors."""
+    for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
+        value = float(response[key].max())
+        yield Fact(
+            key, f"Estimated error of the {label}", value, "1", within(value, "1", 2), note=note
+        )
+
+
+def bias_fact(initial: RigidUnits) -> Fact:
+    """How far the units are turned at rest in the initial design."""
+    arm = initial.vertices[0, 0] - initial.site[0]
+    bias = abs(float(np.degrees(np.arctan2(arm[1], arm[0]))))
+    note = "measured on the initial design"
+    return number("bias", "Angle bias θ₀", bias, "deg", note=note)
+
+
+def design_facts(design: xr.Dataset) -> Iterator[Fact]:
+    """Margins of the constraints, gaps and overlaps of the design at rest."""
+    margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
+    for name, margin in margins:
+        label = f"{_MARGINS[str(name)]}: margin to the bound"
+        length, left = str(name) in {"edge_length", "gap"}, settled(float(margin))
+        value = left if length else float(np.degrees(left))
+        note = "smallest of the design at rest; 0 is active, negative violated"
+        yield number(f"margin_{name}", label, value, "mm" if length else "deg", digits=3, note=note)
+    rest, gap = "at rest, by geometry", float(design["smallest_gap"])
+    yield number("gap", "Smallest gap between units", gap, "mm", digits=3, note=rest)
+    yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)
+
+
+def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
+    """Voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
+    for name in (str(name) for name in response["structure"].values):
+        part = response.sel(structure=name)
+        void, gap = float(np.degrees(part["min_void_angle"].min())), float(part["min_gap"].min())
+        label = f"Smallest void angle, {name}"
+        yield number(f"void_angle_{name}", label, void, "deg", digits=3, note="of all loads")
+        note = "of all loads, by geometry"
+        yield number(f"gap_{name}", f"Smallest gap, {name}", gap, "mm", digits=3, note=note)
+        crossed = int(part["overlaps"].max())
+        yield number(f"overlaps_{name}", f"Overlapping pairs, {name}, most", crossed, note=note)
+        touching, when = part["contact_pairs"], "at any time"
+        if problem.static:
+            touching, when = touching.isel(time=-1), "at the end of the path"
+        label = f"Pairs in contact, {name}"
+        yield number(f"contact_pairs_{name}", label, int(touching.max()), note=when)
+        yield from stability_facts(name, part)
+        yield _shim_strain(problem, name, part)
+
+
+def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
+    """Equilibria of a structure (its name in words) that are not stable, or reached by a jump."""
+    flags = part["stability"].values
+    key = name.replace(" ", "_")
+    if (flags >= 0).any():
+        label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
+        note = f"of {flags.size}; where the tangent is not positive definite"
+        yield number(f"unstable_{key}", label, count, note=note)
+        label, count = f"Jumps to another branch, {name}", int((flags == JUMPED).sum())
+        note = "loads reached only past a limit point or a branching"
+        yield number(f"jumps_{key}", label, count, note=note)
+
+
+def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
+    """Largest strain of a shim as a foil bent by the turn of its ends, against the limit."""
+    length, limit = problem.lattice.ligament_length, problem.report.shim_strain_limit
+    slenderness = problem.fabrication.shims.thickness / length
+    stretch, shear, bend = (
+        float(part[each].max()) for each in ("max_stretch", "max_shear", "max_bend")
+    )
+    strain = beam_strain(stretch, 0.0, bend, slenderness)
+    whole = beam_strain(stretch, shear, bend, slenderness)
+    note = (
+        f"foil of {problem.fabrication.shims.thickness:g} mm, stretched by {percent(stretch)} and "
+        f"bent by {np.degrees(bend):.3g}°; up to {percent(whole)} where the shear of "
+        f"{np.degrees(shear):.3g}° bends it too; limit {percent(limit)}: "
+        + ("kept" if strain <= limit else "exceeded")
+    )
+    return share(f"shim_strain_{name}", f"Largest shim strain, {name}", strain, note=note)
+
+
+def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -> float:
+    """Largest strain of a beam (Euler-Bernoulli) whose ends turn against each other and its chord.
+
+    Args:
+        stretch: of its axis.
+        shear: angle of the chord from the mean of both ends, rad; it bends the ends by 6 times.
+        bend: relative turn of the ends, rad.
+        slenderness: thickness over length.
+    """
+    return stretch + slenderness / 2 * (bend + 6 * shear)
+
+
+def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
+    """Losses of the design with finer load steps and under another contact law."""
+    if verification is None:
+        return
+    unit = verification["loss"].attrs["units"]
+    as_run = verification.isel(check=0).sel(structure="cloaked")
+    for name in (str(name) for name in verification["check"].values[1:]):
+        found = verification.sel(check=name, structure="cloaked")
+        key, loss = name.replace(" ", "_"), float(found["loss"])
+        if str(found["status"].item()) != "ok":
+            label = f"Loss, cloaked, {name}"
+            yield Fact(f"check_{key}", label, np.nan, unit, "—", note=str(found["status"].item()))
+            continue
+        note = (
+            f"{percent(loss / float(as_run['loss']) - 1)} against the run; units at equal loads "
+            f"{within(float(found['departure']), 'mm', 2)} apart; "
+            f"{int(found['contact_pairs'])} pairs in contact at full load"
+        )
+        yield number(f"check_{key}", f"Loss, cloaked, {name}", loss, unit, digits=3, note=note)
+
+
+def settled(margin: float) -> float:
+    """Margins within the optimiser's tolerance count as active."""
+    return 0.0 if abs(margin) < 1e-5 else margin

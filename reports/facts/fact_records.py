@@ -1,0 +1,123 @@
+"""A fact: one number of a report, beside the number that the paper quotes, and where it is from."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from difflib import get_close_matches
+from pathlib import Path
+
+from pipeline.problem.sections import Paper
+from pipeline.runtime import UserError
+from reports.base import Table
+
+ABSENT = "—"
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One line of a table of facts.
+
+    `value` is in `unit` ("1" if it has none, "%" for a share in hundredths); `ours` and `paper` are
+    the same numbers in words, `paper` a dash where it quotes none.
+    """
+
+    key: str
+    label: str
+    value: float
+    unit: str
+    ours: str
+    paper: str = ABSENT
+    note: str = ""
+    group: str = ""
+
+
+def number(
+    key: str,
+    label: str,
+    value: float,
+    unit: str = "1",
+    *,
+    digits: int = 4,
+    paper: str = ABSENT,
+    note: str = "",
+) -> Fact:
+    """Fact whose wording is the value to `digits` significant digits and its unit."""
+    return Fact(key, label, value, unit, worded(value, unit, digits), paper, note)
+
+
+def share(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
+    """Fact of a share given as a fraction of one, shown in per cent to a tenth."""
+    return Fact(key, label, 100.0 * value, "%", percent(value), paper, note)
+
+
+def quoted(facts: Sequence[Fact], paper: Paper | None) -> list[Fact]:
+    """The facts with the words that a publication uses for them; without one, with none.
+
+    Raises:
+        UserError: the publication's words are for a fact that there is not.
+    """
+    if paper is None:
+        return [replace(fact, paper=ABSENT) for fact in facts]
+    known = {fact.key for fact in facts}
+    for key in paper.values:
+        if key not in known:
+            near = get_close_matches(key, known, n=1)
+            hint = f"did you mean {near[0]!r}? " if near else ""
+            remedy = f"{hint}the facts here: {', '.join(sorted(known))}"
+            raise UserError("no such fact", key=f"report.paper.values.{key}", remedy=remedy)
+    return [replace(fact, paper=paper.values.get(fact.key, fact.paper)) for fact in facts]
+
+
+def grouped(group: str, facts: Iterable[Fact]) -> list[Fact]:
+    """The same facts under one heading."""
+    return [replace(fact, group=group) for fact in facts]
+
+
+def within(value: float, unit: str, digits: int) -> str:
+    """Wording of an error (not negative): one too small to mean more is told as a bound."""
+    return worded(value, unit, digits) if value >= 1e-9 else f"below {worded(1e-9, unit, 1)}"
+
+
+def worded(value: float, unit: str, digits: int) -> str:
+    """Number and unit as they are printed; tiny rounding leftovers are zero."""
+    text = "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        text = f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}"
+    text = text.replace("-", "−")
+    return text + {"1": "", "deg": "°"}.get(unit, f" {unit}")
+
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def percent(value: float) -> str:
+    """Fraction of one as per cent to a tenth."""
+    return f"{100 * value:.1f} %".replace("-0.0 ", "0.0 ").replace("-", "−")
+
+
+def write_json(facts: Sequence[Fact], path: Path) -> None:
+    """Facts as a list of objects, in the order of the table; a value that is not finite is null."""
+    records = [
+        asdict(fact) | {"value": fact.value if math.isfinite(fact.value) else None}
+        for fact in facts
+    ]
+    path.write_text(json.dumps(records, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+
+
+def read_json(path: Path) -> list[Fact]:
+    """Facts as they were written; a value that was not finite is NaN."""
+    records = json.loads(path.read_text(encoding="utf-8"))
+    return [
+        Fact(**(record | {"value": math.nan if record["value"] is None else record["value"]}))
+        for record in records
+    ]
+
+
+def table(facts: Sequence[Fact]) -> Table:
+    """Facts as a table, one a line."""
+    columns = {entry.name: [getattr(fact, entry.name) for fact in facts] for entry in fields(Fact)}
+    return Table("facts.csv", "the numbers above", columns)

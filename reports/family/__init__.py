@@ -1,1 +1,0 @@
-"""Report of several designs of one problem on one page."""

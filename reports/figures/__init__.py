@@ -1,0 +1,5 @@
+"""Builds the figures of the paper and of studies like them."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+from . import kinds as kinds

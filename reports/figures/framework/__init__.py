@@ -1,0 +1,1 @@
+"""Draws Figure 1: the framework as a schematic."""

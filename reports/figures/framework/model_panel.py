@@ -1,0 +1,119 @@
+"""The model of one ligament between two rigid units, from the geometry of a design."""
+
+from __future__ import annotations
+
+import matplotlib.patheffects as effects
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Arc, FancyArrowPatch, Polygon
+from numpy.typing import NDArray
+
+from reports.base import style
+from reports.study import RigidUnits
+
+Array = NDArray[np.float64]
+
+TINT = "#dfe3e7"
+_HALO: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.2, foreground="white")]
+
+
+def ligament_panel(axes: Axes, structure: RigidUnits, ligament: int) -> None:
+    """Two units, the springs between them, their degrees of freedom and the angle of contact."""
+    units, corners = structure.ligament_unit[ligament], structure.ligament_vertex[ligament]
+    shapes = [structure.vertices[unit] for unit in units]
+    ends = np.array([shape[corner] for shape, corner in zip(shapes, corners, strict=True)])
+    for shape in shapes:
+        known = shape[~np.isnan(shape[:, 0])]
+        axes.add_patch(Polygon(known, facecolor=TINT, edgecolor=style.INTACT, lw=0.7, zorder=2))
+    for unit in units:
+        _freedoms(axes, structure.centroid[unit])
+    _springs(axes, ends)
+    _contact(axes, shapes, corners, ends)
+    low, high = np.nanmin(shapes, axis=(0, 1)) - 1.6, np.nanmax(shapes, axis=(0, 1)) + 1.6
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_axis_off()
+
+
+def _freedoms(axes: Axes, centre: Array) -> None:
+    """Arrows of u_x, u_y and theta at a unit's centroid."""
+    for way, name in (((2.3, 0.0), "$u_x$"), ((0.0, 2.3), "$u_y$")):
+        _arrow(axes, centre, centre + np.array(way))
+        x, y = centre + 1.28 * np.array(way)
+        axes.text(x, y, name, fontsize=style.SMALL, ha="center", va="center", zorder=8)
+    axes.add_patch(
+        Arc(
+            (float(centre[0]), float(centre[1])), 2.6, 2.6, theta1=150, theta2=300, lw=0.7, zorder=6
+        )
+    )
+    axes.text(
+        centre[0] - 1.9, centre[1] - 1.3, r"$\theta$",
+        fontsize=style.SMALL, ha="center", va="center", zorder=8,
+    )  # fmt: skip
+
+
+def _springs(axes: Axes, ends: Array) -> None:
+    """The ligament as a spring, and its three stiffnesses."""
+    along = ends[1] - ends[0]
+    length = float(np.linalg.norm(along))
+    across = np.array([-along[1], along[0]]) / length
+    part = np.linspace(0.0, 1.0, 9)
+    swing = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.45
+    line = ends[0] + part[:, None] * along + swing[:, None] * across
+    axes.plot(*line.T, color=style.CLOAKED, lw=1.0, zorder=5)
+    axes.plot(*ends.T, "o", color=style.CLOAKED, ms=2.4, zorder=6)
+    x, y = ends.mean(axis=0) - 2.6 * across
+    text = axes.text(
+        x,
+        y,
+        r"$k_\ell,\ k_s,\ k_\theta$", color=style.CLOAKED,
+        fontsize=style.TEXT, ha="center", va="center", zorder=8,
+    )  # fmt: skip
+    text.set_path_effects(_HALO)
+
+
+def _contact(axes: Axes, shapes: list[Array], corners: Array, ends: Array) -> None:
+    """The angle of the void above the ligament, at which units come to touch."""
+    sides = []
+    for shape, corner, end in zip(shapes, corners, ends, strict=True):
+        known = shape[~np.isnan(shape[:, 0])]
+        near = [known[(corner + step) % len(known)] - end for step in (-1, 1)]
+        sides.append(max(near, key=lambda side: float(side[1])))
+    middle = ends.mean(axis=0)
+    angles = sorted(float(np.degrees(np.arctan2(side[1], side[0]))) for side in sides)
+    axes.add_patch(
+        Arc(
+            (float(middle[0]), float(middle[1])),
+            7.0,
+            7.0,
+            theta1=angles[0],
+            theta2=angles[1],
+            color=style.ALTERED,
+            lw=1.0,
+            zorder=6,
+        )
+    )
+    at = np.radians(np.mean(angles))
+    x, y = middle + 8.4 * np.array([np.cos(at), np.sin(at)])
+    text = axes.text(
+        x,
+        y,
+        r"contact: $\varphi$",
+        color=style.ALTERED, fontsize=style.TEXT, ha="center", va="center", zorder=8,
+    )  # fmt: skip
+    text.set_path_effects(_HALO)
+
+
+def _arrow(axes: Axes, start: Array, end: Array) -> None:
+    axes.add_patch(
+        FancyArrowPatch(
+            (float(start[0]), float(start[1])),
+            (float(end[0]), float(end[1])),
+            arrowstyle="-|>",
+            mutation_scale=5.0,
+            shrinkA=0,
+            shrinkB=0,
+            lw=0.7,
+            color=style.INTACT,
+            zorder=6,
+        )
+    )

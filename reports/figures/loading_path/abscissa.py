@@ -1,0 +1,108 @@
+"""The path along which a report shows its structures, and what it shows of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from pipeline.problem.sections import Kagome, Lattice, Quads
+
+Array = NDArray[np.float64]
+
+ORDER = ("intact", "altered", "cloaked")
+SECOND = "Cloaked, no overlap"
+"""What a figure calls the design for contact on distance."""
+
+
+@dataclass(frozen=True)
+class Abscissa:
+    """Where along the path every sample of a response lies.
+
+    `values` (n_times,) is the displacement of the driven units along the drive in mm, or the time
+    in s; `strain` is a paper's label of the last value (a fraction of one), `shown` are the samples
+    of the snapshots.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    values: Array
+    static: bool
+    strain: float | None
+    shown: tuple[int, ...]
+
+    @property
+    def label(self) -> str:
+        """Of an axis."""
+        return f"{self.name} {self.symbol} ({self.unit})"
+
+    def at(self, sample: int) -> str:
+        """The value at a sample in words, with the paper's label of it."""
+        words = f"{self.values[sample]:.3g} {self.unit}"
+        if self.strain is None:
+            return words
+        share = 100.0 * self.strain * self.values[sample] / self.values[-1]
+        return f"{words} ({share:.2g} %)"
+
+
+def course(problem: Problem, response: xr.Dataset) -> Abscissa:
+    """The path of a response."""
+    static = problem.static
+    values = driven_displacement(response) if static else response["time"].values
+    paper = problem.report.paper
+    return Abscissa(
+        name="Applied displacement" if static else "Time",
+        symbol="$u$" if static else "$t$",
+        unit="mm" if static else "s",
+        values=values,
+        static=static,
+        strain=None if paper is None or not static else paper.strain,
+        shown=_samples(values, problem.report.snapshots if static else problem.report.instants),
+    )
+
+
+def driven_displacement(response: xr.Dataset, case: int = 0) -> Array:
+    """Displacement (n_times,) of the driven units along the drive's direction, mm."""
+    motion = response["displacement"].isel(structure=0, case=case)
+    driven = response["support"].values == 2
+    angle = np.radians(float(response["direction"][case]))
+    mean = motion.isel(unit=driven).mean("unit")
+    along = np.cos(angle) * mean.sel(dof="ux") + np.sin(angle) * mean.sel(dof="uy")
+    return np.asarray(along.values, dtype=float)
+
+
+def _samples(values: Array, wanted: tuple[float, ...]) -> tuple[int, ...]:
+    """Samples nearest to the wanted values; at thirds of the way where none are."""
+    targets = wanted or tuple(np.linspace(values[0], values[-1], 4))
+    found = (int(np.argmin(np.abs(values - target))) for target in targets)
+    return tuple(dict.fromkeys(found))
+
+
+def structures(response: xr.Dataset) -> tuple[str, ...]:
+    """Names of the structures of a response, in the order in which they are shown."""
+    held = {str(name) for name in response["structure"].values}
+    return tuple(name for name in ORDER if name in held)
+
+
+def display_name(problem: Problem, structure: str) -> str:
+    """What a figure calls a structure."""
+    if structure != "altered":
+        return structure.capitalize()
+    if getattr(problem, "void", None) is not None:
+        return "Voided"
+    if getattr(problem, "inclusion", None) is not None:
+        return "Stiffened"
+    return "Uncloaked"
+
+
+def lattice_size(lattice: Lattice) -> str:
+    """How many units a lattice has, in words."""
+    if isinstance(lattice, Quads):
+        return f"{lattice.columns} × {lattice.rows}"
+    if isinstance(lattice, Kagome):
+        return f"2 × {lattice.columns} × {lattice.rows}"
+    return f"{lattice.n_units}"

@@ -1,0 +1,85 @@
+"""Both laws of contact: every structure under either, and the design for contact on distance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+
+from reports.facts import Fact, number, percent, share, stability_facts, worded
+from reports.figures.loading_path import measures
+from reports.figures.loading_path.abscissa import structures
+from reports.figures.loading_path.curves import over_cases
+from reports.study import RedesignResults, StudyResults
+
+
+def contact_facts(study: StudyResults) -> Iterator[Fact]:
+    """Loss, overlaps and gap of every structure under either law; then the second design's.
+
+    None of a motion in time, which is run under one law.
+    """
+    if not study.problem.static:
+        return
+    names = [name for name in structures(study.response) if name != "intact"]
+    yield from _by_law(study.response, names)
+    if study.again is not None:
+        yield from _again(study, study.again)
+
+
+def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iterator[Fact]:
+    losses = response["loss_by_contact"].mean("case")
+    unit = response["loss_by_contact"].attrs["units"]
+    for name in names:
+        for law in (str(law) for law in response["contact_law"].values):
+            part = response.sel(structure=name, contact_law=law)
+            loss = float(losses.sel(structure=name, contact_law=law))
+            key = f"contact_{law}_{whose or name}"
+            label = f"Loss, {name}{whose and ', second design'}, contact by the {law} law"
+            if np.isnan(loss):
+                yield Fact(key, label, loss, unit, "—", note="no result")
+                continue
+            count = int(part["overlaps_by_contact"].max())
+            gap = worded(float(part["gap_by_contact"].min()), "mm", 2)
+            note = f"{overlapping(count)}, smallest gap {gap}, by geometry"
+            if law != "angle":
+                change = loss / float(losses.sel(structure=name, contact_law="angle")) - 1.0
+                note = f"{percent(change)} against the angle law; {note}"
+            yield number(key, label, loss, unit, digits=3, note=note)
+
+
+def overlapping(count: int) -> str:
+    """Number of pairs of units that overlap, in words."""
+    if count == 0:
+        return "none overlap"
+    return "1 pair of units overlaps" if count == 1 else f"{count} pairs of units overlap"
+
+
+def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
+    """The design for contact on distance, in a lattice that obeys it too."""
+    note = "for contact on distance, so that no units overlap"
+    words = "the same: its losses by both laws are alike"
+    if again.changed:
+        words = f"optimised again, {again.evaluations} evaluations"
+    yield Fact("second_design", "Second design", np.nan, "1", words, note=note)
+    if again.changed:
+        yield from _by_law(again.response, ["cloaked"], "second")
+    loss = over_cases(study.problem, again.response["loss"])
+    start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
+    note = "from that of the altered lattice, both with contact on distance"
+    yield share("second_loss_reduction", "Its loss reduced by", 1.0 - end / start, note=note)
+    measure = measures.measure_of(study.problem)
+    values = over_cases(study.problem, measure.of(again.response)).isel(time=-1)
+    altered, cloaked = (float(values.sel(structure=name)) for name in ("altered", "cloaked"))
+    note = f"from {worded(altered, measure.unit, 3)} to {worded(cloaked, measure.unit, 3)}"
+    label = f"Its {measure.label[0].lower()}{measure.label[1:]} reduced by"
+    yield share(f"second_{measure.key}_reduction", label, 1.0 - cloaked / altered, note=note)
+    part = again.response.sel(structure="cloaked")
+    gap = worded(float(part["min_gap"].min()), "mm", 2)
+    note = f"the most of all loads, by geometry; smallest gap {gap}"
+    yield number("second_overlaps", "Its overlapping pairs", int(part["overlaps"].max()), note=note)
+    yield from stability_facts("second design", part)
+    history = again.design.isel(method=0)
+    violation = float(history["violation"].isel(evaluation=int(history["best_evaluation"])))
+    label = "Its largest constraint violation"
+    yield number("second_violation", label, violation, digits=2, note="scaled; 0: feasible")

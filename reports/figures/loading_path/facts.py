@@ -1,0 +1,224 @@
+"""The numbers of a report along a path, each computed from the datasets.
+
+A publication's words for them stand in the problem, under `report.paper.values`, by their key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.comparison import middle_units
+from pipeline.problem import Problem
+from pipeline.problem.sections import HarmonicDrive, Lattice, Quads, RampHarmonicDrive, Region
+from reports.facts import Fact, checks, grouped, number, recording_facts, share, worded
+from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
+from reports.figures.loading_path.abscissa import (
+    Abscissa,
+    course,
+    display_name,
+    lattice_size,
+    structures,
+)
+from reports.figures.loading_path.curves import over_cases
+from reports.study import StudyResults, from_dataset
+
+
+def loading_path_facts(study: StudyResults) -> list[Fact]:
+    """All facts, under headings."""
+    path = course(study.problem, study.response)
+    return [
+        *grouped("Scene", scene_facts(study, path)),
+        *grouped("Result", measure_facts(study, path)),
+        *grouped("Measured", measured.measured_facts(study, path)),
+        *recording_facts.recorded_facts(study.recordings),
+        *grouped("Loss", loss_facts(study)),
+        *grouped("Lateral contraction", contraction_facts(study, path)),
+        *grouped("Reaction", reaction_facts(study, path)),
+        *grouped("Optimisation", checks.history_facts(study.design)),
+        *grouped("Checks of the design", checks.design_facts(study.design)),
+        *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
+        *grouped("Contact", contact_comparison.contact_facts(study)),
+        *grouped("Load steps", checks.variant_facts(study.verification)),
+        *grouped("Imperfect copies", robustness_facts(study)),
+    ]
+
+
+def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    """The problem as it was run."""
+    problem, response = study.problem, study.response
+    lattice, paper = problem.lattice, problem.report.paper
+    if paper is not None and paper.variant:
+        note = f"the set of values that was run, of Figure {paper.figure}"
+        yield Fact("variant", "Values", np.nan, "1", paper.variant, note=note)
+    initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
+    yield Fact("units", "Units", lattice.n_units, "1", lattice_size(lattice))
+    yield number("spacing", "Spacing s", lattice.spacing, "mm")
+    if isinstance(lattice, Quads):
+        yield checks.bias_fact(initial)
+    yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
+    removed = initial.n_units - int(from_dataset(study.design, lattice.spacing).present.sum())
+    if removed:
+        yield number("removed_units", "Units removed", removed)
+    yield number("cloak_units", "Units redesigned", int((response["region"] == 1).sum()))
+    yield number("interest_units", "Units of interest", int(response["roi"].sum()))
+    yield from _radii(problem)
+    if path.static:
+        yield _displacement_fact(path)
+        yield _strain_fact(lattice, path)
+        count = problem.horizon.steps or problem.horizon.samples
+        yield number("load_steps", "Loads in the loss", count, note="equally spaced")
+    else:
+        yield from _drive_facts(problem)
+        yield number("horizon", "Loss taken over", problem.horizon_time, "s")
+
+
+def _radii(problem: Problem) -> Iterator[Fact]:
+    """How far round regions reach."""
+    spacing = problem.lattice.spacing
+    for key, label, region in (
+        ("interest_radius", "Radius of the region of interest", problem.objective.region),
+        ("void_radius", "Radius of the void", problem.void),
+        ("cloak_radius", "Radius of the cloak", problem.cloak),
+    ):
+        bounds = region.bounds if isinstance(region, Region) else None
+        if bounds is not None:
+            yield number(key, label, bounds[2], "mm", note=f"{bounds[2] / spacing:.4g} s")
+    width = _cloak_width(problem)
+    if width is not None:
+        yield number(
+            "cloak_width", "Width of the cloak", width, "mm", note=f"{width / spacing:.4g} s"
+        )
+
+
+def _cloak_width(problem: Problem) -> float | None:
+    """Of a cloak around something round, mm."""
+    if problem.cloak.around is not None:
+        return problem.cloak.around.distance
+    cloak = problem.cloak.bounds
+    if cloak is None:
+        return None
+    within = (problem.void, problem.objective.region)
+    rounds = [region.bounds for region in within if isinstance(region, Region)]
+    inner = max([cloak[1], *(bounds[2] for bounds in rounds if bounds is not None)])
+    return cloak[2] - inner if inner > 0 else None
+
+
+def _displacement_fact(path: Abscissa) -> Fact:
+    note = "of the driven units, along the drive"
+    if path.strain is not None:
+        note += f"; the paper labels it ε = {100 * path.strain:g} %"
+    return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
+
+
+def _strain_fact(lattice: Lattice, path: Abscissa) -> Fact:
+    across = [x for _, x, _ in lattice.sites()]
+    span = max(across) - min(across)
+    note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost columns"
+    return share("strain", "Compression", float(path.values[-1]) / span, note=note)
+
+
+def _drive_facts(problem: Problem) -> Iterator[Fact]:
+    """Of a harmonic drive."""
+    if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
+        yield number("amplitude", "Amplitude A", problem.drive.amplitude, "mm")
+        yield number("frequency", "Frequency f", problem.drive.frequency, "Hz")
+
+
+def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    """The measure at the end of the path, and its reduction by the cloak."""
+    measure = measures.measure_of(study.problem)
+    values = over_cases(study.problem, measure.of(study.response))
+    where = f"at {path.at(-1)}" if path.static else "at the end"
+    for name in ("altered", "cloaked"):
+        label = f"{measure.label}, {display_name(study.problem, name).lower()}"
+        end = float(values.sel(structure=name).isel(time=-1))
+        yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=where)
+    altered, cloaked = (values.sel(structure=name) for name in ("altered", "cloaked"))
+    gain = 1.0 - cloaked / altered
+    label = f"{measure.label} reduced by"
+    yield share(f"{measure.key}_reduction", label, float(gain.isel(time=-1)), note=where)
+    second_half = gain.isel(time=slice(gain.sizes["time"] // 2, None))
+    note = "the least over the second half of the path"
+    yield share(
+        f"{measure.key}_reduction_least", f"{label}, at least", float(second_half.min()), note=note
+    )
+    note = "the largest on the whole path"
+    yield number(
+        f"{measure.key}_cloaked_most",
+        f"{measure.label}, cloaked, at most",
+        float(cloaked.max()),
+        measure.unit,
+        digits=3,
+        note=note,
+    )
+
+
+def loss_facts(study: StudyResults) -> Iterator[Fact]:
+    """The loss that was minimised, before and after."""
+    unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
+    loss = over_cases(study.problem, study.response["loss"])
+    start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
+    for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
+        label = f"Loss, {display_name(study.problem, name).lower()}"
+        yield number(f"loss_{key}", label, value, unit, digits=3)
+    yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
+    yield from checks.error_facts(study.response, "relative; the largest of all structures")
+
+
+def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    """Change of the vertical distance between top and bottom rows."""
+    if not path.static:
+        return
+    nearer = over_cases(study.problem, measures.contraction(study.problem, study.response)).isel(
+        time=-1
+    )
+    count = len(middle_units(study.problem, "top"))
+    note = f"loss of distance between top and bottom rows, mean of the middle {count} units"
+    for name in structures(study.response):
+        label = f"Contraction, {display_name(study.problem, name).lower()}"
+        value = float(nearer.sel(structure=name))
+        yield number(f"contraction_{name}", label, value, "mm", digits=3, note=note)
+    if "intact" in structures(study.response):
+        intact = float(nearer.sel(structure="intact"))
+        for name in ("altered", "cloaked"):
+            off = float(nearer.sel(structure=name)) / intact - 1.0
+            label = f"Contraction, {display_name(study.problem, name).lower()}, off the intact by"
+            yield share(f"contraction_error_{name}", label, off)
+
+
+def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    """Force of the drive at the end of the path."""
+    if not path.static:
+        return
+    force = over_cases(study.problem, measures.reaction(study.response)).isel(time=-1)
+    note = f"on the driven units, along the drive, at {path.at(-1)}"
+    for name in structures(study.response):
+        label = f"Reaction, {display_name(study.problem, name).lower()}"
+        value = float(force.sel(structure=name))
+        yield number(f"reaction_{name}", label, value, "N", digits=3, note=note)
+
+
+def robustness_facts(study: StudyResults) -> Iterator[Fact]:
+    """Spread of the measure over the imperfect copies."""
+    copies = study.scatter
+    if copies is None:
+        return
+    measure = measures.measure_of(study.problem)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
+    for spread in monte_carlo.spreads(values, copies):
+        key = spread.noise.replace(" %", "").replace(" ", "_")
+        note = (
+            f"5 % to 95 %: {spread.low:.3g} to {spread.high:.3g}; {spread.count} copies, "
+            f"{spread.failed} failed, {spread.clashing} drawn again in part as units overlapped"
+        )
+        label = f"{measure.label}, median, {_in_words(spread.noise)}"
+        yield number(f"copies_{key}", label, spread.middle, measure.unit, digits=3, note=note)
+
+
+def _in_words(noise: str) -> str:
+    kind, _, size = noise.partition(" ")
+    if kind == "geometry":
+        return f"vertices off by up to ±{size} of s"
+    return f"stiffnesses with {size} standard deviation"

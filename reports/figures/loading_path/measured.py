@@ -1,0 +1,161 @@
+"""Recordings along the path: in the form of responses, as curves, and as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from pipeline.comparison import reduction
+from reports.base import style
+from reports.facts import MEASURED, Fact, intervals, number, share
+from reports.figures.loading_path import measures
+from reports.figures.loading_path.abscissa import Abscissa, display_name
+from reports.figures.loading_path.measures import Measure
+from reports.panels import measured_overlay
+from reports.study import RecordedMotion, StudyResults
+
+Array = NDArray[np.float64]
+Of = Callable[[xr.Dataset], xr.DataArray]
+
+_NAMES = {
+    "rotation": "mean_rotation",
+    "mismatch": "mimicking_error",
+    "contraction": "contraction",
+}
+"""What comparisons follow, by the key of the report's measure."""
+_ENDS = ("low", "high")
+_SIDES = ("measured", "simulated")
+
+
+def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> xr.Dataset:
+    """A recording in the form of the study's response, the simulated intact structure beside it."""
+    held = study.response["structure"].values
+    names = [name for name in held if name in {"intact", recording.structure}]
+    part = study.response.sel(structure=names).isel(case=[recording.case])
+    dims = ("structure", "case", "time", "unit", "dof")
+    motion = part["displacement"].transpose(*dims).copy(deep=True)
+    measured = recording.at(recording.data["measured"], path.values)
+    motion.values[names.index(recording.structure), 0] = measured
+    return part.assign(displacement=motion)
+
+
+def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of) -> Array:
+    """What `of` makes of a recording (n_times,), NaN where nothing was recorded."""
+    made = response(study, path, recording)
+    values = of(made).sel(structure=recording.structure).isel(case=0)
+    motion = made["displacement"].sel(structure=recording.structure).isel(case=0)
+    seen = motion.notnull().any(("unit", "dof"))
+    found: Array = values.where(seen).transpose("time").values
+    return found
+
+
+def measured_curves(
+    axes: Axes, study: StudyResults, path: Abscissa, of: Of, names: Collection[str]
+) -> None:
+    """The same of every recording of these structures, dashed with markers."""
+    for each in study.recordings:
+        if each.structure not in names:
+            continue
+        colour = style.STRUCTURE_COLOURS[each.structure]
+        measured_overlay.measured_curve(axes, path.values, curve(study, path, each, of), colour)
+
+
+def bands(axes: Axes, study: StudyResults, key: str) -> None:
+    """Prediction bands of a quantity, where comparisons have them."""
+    for each in study.recordings if key in _NAMES else ():
+        low, high = (each.values(_followed(each, key, "simulated", end)) for end in _ENDS)
+        measured_overlay.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
+
+
+def _followed(recording: RecordedMotion, key: str, source: str, estimate: str) -> xr.DataArray:
+    """A quantity (time,) of a comparison, in the unit of the report."""
+    values = recording.data[_NAMES[key]].sel(source=source, estimate=estimate)
+    return np.degrees(values) if key == "rotation" else values  # type: ignore[return-value]
+
+
+def _at_the_end(recording: RecordedMotion, path: Abscissa, key: str, source: str) -> Array:
+    """Value, lower and upper end of its interval (3,) at the end of the path."""
+    estimates = ("value", *_ENDS)
+    found = [_followed(recording, key, source, estimate) for estimate in estimates]
+    return np.array([recording.at(values, path.values)[-1] for values in found])
+
+
+def forces(axes: Axes, study: StudyResults) -> None:
+    """Forces of the load cell with the prediction bands, of the recordings that have one."""
+    for each in study.recordings:
+        force, low, high = (
+            each.values(each.data[name]) for name in ("load_force", "force_low", "force_high")
+        )
+        if np.isfinite(force).any():
+            colour = style.STRUCTURE_COLOURS[each.structure]
+            measured_overlay.band(axes, each.along, low, high, colour)
+            measured_overlay.measured_curve(axes, each.along, force, colour)
+
+
+def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    """The measure and the contraction at the end of the path, as they were measured."""
+    measure = measures.measure_of(study.problem)
+    yield from _measure_facts(study, path, measure)
+    if not path.static:
+        return
+    ends: dict[str, float] = {}
+    for each in study.recordings:
+        values = curve(study, path, each, lambda made: measures.contraction(study.problem, made))
+        ends[each.structure] = values[-1]
+        name = display_name(study.problem, each.structure).lower()
+        key = f"{MEASURED}contraction_{each.structure}"
+        label = f"Contraction, {name}, measured"
+        note = f"{each.source}; {_interval(each, path, 'contraction')}"
+        yield number(key, label, values[-1], "mm", digits=3, note=note)
+    for structure in ("altered", "cloaked"):
+        if structure in ends and "intact" in ends:
+            off = ends[structure] / ends["intact"] - 1.0
+            name = display_name(study.problem, structure).lower()
+            label = f"Contraction, {name}, off the intact by, measured"
+            note = _change(study, path, "contraction", ("intact", structure), sign=-1)
+            yield share(f"{MEASURED}contraction_error_{structure}", label, off, note=note)
+
+
+def _measure_facts(study: StudyResults, path: Abscissa, measure: Measure) -> Iterator[Fact]:
+    ends: dict[str, float] = {}
+    for each in study.recordings:
+        if each.structure == "intact":
+            continue
+        values = curve(study, path, each, measure.of)
+        ends[each.structure] = values[-1]
+        label = f"{measure.label}, {display_name(study.problem, each.structure).lower()}, measured"
+        key = f"{MEASURED}{measure.key}_{each.structure}"
+        note = f"{each.source}; {_interval(each, path, measure.key)}"
+        yield number(key, label, values[-1], measure.unit, digits=3, note=note.removesuffix("; "))
+        most = float(np.nanmax(values))
+        yield number(f"{key}_most", f"{label}, at most", most, measure.unit, digits=3)
+    if {"altered", "cloaked"} <= ends.keys():
+        gain = 1.0 - ends["cloaked"] / ends["altered"]
+        label = f"{measure.label} reduced by, measured"
+        note = _change(study, path, measure.key, ("altered", "cloaked"))
+        yield share(f"{MEASURED}{measure.key}_reduction", label, gain, note=note)
+
+
+def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
+    """The interval of a quantity at the end of the path, and what was predicted, in words."""
+    if key not in _NAMES:
+        return ""
+    measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
+    return intervals(measured[1:], predicted[1:])
+
+
+def _change(
+    study: StudyResults, path: Abscissa, key: str, between: tuple[str, str], sign: int = 1
+) -> str:
+    """The same of what the second of two structures takes from a quantity of the first."""
+    if key not in _NAMES:
+        return ""
+    ends = []
+    for side in _SIDES:
+        of = {each.structure: _at_the_end(each, path, key, side) for each in study.recordings}
+        ends.append(np.sort(100 * sign * reduction(*(of[name] for name in between))[1:]))
+    return intervals(ends[0], ends[1], " %")

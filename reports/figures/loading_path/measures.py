@@ -1,0 +1,116 @@
+"""How far structures are from what they should do, along the path; contraction and reaction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.comparison import middle_units
+from pipeline.problem import Problem
+from reports.study import DRIVEN
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number along the path that should be small, of every structure and load case.
+
+    `of` maps a response to (structure, case, time); `symbol` stands on axes.
+    """
+
+    key: str
+    label: str
+    symbol: str
+    unit: str
+    of: Callable[[xr.Dataset], xr.DataArray]
+
+
+def measure_of(problem: Problem) -> Measure:
+    """The measure that goes with a problem's objective."""
+    scale = scales(problem)
+    if problem.objective.kind == "strain_energy":
+        symbol = r"mean $|\theta|$ (°)"
+        return Measure("rotation", "Mean |θ| in the region of interest", symbol, "deg", rotation)
+    if problem.objective.target == "rest":
+        symbol = r"RMS $\|\mathbf{U}\|$"
+        return Measure(
+            "motion", "RMS |U| in the region of interest", symbol, "1", lambda r: motion(r, scale)
+        )
+    return Measure(
+        "mismatch",
+        "Mimicking error",
+        "mimicking error",
+        "1",
+        lambda r: mismatch(r, scale, problem.static),
+    )
+
+
+def rotation(response: xr.Dataset) -> xr.DataArray:
+    """Mean |theta| over the region of interest, degrees."""
+    turn: xr.DataArray = np.abs(interest(response).sel(dof="theta"))  # type: ignore[assignment]
+    mean: xr.DataArray = turn.mean("unit")
+    return np.degrees(mean)  # type: ignore[return-value]
+
+
+def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Root mean square of |U|, U = (ux/s, uy/s, theta), over the region of interest."""
+    mean: xr.DataArray = squares(interest(response), scale).mean("unit")
+    return mean**0.5
+
+
+def mismatch(
+    response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
+) -> xr.DataArray:
+    """Norm of U - U_intact over the region of interest, over what ``size_of_intact`` is."""
+    inside = interest(response)
+    intact = inside.sel(structure="intact")
+    apart: xr.DataArray = squares(inside - intact, scale).sum("unit") ** 0.5
+    return apart / size_of_intact(response, scale, static)
+
+
+def size_of_intact(
+    response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
+) -> xr.DataArray:
+    """Norm (case,) of U_intact over the region of interest: at the end of a path, most in time."""
+    intact = interest(response).sel(structure="intact")
+    size: xr.DataArray = squares(intact, scale).sum("unit") ** 0.5
+    return size.isel(time=-1) if static else size.max("time")
+
+
+def scales(problem: Problem) -> tuple[float, float, float]:
+    """Divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
+    return problem.lattice.spacing, problem.lattice.spacing, 1.0
+
+
+def interest(response: xr.Dataset) -> xr.DataArray:
+    """Displacements of the units of the region of interest."""
+    return response["displacement"].isel(unit=response["roi"].values.astype(bool))
+
+
+def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
+    """Sum of squares of dimensionless displacements (..., dof)."""
+    divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
+    squares: xr.DataArray = ((displacement / divisors) ** 2).sum("dof")
+    return squares
+
+
+def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Loss of distance in mm between the top and the bottom units of the lattice's middle half."""
+    top, bottom = (middle_units(problem, side) for side in ("top", "bottom"))
+    rise = response["displacement"].sel(dof="uy")
+    nearer: xr.DataArray = rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")
+    return nearer
+
+
+def reaction(response: xr.Dataset) -> xr.DataArray:
+    """Force in N that the drive exerts along its direction, on all driven units together."""
+    held = response["reaction_force"].isel(unit=response["support"].values == DRIVEN)
+    total = held.sum("unit")
+    angle = np.radians(response["direction"])
+    along: xr.DataArray = np.cos(angle) * total.sel(dof="ux") + np.sin(angle) * total.sel(dof="uy")
+    return along.transpose("structure", "case", "time")

@@ -1,0 +1,169 @@
+"""Structures along the path, true to scale, side by side and above one another."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from pipeline.problem import Problem
+from reports.base import style
+from reports.figures.loading_path.abscissa import SECOND, Abscissa, course, display_name, structures
+from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
+from reports.panels import draw
+from reports.study import StudyResults, from_dataset
+
+LABEL, BAR, GAP = 6.0, 14.0, 1.2
+"""Room for labels left of snapshots and for the bar of colours, and between snapshots; mm."""
+LARGEST = 44.0
+"""Side of a snapshot where there is room, mm."""
+
+Label = tuple[str, str]
+
+
+@dataclass(frozen=True)
+class SnapshotStructure:
+    """One structure among the snapshots: its name, the colour of that, and what it does."""
+
+    label: str
+    colour: str
+    part: xr.Dataset
+
+
+def rows(study: StudyResults) -> list[SnapshotStructure]:
+    """The structures of a study, recordings above them, and a design for contact on distance."""
+    response, problem = study.response, study.problem
+    along, found = course(problem, response).values, []
+    for name in structures(response):
+        label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
+        filmed = [each for each in study.recordings if each.structure == name]
+        for each in filmed:
+            part = each.motion(response, along)
+            found.append(SnapshotStructure(f"{label}\n{each.source}", colour, part))
+        label = f"{label}\nsimulation" if filmed else label
+        found.append(SnapshotStructure(label, colour, response.sel(structure=name)))
+    if study.again is not None and study.again.changed:
+        part = study.again.response.sel(structure="cloaked")
+        found.append(SnapshotStructure(SECOND, style.CLOAKED, part))
+    return found
+
+
+@dataclass(frozen=True)
+class SnapshotLayout:
+    """How the snapshots are laid out: structures above one another or side by side; mm."""
+
+    rows: list[SnapshotStructure]
+    course: Abscissa
+    side: float
+    beside: bool
+
+    @classmethod
+    def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> SnapshotLayout:
+        """The layout that shows them larger."""
+        kinds, loads = rows(study), len(path.shown)
+        across = style.TWO_COLUMNS - LABEL - BAR
+
+        def side(columns: int, lines: int) -> float:
+            return min(across / columns, tallest / lines, LARGEST)
+
+        above, beside = side(loads, len(kinds)), side(len(kinds), loads)
+        return cls(kinds, path, max(above, beside), beside > above)
+
+    @property
+    def lines(self) -> int:
+        """Number of snapshots above one another."""
+        return len(self.course.shown) if self.beside else len(self.rows)
+
+    @property
+    def columns(self) -> int:
+        """Number of snapshots side by side."""
+        return len(self.rows) if self.beside else len(self.course.shown)
+
+    @property
+    def left(self) -> float:
+        """Where the snapshots begin so that all of them are in the middle."""
+        return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2
+
+    def at(self, row: int, load: int) -> tuple[int, int]:
+        """Line and column of a snapshot."""
+        return (load, row) if self.beside else (row, load)
+
+
+Overlay = Callable[[Axes, SnapshotStructure, int], None]
+
+
+def snapshots(
+    figure: Figure,
+    study: StudyResults,
+    grid: SnapshotLayout,
+    top: float,
+    overlay: Overlay | None = None,
+) -> None:
+    """Every structure at every load shown, from ``top`` (mm) on, with an ``overlay`` on each."""
+    shade, side = shade_of(study.problem, study.response), grid.side
+    for k, row in enumerate(grid.rows):
+        for m, sample in enumerate(grid.course.shown):
+            line, column = grid.at(k, m)
+            axes = style.place(
+                figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
+            )
+            snapshot(axes, study.problem, row.part, sample, shade)
+            if overlay is not None:
+                overlay(axes, row, sample)
+    loads = [f"{grid.course.symbol} = {grid.course.at(sample)}" for sample in grid.course.shown]
+    kinds = [(row.label, row.colour) for row in grid.rows]
+    values = [(load, style.INTACT) for load in loads]
+    _labels(figure, grid, top, *((kinds, values) if grid.beside else (values, kinds)))
+    end = grid.left + grid.columns * side
+    colour_bar(figure, shade, (end + 1.5, top, grid.lines * side - GAP))
+
+
+def _labels(
+    figure: Figure, grid: SnapshotLayout, top: float, above: Sequence[Label], left: Sequence[Label]
+) -> None:
+    """Words with their colours above the columns and left of the lines."""
+    for k, (text, colour) in enumerate(above):
+        x = grid.left + (k + 0.5) * grid.side - GAP / 2
+        style.write(
+            figure, x, top - 0.8, text, ha="center", va="bottom", color=colour,
+            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
+        )  # fmt: skip
+    for k, (text, colour) in enumerate(left):
+        y = top + (k + 0.5) * grid.side - GAP / 2
+        style.write(
+            figure, grid.left - 1.5, y, text, rotation=90, ha="right", va="center", color=colour,
+            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
+        )  # fmt: skip
+
+
+def snapshot(
+    axes: Axes, problem: Problem, part: xr.Dataset, sample: int, shade: UnitColouring, case: int = 0
+) -> None:
+    """One structure at one sample of its path, true to scale."""
+    structure = from_dataset(part, problem.lattice.spacing)
+    frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
+    draw(
+        axes,
+        structure,
+        frame,
+        values=shade.values(frame),
+        colour_map=shade.colours,
+        norm=shade.norm,
+    )
+
+
+def colour_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:
+    """The bar of the snapshots, in `place`: mm from the left and the top, and height."""
+    left, top, height = place
+    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
+    figure.colorbar(ScalarMappable(shade.norm, shade.colours), cax=bar).set_label(
+        shade.label, labelpad=1.5
+    )
+    bar.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
+    bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
+    bar.tick_params(length=1.5)

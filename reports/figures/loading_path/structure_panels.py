@@ -1,0 +1,111 @@
+"""Panels that show structures: at rest with their regions, and along the path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.patches import FancyArrowPatch
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from pipeline.problem.sections import Region
+from reports.base import style
+from reports.panels import ColourField, draw, draw_clamps, round_up, scalar
+from reports.study import CLAMPED, CLOAK, DRIVEN, INCLUSION, RigidUnits, from_dataset
+
+Array = NDArray[np.float64]
+
+CLOAK_TINT, UNIT_TINT, CLAMP_TINT, DRIVE_TINT = "#c9b3e0", "#d9dce0", "#4a4d52", "#f2c48d"
+INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
+
+
+@dataclass(frozen=True)
+class UnitColouring:
+    """How a displacement (n_units, 3) colours the units."""
+
+    field: ColourField
+    label: str
+    colours: Colormap
+
+    def values(self, displacement: Array) -> Array:
+        """The number (n_units,) that each unit shows."""
+        return scalar(self.field, displacement)
+
+    @property
+    def norm(self) -> Normalize:
+        """From the lowest to the highest colour."""
+        return Normalize(*self.field.limits)
+
+
+def shade_of(problem: Problem, response: xr.Dataset) -> UnitColouring:
+    """What colours the snapshots: |theta|, u_y or |U|, by what the cloak is for."""
+    free = response["displacement"].isel(unit=response["support"].values == 0).values
+    if problem.objective.kind == "strain_energy":
+        most = round_up(float(np.degrees(np.nanmax(np.abs(free[..., 2])))))
+        field = ColourField("turn", "|θ|", "°", 180.0 / np.pi, "magnitude", (0.0, most))
+        return UnitColouring(field, r"$|\theta|$ (°)", style.MAGNITUDE)
+    if problem.objective.target != "rest":
+        most = round_up(float(np.nanmax(np.abs(free[..., 1]))))
+        field = ColourField("uy", "u_y", "mm", 1.0, "signed", (-most, most))
+        return UnitColouring(field, "$u_y$ (mm)", style.SIGNED)
+    scale = (problem.lattice.spacing, problem.lattice.spacing, 1.0)
+    most = round_up(float(np.nanmax(np.linalg.norm(free / np.array(scale), axis=-1))))
+    field = ColourField("norm", "|U|", "", 1.0, "magnitude", (0.0, most), scale)
+    return UnitColouring(field, r"$\|\mathbf{U}\|$", style.MAGNITUDE)
+
+
+def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) -> None:
+    """One structure at rest: what is clamped, driven, looked at and redesigned."""
+    structure = from_dataset(response.sel(structure=name), problem.lattice.spacing)
+    interest = np.zeros(structure.n_units, dtype=bool)
+    if isinstance(problem.objective.region, Region):
+        interest = response["roi"].values.astype(bool)
+    draw_clamps(axes, structure, problem.lattice.spacing)
+    draw(axes, structure, colours=list(_tints(structure, interest, name)), margin=12.0)
+    if name != "intact" and not np.isnan(float(response["direction"][0])):
+        _load_arrows(axes, structure, float(response["direction"][0]))
+
+
+def _tints(structure: RigidUnits, interest: NDArray[np.bool_], name: str) -> Iterator[str]:
+    for region, support, looked_at in zip(
+        structure.region, structure.support, interest, strict=True
+    ):
+        if support == CLAMPED:
+            yield CLAMP_TINT
+        elif support == DRIVEN:
+            yield DRIVE_TINT
+        elif region == CLOAK and name == "cloaked":
+            yield CLOAK_TINT
+        elif region == INCLUSION and name != "intact":
+            yield RIGID_TINT
+        else:
+            yield INTEREST_TINT if looked_at else UNIT_TINT
+
+
+def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
+    """Arrows onto some of the driven units, along the drive."""
+    ends = structure.centroid[structure.present & (structure.support == DRIVEN)]
+    along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
+    few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
+    reach = 0.055 * float(np.ptp(structure.centroid[structure.present], axis=0).max())
+    for x, y in ends[few[1:-1] if len(few) == 5 else few]:
+        start = np.array([x, y]) - 1.3 * reach * along
+        end = np.array([x, y]) - 0.3 * reach * along
+        arrow = FancyArrowPatch(
+            (float(start[0]), float(start[1])),
+            (float(end[0]), float(end[1])),
+            arrowstyle="-|>",
+            mutation_scale=6.0,
+            shrinkA=0,
+            shrinkB=0,
+            linewidth=1.3,
+            color=style.ALTERED,
+            zorder=7,
+            clip_on=False,
+        )
+        axes.add_patch(arrow)

@@ -1,0 +1,1 @@
+"""Draws Figure 3: several designs of one problem."""

@@ -1,0 +1,124 @@
+"""The designs of a problem with the parameter that they differ by, and how well each shields."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline import problem
+from pipeline.problem import Problem
+from pipeline.problem.sections import Word, numbered, taken_apart
+from pipeline.runtime import UserError
+from reports.facts import measures
+from reports.study import CLOAK, ReportScene, StudyResults
+from reports.study import study_results as study
+
+Array = NDArray[np.float64]
+
+RADIUS = "cloak.disc.radius"
+
+
+@dataclass(frozen=True)
+class SeriesDesign:
+    """One of the designs: the value of the parameter, in words, and its study."""
+
+    number: int
+    word: Word
+    study: StudyResults
+
+    @property
+    def scene(self) -> ReportScene:
+        """The shaken lattice."""
+        return self.study.scene
+
+    @property
+    def units(self) -> int:
+        """Number of units in the cloak."""
+        return int((self.study.design["region"] == CLOAK).sum())
+
+    @cached_property
+    def _reached(self) -> xr.DataArray:
+        """Largest |U| over the loss's time (structure, case, unit)."""
+        scene, moved = self.scene, self.study.response["displacement"]
+        window = moved.sel(time=slice(None, scene.horizon * measures.LAST_SAMPLE))
+        return measures.magnitude(window, scene.scale).max("time")
+
+    @property
+    def peak(self) -> xr.DataArray:
+        """Largest |U| over the loss's time (structure, unit), mean over the load cases."""
+        return self.scene.mean(self._reached)
+
+    @property
+    def boundary(self) -> xr.DataArray:
+        """Largest |U| of a unit of the outer rows and columns (structure), mean over the cases."""
+        i, j = (self.study.response[name].values for name in ("i", "j"))
+        scene = self.scene
+        outer = np.isin(i, (0, scene.columns - 1)) | np.isin(j, (0, scene.rows - 1))
+        return scene.mean(self._reached.isel(unit=outer).max("unit"))
+
+    def loss(self, structure: str) -> float:
+        """The loss, mean over the load cases."""
+        return float(self.scene.mean(self.study.response["loss"].sel(structure=structure)))
+
+
+@dataclass(frozen=True)
+class DesignSeries:
+    """All designs of a problem, in their order.
+
+    `target` builds them; `problem` asks for them; `key` is the parameter that they differ by.
+    """
+
+    name: str
+    target: str
+    problem: Problem
+    key: str
+    designs: list[SeriesDesign]
+
+    @property
+    def axis(self) -> tuple[Array, str]:
+        """Values of the parameter and what they are, for an axis; a radius in spacings."""
+        found = [taken_apart(design.word) for design in self.designs]
+        values = np.array([number for number, _ in filter(None, found)])
+        unit = next((unit for _, unit in filter(None, found)), "")
+        if self.key == RADIUS and unit == "mm":
+            return values / self.designs[0].scene.spacing, "Size of the cloak $R/s$"
+        return values, f"{self.key} ({unit})" if unit else self.key
+
+    def label(self, design: SeriesDesign) -> str:
+        """What one design is called beside the others."""
+        value = self.axis[0][self.designs.index(design)]
+        return f"R = {value:g}s" if self.key == RADIUS else f"{self.key} = {design.word}"
+
+
+def load(path: Path, preset: str | None, results: Path) -> DesignSeries:
+    """All designs with their datasets.
+
+    Raises:
+        UserError: the problem asks for one design only, or not for numbers to tell them by, or a
+            dataset is missing.
+    """
+    asked = problem.load(path, preset)
+    if asked.designs is None:
+        remedy = (
+            "list the values of a parameter below `designs`, or use reports.figures.study_report"
+        )
+        raise UserError("the problem asks for one design", file=path, key="designs", remedy=remedy)
+    ((key, words),) = asked.designs.items()
+    if any(taken_apart(word) is None for word in words):
+        remedy = "vary a parameter that is a number"
+        raise UserError("numbers are wanted here", file=path, key=f"designs.{key}", remedy=remedy)
+    name = path.resolve().parent.name
+    found = []
+    for number, word in enumerate(words, start=1):
+        one = numbered(preset or "", number)
+        folder = results / f"{name}@{one}"
+        wanted = problem.outputs(problem.load(path, one))
+        files = {kind: folder / f"{kind}.nc" for kind in wanted}
+        found.append(SeriesDesign(number, word, study.load(path, one, files)))
+    target = name if preset is None else f"{name}@{preset}"
+    return DesignSeries(name, target, asked, key, found)

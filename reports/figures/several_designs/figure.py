@@ -1,0 +1,98 @@
+"""How well each design shields, and the designs themselves, at a journal's two-column width."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from reports.base import style
+from reports.figures.several_designs.designs import DesignSeries, SeriesDesign
+from reports.panels import draw, draw_clamps, outline
+from reports.study import draft, from_dataset
+
+PER_ROW = 3
+"""Panels in a row; the first is the curve."""
+
+LEFT, BAR, GAP, HEAD = 2.0, 16.0, 2.0, 11.0
+
+
+def draw_design_series(family: DesignSeries) -> Figure:
+    """The whole figure: curve and altered structure, then the designs, coloured alike."""
+    side = (style.TWO_COLUMNS - LEFT - BAR) / PER_ROW - GAP
+    shown = [(family.designs[0], "altered"), *((each, "cloaked") for each in family.designs)]
+    rows = -(-(1 + len(shown)) // PER_ROW)
+    figure = style.page(rows * (side + HEAD))
+    norm = Normalize(0.0, _limit(family))
+    style.letter(figure, 0.0, 0.8, "a", "Shielding of the boundary")
+    _curve(style.place(figure, 13.0, HEAD, side - 9.0, side - 12.0), family)
+    style.letter(figure, side + GAP, 0.8, "b", "Peak displacement")
+    for k, (design, name) in enumerate(shown, start=1):
+        left = LEFT + (k % PER_ROW) * (side + GAP)
+        top = HEAD + (k // PER_ROW) * (side + HEAD)
+        axes = style.place(figure, left, top, side, side)
+        _structure(axes, family, design, name, norm)
+    _bar(figure, norm, LEFT + PER_ROW * (side + GAP), HEAD, rows * (side + HEAD) - HEAD)
+    if any(design.study.draft for design in family.designs):
+        draft.mark(figure)
+    return figure
+
+
+def _limit(family: DesignSeries) -> float:
+    """Largest peak outside the cloaks, rounded up: one range of colours for all."""
+    largest = 0.0
+    for design in family.designs:
+        outside = design.study.response["roi"].values.astype(bool)
+        largest = max(largest, float(design.peak.isel(unit=outside).max()))
+    step = 10.0 ** np.floor(np.log10(largest)) / 2
+    return float(np.ceil(largest / step - 1e-9) * step)
+
+
+def _curve(axes: Axes, family: DesignSeries) -> None:
+    sizes, label = family.axis
+    for name, line in (("altered", "--"), ("cloaked", "-")):
+        peaks = [float(design.boundary.sel(structure=name)) for design in family.designs]
+        colour = style.STRUCTURE_COLOURS[name]
+        axes.plot(sizes, peaks, line, color=colour, marker="o", ms=3.2, lw=1.1)
+        axes.annotate(
+            name.capitalize(),
+            (sizes[-1], peaks[-1]),
+            xytext=(0, 6),
+            textcoords="offset points",
+            ha="right",
+            va="bottom",
+            color=colour,
+            fontsize=style.TEXT,
+        )
+    top = max(float(design.boundary.max()) for design in family.designs)
+    axes.set(xlabel=label, ylim=(0.0, 1.15 * top))
+    axes.set_ylabel(r"$U^\mathrm{max}_{\partial\Omega}$", labelpad=2.0)
+    axes.set_xticks(sizes)
+    axes.margins(x=0.12)
+
+
+def _structure(
+    axes: Axes, family: DesignSeries, design: SeriesDesign, name: str, norm: Normalize
+) -> None:
+    scene, response = design.scene, design.study.response
+    structure = from_dataset(response.sel(structure=name), scene.spacing)
+    draw_clamps(axes, structure, scene.spacing)
+    values = design.peak.sel(structure=name).values
+    draw(axes, structure, values=values, colour_map=style.MAGNITUDE, norm=norm)
+    if name == "cloaked":
+        outline(axes, np.array(scene.middle), scene.radii, style.CLOAKED)
+    title = "Altered" if name == "altered" else f"Cloaked, {family.label(design)}"
+    colour = style.STRUCTURE_COLOURS[name]
+    axes.set_title(title, color=colour, fontsize=style.TEXT, pad=1.5)
+
+
+def _bar(figure: Figure, norm: Normalize, left: float, top: float, height: float) -> None:
+    bar = style.place(figure, left + 1.0, top + 0.15 * height, 2.4, 0.7 * height)
+    colours = ScalarMappable(norm, style.MAGNITUDE)
+    made = figure.colorbar(colours, cax=bar, extend="max")
+    made.set_label(r"$U_\mathrm{peak}$", labelpad=1.5)
+    made.locator = MaxNLocator(5)
+    bar.tick_params(length=1.5)

@@ -1,0 +1,1 @@
+"""Draws several studies side by side."""

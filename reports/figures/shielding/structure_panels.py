@@ -1,0 +1,205 @@
+"""Panels of Figure 2 that show structures: the problem (a) and the snapshots (c)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import matplotlib.patheffects as effects
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Arc
+from numpy.typing import NDArray
+
+from reports.base import style
+from reports.facts import measures
+from reports.figures.shielding.facts import MONITORED
+from reports.panels import draw, draw_clamps, drive_arrows, outline
+from reports.study import (
+    CLAMPED,
+    CLOAK,
+    DRIVEN,
+    RecordedMotion,
+    ReportScene,
+    RigidUnits,
+    deformed,
+    from_dataset,
+    middle_of_top_edge,
+)
+
+Array = NDArray[np.float64]
+
+PHASES = (0.05, 0.3, 0.55, 0.8)
+"""Parts of the last drive cycle that the snapshots show: near both peaks, and after both zeros."""
+
+CLOAK_TINT, UNIT_TINT, CLAMP_TINT = "#c9b3e0", "#c3c7cc", "#4a4d52"
+
+
+@dataclass(frozen=True)
+class SnapshotRow:
+    """One row of snapshots: a structure at several times.
+
+    displacement (n_times, n_units, 3) in mm, mm, rad; NaN for units without data. `time` in s.
+    """
+
+    name: str
+    source: str
+    structure: RigidUnits
+    time: Array
+    displacement: Array
+
+
+def problem_panel(
+    axes: Axes, scene: ReportScene, structure: RigidUnits, name: str, direction: float
+) -> None:
+    """One structure of panel (a), "reference", "altered" or "cloaked", driven in `direction`."""
+    draw_clamps(axes, structure, scene.spacing)
+    draw(axes, structure, colours=list(_colours(structure, name)))
+    middle = np.array(scene.middle)
+    if name == "reference":
+        return
+    if name == "cloaked":
+        outline(axes, middle, scene.radii, style.CLOAKED)
+    if name == "altered":
+        _direction(axes, scene, direction)
+    reach = (0.75 * scene.spacing, 0.16 * scene.columns * scene.spacing + 0.2 * scene.spacing)
+    drive_arrows(axes, middle, direction, reach, style.ALTERED)
+
+
+def _direction(axes: Axes, scene: ReportScene, direction: float) -> None:
+    """The loading angle in degrees, between the x axis and the drive."""
+    x, y = scene.middle
+    halo: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.0, foreground="white")]
+    radius = 0.2 * scene.columns * scene.spacing
+    line = axes.plot(
+        [x + 0.75 * scene.spacing, x + 1.15 * radius], [y, y], color=style.INTACT, lw=0.6, zorder=6
+    )[0]
+    arc = Arc((x, y), 1.7 * radius, 1.7 * radius, theta1=0, theta2=direction, lw=0.6, zorder=6)
+    axes.add_patch(arc)
+    angle = np.radians(0.5 * direction)
+    at = (x + 1.12 * radius * np.cos(angle), y + 1.12 * radius * np.sin(angle))
+    text = axes.text(*at, r"$\alpha$", fontsize=style.TITLE, ha="center", va="center", zorder=9)
+    for artist in (line, arc, text):
+        artist.set_path_effects(halo)
+
+
+def _colours(structure: RigidUnits, name: str) -> Iterator[str]:
+    for region, support in zip(structure.region, structure.support, strict=True):
+        if support == CLAMPED:
+            yield CLAMP_TINT
+        elif support == DRIVEN and name != "reference":
+            yield style.ALTERED
+        elif region == CLOAK and name == "cloaked":
+            yield CLOAK_TINT
+        else:
+            yield UNIT_TINT
+
+
+def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Array:
+    """When the snapshots are, over the last whole drive cycle, s."""
+    end = response["time"].values[-1]
+    start = (np.floor(end * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
+    wanted: Array = start + np.array(PHASES) * scene.period
+    return wanted
+
+
+def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow]:
+    """Snapshots of the altered and the cloaked structure over the last whole drive cycle."""
+    case = measures.nearest_case(response, MONITORED)
+    wanted, rows = snapshot_times(scene, response), []
+    for name in ("altered", "cloaked"):
+        part = response.sel(structure=name).isel(case=case)
+        frames = part["displacement"].sel(time=wanted, method="nearest")
+        rows.append(
+            SnapshotRow(
+                name,
+                "simulation",
+                from_dataset(part, scene.spacing),
+                frames["time"].values,
+                frames.transpose("time", "unit", "dof").values,
+            )
+        )
+    return rows
+
+
+def recorded_rows(
+    scene: ReportScene, response: xr.Dataset, recordings: Sequence[RecordedMotion]
+) -> list[SnapshotRow]:
+    """The recordings at the same times."""
+    wanted = snapshot_times(scene, response)
+    return [
+        SnapshotRow(
+            each.structure,
+            each.source,
+            from_dataset(response.sel(structure=each.structure), scene.spacing),
+            wanted,
+            each.at(each.data["measured"], wanted),
+        )
+        for each in recordings
+    ]
+
+
+def snapshots_panel(
+    figure: Figure, scene: ReportScene, rows: Sequence[SnapshotRow], top: float, height: float
+) -> None:
+    """Panel (c): as many rows as there are, all at one scale, coloured by |U| with one bar."""
+    count = max(len(row.time) for row in rows)
+    label, bar, gap = 9.0, 14.0, 1.2
+    side = min((style.TWO_COLUMNS - label - bar) / count, height / len(rows))
+    left = label + (style.TWO_COLUMNS - label - bar - count * side) / 2
+    norm = Normalize(0.0, _colour_limit(scene, rows))
+    for k, row in enumerate(rows):
+        y = top + k * side
+        style.write(
+            figure,
+            left - 1.5,
+            y + side / 2,
+            f"{row.name.capitalize()}\n{row.source}",
+            rotation=90,
+            ha="right",
+            va="center",
+            multialignment="center",
+            color=style.STRUCTURE_COLOURS[row.name],
+            fontsize=style.TEXT,
+        )
+        for m, frame in enumerate(row.displacement):
+            axes = style.place(figure, left + m * side, y, side - gap, side - gap)
+            _snapshot(axes, scene, row, frame, norm)
+            if k == 0:
+                text = f"$t$ = {row.time[m]:.3f} s"
+                axes.set_title(text, fontsize=style.TEXT, pad=1.0)
+    _magnitude_bar(figure, norm, left + count * side + 1.5, top, len(rows) * side - gap)
+
+
+def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:
+    """Largest |U| outside the source, rounded up to a tenth."""
+    sizes = [
+        np.linalg.norm(row.displacement[:, row.structure.support != DRIVEN] / scene.scale, axis=-1)
+        for row in rows
+    ]
+    largest = max(float(np.nanmax(size)) for size in sizes)
+    return float(np.ceil(10 * largest - 1e-9) / 10)
+
+
+def _snapshot(
+    axes: Axes, scene: ReportScene, row: SnapshotRow, frame: Array, norm: Normalize
+) -> None:
+    structure = row.structure
+    size = np.linalg.norm(frame / scene.scale, axis=1)
+    draw_clamps(axes, structure, scene.spacing)
+    draw(axes, structure, frame, values=size, colour_map=style.MAGNITUDE, norm=norm)
+    unit = middle_of_top_edge(structure)
+    x, y = np.nanmean(deformed(structure, frame)[unit], axis=0)  # at rest where it was lost
+    colour = style.STRUCTURE_COLOURS[row.name]
+    axes.plot(x, y, "o", ms=3.6, mfc=colour, mec="white", mew=0.6, zorder=8)
+
+
+def _magnitude_bar(figure: Figure, norm: Normalize, left: float, top: float, height: float) -> None:
+    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
+    colours = ScalarMappable(norm, style.MAGNITUDE)
+    figure.colorbar(colours, cax=bar, extend="max").set_label(r"$\|\mathbf{U}\|$", labelpad=1.5)
+    bar.tick_params(length=1.5)

@@ -1,0 +1,93 @@
+"""Which voids of a structure are closed to contact, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from reports.study import Integers, RigidUnits, from_dataset
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def smaller_angles(problem: Problem, part: xr.Dataset) -> Array:
+    """The smaller void angle beside each ligament of a structure under one load case, rad.
+
+    Returns:
+        (n_times, n_ligaments) in the order of ``from_dataset``.
+    """
+    structure = from_dataset(part, problem.lattice.spacing)
+    turns = part["displacement"].sel(dof="theta").transpose("time", "unit").values
+    first, second = structure.ligament_unit.T
+    turned = turns[:, first] - turns[:, second]
+    one, other = rest_angles(structure).T
+    return np.asarray(np.minimum(one + turned, other - turned))
+
+
+def closed(problem: Problem, part: xr.Dataset) -> Mask:
+    """Whether a void beside each ligament (n_times, n_ligaments) is closed to the cutoff."""
+    return np.asarray(smaller_angles(problem, part) < problem.contact.cutoff_angle)
+
+
+def rest_angles(structure: RigidUnits) -> Array:
+    """The two void angles (n_ligaments, 2) beside every ligament at rest, rad."""
+    (a, b), (p, q) = structure.ligament_unit.T, structure.ligament_vertex.T
+    one = _angle(_edge(structure, b, q, -1), _edge(structure, a, p, 1))
+    other = _angle(_edge(structure, a, p, -1), _edge(structure, b, q, 1))
+    return np.stack([one, other], axis=1)
+
+
+def _edge(structure: RigidUnits, unit: Integers, vertex: Integers, way: int) -> Array:
+    """Vectors (n, 2) from vertices to their neighbours, counter-clockwise if ``way`` is 1."""
+    corners = structure.vertices[unit]
+    sides = np.isfinite(corners[..., 0]).sum(axis=1)
+    each = np.arange(len(unit))
+    return np.asarray(corners[each, (vertex + way) % sides] - corners[each, vertex])
+
+
+def _angle(start: Array, end: Array) -> Array:
+    """Angle from one vector to another, between -90 and 270 degrees."""
+    cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
+    angle = np.arctan2(cross, (start * end).sum(axis=1))
+    return np.where(angle < -np.pi / 2, angle + 2 * np.pi, angle)
+
+
+def on_edges(structure: RigidUnits) -> Mask:
+    """Which ligaments (n_ligaments,) run along the top or the bottom edge."""
+    height = structure.site[structure.ligament_unit, 1]
+    ends = structure.site[:, 1].min(), structure.site[:, 1].max()
+    return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
+
+
+def middles(structure: RigidUnits, vertices: Array) -> Array:
+    """Middles (n_ligaments, 2) of the ligaments between vertices (n_units, n_vertices, 2), mm."""
+    ends = vertices[structure.ligament_unit, structure.ligament_vertex]
+    return np.asarray(ends.mean(axis=1))
+
+
+def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """The smaller void angle (structure, case, time, ligament) along the top and bottom edges."""
+    whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
+    n_edge = int(on_edges(whole).sum())
+    angles = np.full(
+        (*(response.sizes[dim] for dim in ("structure", "case", "time")), n_edge), np.nan
+    )
+    for k, name in enumerate(response["structure"].values):
+        part = response.sel(structure=name)
+        here = on_edges(from_dataset(part, problem.lattice.spacing))
+        for case in range(response.sizes["case"]):
+            found = smaller_angles(problem, part.isel(case=case))[:, here]
+            angles[k, case, :, : found.shape[1]] = found
+    dims = ("structure", "case", "time", "ligament")
+    return xr.DataArray(angles, {name: response[name] for name in ("structure", "time")}, dims)
+
+
+def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Number (structure, case, time) of closed voids along the top and bottom edges."""
+    contacts: xr.DataArray = (along_edges(problem, response) < problem.contact.cutoff_angle).sum(
+        "ligament"
+    )
+    return contacts

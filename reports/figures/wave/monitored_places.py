@@ -1,0 +1,52 @@
+"""How a wave goes on in each structure: at some places, and against the intact one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.problem import Problem
+from reports.figures.loading_path import interest, scales, squares
+from reports.study import RigidUnits, from_dataset, unit_at
+
+Mark = str | tuple[int, int, int]
+
+MARKS: tuple[Mark, ...] = ("o", "D", (4, 1, 0))
+"""Of the places: circle, diamond, four-pointed star."""
+
+
+@dataclass(frozen=True)
+class MonitoredUnit:
+    """A unit whose motion is shown over time, with its mark."""
+
+    unit: int
+    mark: Mark
+    name: str
+
+
+def places(problem: Problem, response: xr.Dataset) -> list[MonitoredUnit]:
+    """The places that the problem names."""
+    structure = first_structure(problem, response)
+    found = []
+    for mark, point in zip(MARKS, problem.report.places, strict=False):
+        unit = unit_at(structure, np.array(point))
+        i, j = (int(response[name][unit]) for name in ("i", "j"))
+        found.append(MonitoredUnit(unit, mark, f"unit ({i}, {j})"))
+    return found
+
+
+def first_structure(problem: Problem, response: xr.Dataset) -> RigidUnits:
+    """The intact structure."""
+    return from_dataset(response.sel(structure="intact"), problem.lattice.spacing)
+
+
+def relative_error(problem: Problem, response: xr.Dataset) -> xr.DataArray:
+    """Relative L2 error (structure, case) of the surroundings' motion over the whole history."""
+    inside, scale = interest(response), scales(problem)
+    intact = inside.sel(structure="intact")
+    missed = squares(inside - intact, scale).sum("unit").integrate("time")
+    size = squares(intact, scale).sum("unit").integrate("time")
+    error: xr.DataArray = (missed / size) ** 0.5
+    return error

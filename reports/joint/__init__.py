@@ -1,1 +1,0 @@
-"""Report of several studies on one page."""

@@ -1,1 +1,0 @@
-"""Movies of the studies: structures side by side under their loads."""

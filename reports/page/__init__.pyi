@@ -1,0 +1,9 @@
+from . import citation as citation
+from . import figure_page as figure_page
+from . import publishing as publishing
+from . import study_page as study_page
+from . import templating as templating
+from .figure_page import PageTable as PageTable
+from .publishing import ReportParts as ReportParts
+from .report_page import ReportPage as ReportPage
+from .study_page import PageText as PageText

@@ -1,0 +1,16 @@
+from . import measured_overlay as measured_overlay
+from .animation_data import COLOUR_MAPS as COLOUR_MAPS
+from .animation_data import Animation as Animation
+from .animation_data import AnimationAxis as AnimationAxis
+from .animation_data import AnimationClip as AnimationClip
+from .animation_data import ColourField as ColourField
+from .animation_data import DashedDisc as DashedDisc
+from .animation_data import payload as payload
+from .animation_data import quantisation_error as quantisation_error
+from .animation_data import round_up as round_up
+from .animation_data import scalar as scalar
+from .convergence import loss_history as loss_history
+from .structure_drawing import draw as draw
+from .structure_drawing import draw_clamps as draw_clamps
+from .structure_drawing import drive_arrows as drive_arrows
+from .structure_drawing import outline as outline

@@ -1,0 +1,109 @@
+"""How every figure and every player shows measurement beside simulation.
+
+Measured curves are dashed with markers, simulated ones continuous, prediction bands behind both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from reports.base import style
+from reports.panels.animation_data import AnimationClip
+from reports.study import LABEL, RecordedMotion, from_dataset
+
+Array = NDArray[np.float64]
+
+MARKERS = 22
+"""Of a measured curve."""
+_DASHES = (0, (2.6, 1.4))
+
+
+def measured_curve(axes: Axes, along: Array, values: Array, colour: str) -> None:
+    """A measured curve, its markers evenly spread."""
+    every = max(1, len(along) // MARKERS)
+    axes.plot(
+        along, values, color=colour, lw=0.8, ls=_DASHES, marker="o", ms=2.0, mfc="white",
+        mew=0.6, markevery=(every // 2, every), zorder=5,
+    )  # fmt: skip
+
+
+def band(axes: Axes, along: Array, low: Array, high: Array, colour: str) -> None:
+    """A prediction band."""
+    axes.fill_between(along, low, high, color=colour, alpha=0.22, lw=0, zorder=2)
+
+
+def handles(recordings: Sequence[RecordedMotion]) -> list[Artist]:
+    """What a legend tells of continuous and dashed lines, and of bands."""
+    if not recordings:
+        return []
+    words = "experiment" + (f" ({LABEL})" if any(each.synthetic for each in recordings) else "")
+    dashed = Line2D(
+        [], [], color=style.GREY, lw=0.8, ls=_DASHES, marker="o", ms=2.0, mfc="white", mew=0.6,
+        label=words,
+    )  # fmt: skip
+    lines: list[Artist] = [Line2D([], [], color=style.GREY, lw=1.2, label="simulation"), dashed]
+    shade = Patch(color=style.GREY, alpha=0.3, lw=0, label="prediction band")
+    return [*lines, shade]
+
+
+def clips(
+    recordings: Sequence[RecordedMotion], simulated: AnimationClip, wanted: Array, spacing: float
+) -> list[AnimationClip]:
+    """Recordings of one structure for a player, each under its own load case, with the residual.
+
+    Args:
+        recordings: of the structure; a second one of the same load case is a clip of its own.
+        simulated: what stands beside them.
+        wanted: (n_frames,) where along the course.
+        spacing: of the lattice, mm.
+    """
+    trials: list[dict[int, RecordedMotion]] = []
+    for each in recordings:
+        free = next((trial for trial in trials if each.case not in trial), None)
+        if free is None:
+            trials.append(free := {})
+        free[each.case] = each
+    return [_clip(trial, simulated, wanted, spacing) for trial in trials]
+
+
+def _clip(
+    trial: Mapping[int, RecordedMotion], simulated: AnimationClip, wanted: Array, spacing: float
+) -> AnimationClip:
+    first = next(iter(trial.values()))
+    shape = (len(simulated.motion), len(wanted), *simulated.motion.shape[2:])
+    motion, residual = np.full(shape, np.nan), np.full(shape, np.nan)
+    for case, each in trial.items():
+        motion[case] = each.at(each.data["measured"], wanted)
+        residual[case] = each.at(each.data["residual"], wanted)
+    return AnimationClip(
+        f"{simulated.name}, {first.source}",
+        simulated.colour,
+        from_dataset(first.data, spacing),
+        motion,
+        simulated.marker,
+        residual,
+    )
+
+
+def caption(recordings: Sequence[RecordedMotion]) -> str:
+    """What a figure with recordings says of them, as HTML; nothing without."""
+    if not recordings:
+        return ""
+    text = (
+        " Experiment stands above simulation; its curves are dashed with markers, those of the "
+        "simulation continuous; the bands hold 95 % of simulations of imperfect specimens under "
+        "the measured motion of drive and supports. Units that were not found are white."
+    )
+    if any(each.synthetic for each in recordings):
+        text += (
+            f" <b>{LABEL}</b>: these recordings were rendered from simulated imperfect specimens "
+            "and tracked as videos are; no specimen was filmed."
+        )
+    return text

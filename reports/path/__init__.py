@@ -1,1 +1,0 @@
-"""Report of structures along a path: a slowly growing load, or time."""

@@ -1,0 +1,1 @@
+"""Shows benchmarks: run time against error, growth, ablation, optimisers."""

@@ -1,0 +1,104 @@
+"""Pictures of written files: sheets from DXF, plates from 3MF, the whole specimen from STL."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from pipeline.fabrication.readback import Curve, MeshBody, read, read_3mf, read_stl
+from reports.base import GREY, INTACT, MM_PER_INCH, PALE
+from reports.products.fabrication.renderer import Body, picture
+
+WIDTH = 1000
+"""Of a picture in pixels."""
+
+PENS = {
+    "REFERENCE": GREY,
+    "SCORE": "#c25e00",
+    "ENGRAVE": "#1d7f78",
+    "CUT_INNER": "#17427f",
+    "CUT_OUTER": INTACT,
+}
+"""Colours in which the layers are shown here, in the order of drawing."""
+
+_RIM = 6.0  # mm around a sheet
+_BED = "#e6e8ea"
+_BED_HEIGHT = 1.0  # mm
+
+
+def sheet(path: Path) -> bytes:
+    """PNG of a drawing: parts filled, layers in their colours."""
+    drawing = read(path)
+    points = np.concatenate([curve.points for curve in drawing.curves])
+    low, high = points.min(axis=0) - _RIM, points.max(axis=0) + _RIM
+    dpi = WIDTH / (high[0] - low[0]) * MM_PER_INCH
+    figure = Figure(figsize=tuple((high - low) / MM_PER_INCH), dpi=dpi)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axes.set_axis_off()
+    for layer in PENS:
+        _draw(axes, layer, [curve for curve in drawing.curves if curve.layer == layer])
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return _small(Image.open(stream))
+
+
+def _draw(axes: Axes, layer: str, curves: list[Curve]) -> None:
+    """One layer; outer cuts are filled, holes are white."""
+    closed = [curve.points for curve in curves if curve.closed]
+    fill = {"CUT_OUTER": PALE, "CUT_INNER": "white"}.get(layer, "none")
+    order = list(PENS).index(layer) if layer != "CUT_OUTER" else 0.5
+    axes.add_collection(
+        PolyCollection(
+            closed, facecolors=fill, edgecolors=PENS[layer], linewidths=0.9, zorder=order
+        )
+    )
+    strokes = [curve.points for curve in curves if not curve.closed]
+    axes.add_collection(
+        LineCollection(strokes, colors=PENS[layer], linewidths=0.9, zorder=order + 1)
+    )
+
+
+def plate(path: Path, bed: tuple[float, float], colour: str) -> bytes:
+    """PNG of a printer's plate on its bed."""
+    solids = read_3mf(path)
+    board = _board(bed)
+    return _png(picture([board, *(_body(solid, colour) for solid in solids)], WIDTH))
+
+
+def assembled(path: Path, colour: str) -> bytes:
+    """PNG of the whole specimen."""
+    return _png(picture([_body(read_stl(path), colour)], WIDTH))
+
+
+def _body(solid: MeshBody, colour: str) -> Body:
+    return Body(solid.vertices, solid.triangles, colour)
+
+
+def _board(bed: tuple[float, float]) -> Body:
+    """The bed as a thin board below the parts."""
+    width, depth = bed
+    corners = np.array([[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]])
+    top = np.column_stack([corners, np.full(4, -0.01)])
+    bottom = np.column_stack([corners, np.full(4, -_BED_HEIGHT)])
+    sides = [[a, b, b + 4, a, b + 4, a + 4] for a, b in ((4, 5), (5, 6), (6, 7), (7, 4))]
+    faces = [[4, 5, 6], [4, 6, 7], *np.array(sides)[:, [0, 1, 2]], *np.array(sides)[:, [3, 4, 5]]]
+    turned = np.array(faces) % 8
+    return Body(np.vstack([bottom, top]), turned, _BED)
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    return _small(Image.fromarray(pixels))
+
+
+def _small(image: Image.Image) -> bytes:
+    """A PNG with a palette of its own: a third of the bytes, and no difference to see."""
+    stream = io.BytesIO()
+    image.convert("RGB").quantize(96, dither=Image.Dither.NONE).save(stream, format="PNG")
+    return stream.getvalue()

@@ -1,0 +1,1 @@
+"""Lists all that was built on one page."""

@@ -1,0 +1,124 @@
+"""What has been built below a folder of results: reports with their datasets, packages, recordings.
+
+Only what is there counts; nothing of the problems is read, so the index is of these very files.
+"""
+
+from __future__ import annotations
+
+import html
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from pipeline.datasets import file_hash
+from reports.facts import Fact
+from reports.facts import fact_records as facts
+
+FIGURE = re.compile(r"fig\d+")
+"""Names of the studies that are figures of the paper."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """A file, as seen from the folder of results; `note` tells more of it."""
+
+    address: str
+    text: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class BuiltDataset:
+    """Where a dataset is from: its file's hash, and what it says of itself."""
+
+    address: str
+    sha256: str
+    commit: str
+    problem: str
+
+
+@dataclass(frozen=True)
+class BuiltReport:
+    """One report, with what lies around it."""
+
+    name: str
+    title: str
+    draft: bool
+    page: Link
+    picture: Path
+    facts: list[Fact]
+    files: list[Link]
+    datasets: list[BuiltDataset]
+
+    @property
+    def figure(self) -> bool:
+        """Whether it is a figure of the paper, and not a variant or another study."""
+        return FIGURE.fullmatch(self.name) is not None
+
+
+def reports(results: Path) -> list[BuiltReport]:
+    """All reports in `results`: the paper's figures first, then others, by name."""
+    pages = sorted(results.glob("*/report/index.html"))
+    found = [_built(page, results) for page in pages]
+    return sorted(found, key=lambda built: (not built.figure, built.draft, built.name))
+
+
+def others(results: Path, folder: str, pattern: str) -> list[Link]:
+    """Files of a folder of results, by name."""
+    paths = sorted((results / folder).glob(pattern))
+    return [Link(_seen(path, results), path.name) for path in paths]
+
+
+def _built(page: Path, results: Path) -> BuiltReport:
+    name = page.parent.parent.name
+    text = page.read_text(encoding="utf-8")
+    title = re.search(r"<title>(.*?)</title>", text)
+    known = page.parent / "facts.json"
+    shown = _datasets(page, text)
+    folders = dict.fromkeys(file.parent for file in shown)
+    return BuiltReport(
+        name=name,
+        title=html.unescape(title[1]) if title else name,
+        draft='class="draft"' in text,
+        page=Link(_seen(page, results), "page"),
+        picture=page.parent / f"{name.partition('@')[0]}.png",
+        facts=facts.read_json(known) if known.is_file() else [],
+        files=[
+            *(Link(_seen(file, results), file.name) for file in sorted(page.parent.glob("*.pdf"))),
+            *(link for folder in folders for link in _around(folder, results)),
+        ],
+        datasets=[_dataset(file, results) for file in shown],
+    )
+
+
+def _datasets(page: Path, text: str) -> list[Path]:
+    """The datasets that a page links to, as far as they are there."""
+    addresses = re.findall(r'href="([^":]*\.nc)"', text)
+    files = (Path(os.path.normpath(page.parent / address)) for address in addresses)
+    return [file for file in files if file.is_file()]
+
+
+def _around(folder: Path, results: Path) -> list[Link]:
+    """What is built of a study, and its recordings: their quality, and whether they were filmed."""
+    package = folder / "fabrication/index.html"
+    found = [Link(_seen(package, results), "fabrication files")] if package.is_file() else []
+    for page in sorted(folder.glob("recordings/*/index.html")):
+        with xr.open_dataset(page.parent / "track.nc") as track:
+            note = "SYNTHETIC" if track.attrs["synthetic"] == "yes" else ""
+        found.append(Link(_seen(page, results), f"recording “{page.parent.name}”", note))
+    return found
+
+
+def _dataset(file: Path, results: Path) -> BuiltDataset:
+    with xr.open_dataset(file) as data:
+        about = {key: str(data.attrs.get(key, "")) for key in ("git_commit", "problem_hash")}
+    return BuiltDataset(
+        _seen(file, results), file_hash(file), about["git_commit"], about["problem_hash"]
+    )
+
+
+def _seen(path: Path, results: Path) -> str:
+    return path.relative_to(results).as_posix()

@@ -1,0 +1,1 @@
+"""Renders movies of structures side by side under their loads."""

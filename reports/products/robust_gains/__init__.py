@@ -1,0 +1,1 @@
+"""Shows what robust designs gain over the study's own."""

@@ -1,0 +1,1 @@
+"""Shows small vibrations: modes, transmission, waves in the unit cell."""

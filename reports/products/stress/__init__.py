@@ -1,0 +1,1 @@
+"""Shows the counts of the stress suite."""

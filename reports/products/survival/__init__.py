@@ -1,0 +1,1 @@
+"""Shows what survived damage, kills and full disks."""

@@ -1,0 +1,1 @@
+"""Shows a sweep over any parameters: figure, tables, page."""

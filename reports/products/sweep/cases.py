@@ -1,0 +1,76 @@
+"""The cases of a sweep as a picture shows them: along axes of numbers or of words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem.sections import Sweep
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SweepAxis:
+    """A parameter of a sweep.
+
+    Attributes:
+        label: its keys and unit.
+        places: (case) its values; those of words are their numbers in `words`.
+        words: the values, where they are no numbers.
+    """
+
+    label: str
+    places: Floats
+    words: tuple[str, ...] = ()
+
+    @property
+    def distinct(self) -> Floats:
+        """Every value once, ascending."""
+        return np.unique(self.places)
+
+
+def axes(data: xr.Dataset) -> list[SweepAxis]:
+    """The parameters of a sweep, in its order."""
+    return [_axis(data.sel(parameter=key)) for key in data["parameter"].values]
+
+
+def _axis(data: xr.Dataset) -> SweepAxis:
+    key, unit = str(data["parameter"].values), str(data["parameter_units"].values)
+    values = data["value"].values
+    if np.isfinite(values).all():
+        return SweepAxis(key if unit == "1" else f"{key} ({unit})", values)
+    words, numbers = np.unique(data["setting"].values, return_inverse=True)
+    return SweepAxis(key, numbers.astype(float), tuple(map(str, words)))
+
+
+def ordered(sweep: Sweep) -> bool:
+    """Whether the cases are points of a curve, one beside the other."""
+    return sweep.random is None and len(sweep.keys) == 1
+
+
+def mapped(sweep: Sweep) -> bool:
+    """Whether the cases are the points of a map: all combinations of two parameters."""
+    return sweep.grid is not None and len(sweep.keys) == 2
+
+
+def good(data: xr.Dataset) -> NDArray[np.bool_]:
+    """(case) whether a case has results."""
+    return (data["status"] == "ok").values
+
+
+def ratio(data: xr.Dataset) -> Floats:
+    """(case) loss of the cloaked structure over that of the altered one; NaN for failed cases."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        quotient: Floats = (data["loss"] / data["loss_altered"]).values
+    return np.where(np.isfinite(quotient), quotient, np.nan)
+
+
+def failures(data: xr.Dataset) -> list[tuple[str, int]]:
+    """Why cases failed, and how many for each reason, the most frequent first."""
+    reasons, counts = np.unique(data["status"].values[~good(data)], return_counts=True)
+    found = [(str(reason), int(count)) for reason, count in zip(reasons, counts, strict=True)]
+    return sorted(found, key=lambda entry: -entry[1])

@@ -1,0 +1,1 @@
+"""Shows a track on its video, with its quality."""

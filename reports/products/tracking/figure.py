@@ -1,0 +1,132 @@
+"""The figure of a quality report: residuals and uncertainty over the specimen, and over time."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from pipeline.tracking.frames import WORD
+from pipeline.tracking.geometry import SpecimenOutlines
+from reports.base import style
+from reports.products.tracking.overlay import of_track
+from reports.products.tracking.track_quality import TrackQuality
+
+_REASONS = {
+    "out_of_frame": style.GREY,
+    "hidden": style.INTACT,
+    "glare": "#e8c547",
+    "poor_fit": style.ALTERED,
+    "strayed": "#b03060",
+}
+_SIZE, _TOP = 50.0, 9.0
+
+
+def draw_quality(track: xr.Dataset, found: TrackQuality, load_axis: str) -> Figure:
+    """Maps above, courses below: over time, or over the displacement of the driven units."""
+    drawn = style.page(132.0)
+    if track.attrs["synthetic"] == "yes":
+        drawn.text(0.99, 0.005, WORD, ha="right", va="bottom", color=style.ALTERED)
+    specimen = of_track(track)
+    there = np.isin(track["unit"].values, specimen.ids)
+    residual = track["camera_residual"].values[there]
+    sigma = track["sigma"].transpose("time", "unit", "dof").values[:, there]
+    scale = np.array([1 / found.pixel, 1 / found.pixel, 180 / np.pi])
+    typical = np.nanmedian(sigma * scale, axis=0)
+    maps = [
+        ("a", "First frame less design, px", np.hypot(*residual.T)),
+        ("b", "Uncertainty of the place, px", np.hypot(*typical[:, :2].T) / np.sqrt(2)),
+        ("c", "Uncertainty of the rotation, deg", typical[:, 2]),
+    ]
+    for place, (letter, title, values) in enumerate(maps):
+        left = 2.0 + 60.0 * place
+        style.letter(drawn, left, 1.0, letter, title)
+        axes = style.place(drawn, left, _TOP, _SIZE, _SIZE)
+        shown = _map(axes, specimen, values)
+        bar = style.place(drawn, left + _SIZE - 3.0, _TOP + 12.0, 1.8, _SIZE - 24.0)
+        drawn.colorbar(shown, cax=bar)
+    _arrows(drawn.axes[0], specimen, residual)
+    _courses(drawn, track, found, sigma * scale, _axis(track, load_axis))
+    return drawn
+
+
+def _map(axes: Axes, specimen: SpecimenOutlines, values: np.ndarray) -> PolyCollection:
+    outlines = [specimen.centre[k] + specimen.polygon(k) for k in range(specimen.count)]
+    most = float(np.nanpercentile(values, 98)) if np.isfinite(values).any() else 1.0
+    shown = PolyCollection(outlines, edgecolors=style.INTACT, linewidths=0.15)
+    shown.set(array=values, cmap=style.MAGNITUDE, norm=Normalize(0, max(most, 1e-9)))
+    axes.add_collection(shown)
+    points = np.concatenate(outlines)
+    low, high = points.min(axis=0), points.max(axis=0)
+    spare = 0.18 * (high[0] - low[0])  # room for the colour bar
+    axes.set(xlim=(low[0], high[0] + spare), ylim=(low[1], high[1]), aspect="equal")
+    axes.set_axis_off()
+    return shown
+
+
+def _arrows(axes: Axes, specimen: SpecimenOutlines, residual: np.ndarray) -> None:
+    """Directions of the residuals; pixels count downwards."""
+    x, y = specimen.centre.T
+    longest = max(float(np.nanpercentile(np.hypot(*residual.T), 98)), 1e-9)
+    reach = longest / np.sqrt(np.median(specimen.area))
+    axes.quiver(
+        x,
+        y,
+        residual[:, 0],
+        -residual[:, 1],
+        angles="xy",
+        scale_units="xy",
+        scale=reach,
+        width=0.005,
+        color=style.ALTERED,
+    )
+
+
+def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:
+    """What the courses are drawn over (frames,), and its label."""
+    if load_axis == "time":
+        return track["time"].values, "time, s"
+    moved = track["drive_displacement"].values
+    far = np.nan_to_num(np.linalg.norm(moved, axis=1))
+    direction = moved[far.argmax()] / max(far.max(), 1e-9)
+    return moved @ direction, "displacement of the driven units, mm"
+
+
+def _courses(
+    drawn: Figure,
+    track: xr.Dataset,
+    found: TrackQuality,
+    sigma: np.ndarray,
+    axis: tuple[np.ndarray, str],
+) -> None:
+    load, label = axis
+    style.letter(drawn, 2.0, 66.0, "d", "Units that are lost, by reason")
+    axes = style.place(drawn, 14.0, 73.0, 70.0, 47.0)
+    for name, share in zip(found.reasons, found.lost.T, strict=True):
+        if share.any():
+            reason = name.replace("_", " ")
+            axes.plot(load, 100 * share, color=_REASONS[name], label=reason, drawstyle="steps-mid")
+    if found.lost.any():
+        axes.legend(loc="best")
+    else:
+        axes.text(0.5, 0.5, "none", transform=axes.transAxes, ha="center")
+    span = (np.nanmin(load), np.nanmax(load)) if len(load) > 1 else None
+    axes.set(xlabel=label, ylabel="of the units, %", xlim=span, ylim=(0, None))
+    style.letter(drawn, 92.0, 66.0, "e", "Uncertainty of the place: median, 90 % of the units")
+    axes = style.place(drawn, 104.0, 73.0, 70.0, 47.0)
+    place = np.hypot(sigma[..., 0], sigma[..., 1]) / np.sqrt(2)
+    with np.errstate(all="ignore"):
+        low, middle, high = np.nanpercentile(place, [5, 50, 95], axis=1)
+    axes.fill_between(load, low, high, color=style.PALE, linewidth=0)
+    axes.plot(load, middle, color=style.INTACT)
+    if np.isfinite(found.floor[0]):
+        floor = float(np.hypot(*found.floor[:2]) / np.sqrt(2))
+        axes.axhline(floor, color=style.ALTERED, linestyle="--", label="scatter at rest")
+        axes.legend(loc="best")
+    for flag, colour in ((1, style.ALTERED), (2, style.CLOAKED)):
+        for moment in load[track["timing"].values == flag]:
+            axes.axvline(moment, color=colour, linewidth=0.5)
+    axes.set(xlabel=label, ylabel="px", ylim=(0, None))

@@ -1,0 +1,196 @@
+"""The video with what was found in it: units coloured by their motion, ids, lost units hatched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import xarray as xr
+from matplotlib.colors import Colormap, to_rgb
+from numpy.typing import NDArray
+
+from pipeline.runtime import Floats, Image
+from pipeline.tracking.frames import Frame
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, of_design
+from reports.base import style
+
+SHOWN = ("displacement", "rotation")
+
+_SHIFT = 4  # bits behind the point of cv2's coordinates
+_OPACITY = 0.8
+_BAND = 46  # px below the picture
+_LARGE = 1000  # px: smaller pictures are doubled, so that ids can be read
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_INK = (26, 26, 26)
+_LOST = tuple(round(255 * part) for part in to_rgb(style.ALTERED))
+
+
+class Painter(NamedTuple):
+    """Draws a track on the frames of its video.
+
+    Attributes:
+        specimen: the units that are present.
+        camera: of the track.
+        pose: (frames, units, 3), NaN where lost.
+        values: (frames, units) what the colours show.
+        colours: (256, 3) of the colour map.
+        limits: values at its ends.
+        label: what the colours show, with its unit.
+        note: words at the right end of the band.
+        scale: how much larger the picture is drawn.
+    """
+
+    specimen: SpecimenOutlines
+    camera: Camera
+    pose: Floats
+    values: Floats
+    colours: NDArray[np.uint8]
+    limits: tuple[float, float]
+    label: str
+    note: str
+    scale: int
+
+
+def painter(track: xr.Dataset, shown: str) -> Painter:
+    """The painter of a track.
+
+    Args:
+        track: the dataset.
+        shown: displacement (its size) or rotation.
+    """
+    specimen = of_track(track)
+    there = np.isin(track["unit"].values, specimen.ids)
+    pose = track["displacement"].transpose("time", "unit", "dof").values[:, there]
+    size = tuple(int(side) for side in track["image_size"].values)
+    camera = Camera(
+        track["camera_homography"].values,
+        track["camera_centre"].values,
+        track["camera_radial"].values,
+        (size[0], size[1]),
+    )
+    if shown == "rotation":
+        values, colours, label = np.rad2deg(pose[..., 2]), style.SIGNED, "rotation, deg"
+    else:
+        values, colours = np.hypot(pose[..., 0], pose[..., 1]), style.MAGNITUDE
+        label = "displacement, mm"
+    most = float(np.nanmax(np.abs(values), initial=1e-6))
+    return Painter(
+        specimen,
+        camera,
+        pose,
+        values,
+        _palette(colours),
+        (-most if shown == "rotation" else 0.0, most),
+        label,
+        "SYNTHETIC" if track.attrs["synthetic"] == "yes" else "",
+        2 if max(size) < _LARGE else 1,
+    )
+
+
+def of_track(track: xr.Dataset) -> SpecimenOutlines:
+    """The units of a track; who is joined to whom it does not say."""
+    nobody = np.empty((0, 2), int)
+    ends = ("ligament", "end")
+    return of_design(track.assign(ligament_unit=(ends, nobody), ligament_vertex=(ends, nobody)))
+
+
+def images(painted: Painter, frames: Iterable[Frame]) -> Iterator[Image]:
+    """The frames (rows, columns, 3) with everything drawn on them."""
+    last = np.zeros_like(painted.pose[0])
+    legend = _legend(painted)
+    for index, frame in zip(range(len(painted.pose)), frames, strict=False):
+        lost = np.isnan(painted.pose[index, :, 0])
+        last = np.where(lost[:, None], last, painted.pose[index])
+        size = [side * painted.scale for side in painted.camera.size]
+        big = np.asarray(cv2.resize(frame.image, size), np.uint8)
+        drawn = _units(painted, np.repeat(big[..., None], 3, axis=2), index, last)
+        yield np.vstack([drawn, _told(painted, legend, index, frame.time, int(lost.sum()))])
+
+
+def _palette(colours: Colormap) -> NDArray[np.uint8]:
+    table = colours(np.linspace(0, 1, 256))[:, :3]
+    return np.round(255 * np.asarray(table)).astype(np.uint8)
+
+
+def _units(painted: Painter, image: Image, index: int, pose: Floats) -> Image:
+    corners = _corners(painted, pose)
+    places = _pixels(painted, painted.specimen.centre + pose[:, :2])
+    low, high = painted.limits
+    share = np.clip((painted.values[index] - low) / (high - low), 0, 1)
+    over = image.copy()
+    for unit, polygon in enumerate(corners):
+        if np.isfinite(share[unit]):
+            colour = painted.colours[round(255 * share[unit])].tolist()
+            cv2.fillPoly(over, [polygon], colour, cv2.LINE_AA, _SHIFT)
+    cv2.addWeighted(over, _OPACITY, image, 1 - _OPACITY, 0, image)
+    for unit, polygon in enumerate(corners):
+        lost = not np.isfinite(share[unit])
+        if lost:
+            _hatch(image, polygon)
+        cv2.polylines(image, [polygon], True, _LOST if lost else _INK, 1, cv2.LINE_AA, _SHIFT)
+    _ids(painted, image, places)
+    return image
+
+
+def _corners(painted: Painter, pose: Floats) -> list[NDArray[np.int32]]:
+    """Outlines of the units in the picture, in cv2's fixed point."""
+    out = []
+    for unit in range(painted.specimen.count):
+        cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
+        turned = painted.specimen.polygon(unit) @ np.array([[cos, sin], [-sin, cos]])
+        out.append(_pixels(painted, painted.specimen.centre[unit] + pose[unit, :2] + turned))
+    return out
+
+
+def _pixels(painted: Painter, points: Floats) -> NDArray[np.int32]:
+    large = (painted.camera.project(points) + 0.5) * painted.scale - 0.5
+    return np.round(large * (1 << _SHIFT)).astype(np.int32)
+
+
+def _hatch(image: Image, polygon: NDArray[np.int32]) -> None:
+    """Slanted lines within the outline."""
+    mask = np.zeros(image.shape[:2], np.uint8)
+    cv2.fillPoly(mask, [polygon], 1, cv2.LINE_8, _SHIFT)
+    rows, columns = np.nonzero(mask)
+    striped = (rows + columns) % 8 < 2
+    image[rows[striped], columns[striped]] = _LOST
+
+
+def _ids(painted: Painter, image: Image, places: NDArray[np.int32]) -> None:
+    pitch = np.sqrt(np.median(painted.specimen.area))
+    size = float(np.linalg.norm(painted.camera.jacobian(painted.specimen.centre[:1])[0, :, 0]))
+    height = 0.011 * pitch * size * painted.scale
+    for number, (x, y) in zip(painted.specimen.ids, places >> _SHIFT, strict=True):
+        text = str(number)
+        (wide, high), _ = cv2.getTextSize(text, _FONT, height, 1)
+        at = (int(x - wide / 2), int(y + high / 2))
+        cv2.putText(image, text, at, _FONT, height, (255, 255, 255), 3, cv2.LINE_AA)
+        cv2.putText(image, text, at, _FONT, height, _INK, 1, cv2.LINE_AA)
+
+
+def _legend(painted: Painter) -> Image:
+    """The band below the picture: colour bar and what it shows."""
+    band = np.full((_BAND, painted.camera.size[0] * painted.scale, 3), 255, np.uint8)
+    bar = np.repeat(painted.colours[None], 14, axis=0)
+    low, high = (f"{limit:.3g}" for limit in painted.limits)
+    start = 16 + cv2.getTextSize(low, _FONT, 0.45, 1)[0][0]
+    band[16:30, start : start + 256] = bar
+    cv2.rectangle(band, (start, 16), (start + 255, 29), _INK, 1)
+    _write(band, low, 8)
+    _write(band, f"{high}   {painted.label}", start + 264)
+    return band
+
+
+def _told(painted: Painter, legend: Image, index: int, time: float, lost: int) -> Image:
+    band = legend.copy()
+    words = [f"frame {index}", f"{time:.3f} s", f"{lost} lost", painted.note]
+    text = "   ".join(word for word in words if word)
+    wide = cv2.getTextSize(text, _FONT, 0.45, 1)[0][0]
+    _write(band, text, band.shape[1] - wide - 10)
+    return band
+
+
+def _write(band: Image, text: str, left: int) -> None:
+    cv2.putText(band, text, (left, 28), _FONT, 0.45, _INK, 1, cv2.LINE_AA)

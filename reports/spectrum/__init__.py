@@ -1,1 +1,0 @@
-"""The page on small vibrations: modes, transmission, waves in the unit cell."""

@@ -1,0 +1,5 @@
+"""Reads a study's results as reports see them."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,113 @@
+"""Recordings of a study beside its simulation, along the same course: time, or the load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from pipeline.problem import Problem
+from reports.study.rigid_units import Array
+
+LABEL = "SYNTHETIC"
+"""Stands wherever a motion is shown that was rendered and not filmed."""
+
+_UNLOADING = 2
+_BEYOND = 0.02
+"""Share of the course by which a recording may end before it, and still shows its end."""
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """One recording.
+
+    Attributes:
+        name: of its file.
+        data: the dataset `comparison`.
+        along: (n_frames,) time in s, or displacement of the driven units along the drive in mm,
+            never falling.
+        frames: (n_frames,) the frames that these are, of those in the dataset.
+    """
+
+    name: str
+    data: xr.Dataset
+    along: Array
+    frames: NDArray[np.int64]
+
+    @property
+    def structure(self) -> str:
+        """The structure that was filmed."""
+        return str(self.data.attrs["structure"])
+
+    @property
+    def case(self) -> int:
+        """The load case that it was under."""
+        return int(self.data.attrs["case"])
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether it was rendered."""
+        return str(self.data.attrs["synthetic"]) == "yes"
+
+    @property
+    def source(self) -> str:
+        """What a figure calls it."""
+        return f"experiment ({LABEL})" if self.synthetic else "experiment"
+
+    def values(self, variable: xr.DataArray) -> Array:
+        """A variable (time, ...) of the dataset at its frames (n_frames, ...)."""
+        found: Array = variable.transpose("time", ...).values[self.frames]
+        return found
+
+    def at(self, variable: xr.DataArray, wanted: Array) -> Array:
+        """A variable (time, ...) of the dataset, interpolated; NaN where nothing was recorded.
+
+        Args:
+            variable: one of the dataset.
+            wanted: where along the course, in the unit of `along`.
+        """
+        values = self.values(variable)
+        slack = _BEYOND * (float(np.max(wanted)) - float(self.along[0]))
+        within = (wanted >= self.along[0] - slack) & (wanted <= self.along[-1] + slack)
+        place = np.interp(wanted, self.along, np.arange(len(self.along)))
+        low = np.minimum(place.astype(int), len(values) - 2)
+        part = (place - low).reshape(-1, *[1] * (values.ndim - 1))
+        found = values[low] + part * (values[low + 1] - values[low])
+        return np.where(within.reshape(part.shape), found, np.nan)
+
+    def motion(self, response: xr.Dataset, wanted: Array) -> xr.Dataset:
+        """The measured motion in the form of a response of one structure and one case.
+
+        Args:
+            response: of the study.
+            wanted: where along the course; these are its `time`.
+        """
+        part = response.sel(structure=self.structure).isel(case=[self.case], time=slice(0, 0))
+        part = part.drop_vars([name for name in part.data_vars if "time" in part[name].dims])
+        measured = self.at(self.data["measured"], wanted)[None]
+        dims = ("case", "time", "unit", "dof")
+        return part.assign_coords(time=wanted).assign(displacement=(dims, measured))
+
+
+def recordings(
+    problem: Problem, response: xr.Dataset, compared: Mapping[str, xr.Dataset]
+) -> list[RecordedMotion]:
+    """The recordings of a study, in the order of its structures and load cases."""
+    found = [_recorded(problem, response, name, data) for name, data in sorted(compared.items())]
+    order = [str(name) for name in response["structure"].values]
+    return sorted(found, key=lambda each: (order.index(each.structure), each.case))
+
+
+def _recorded(
+    problem: Problem, response: xr.Dataset, name: str, data: xr.Dataset
+) -> RecordedMotion:
+    along = data["time"].values
+    if problem.static:
+        angle = np.radians(float(response["direction"][int(data.attrs["case"])]))
+        along = data["drive_displacement"].values @ np.array([np.cos(angle), np.sin(angle)])
+    kept = np.flatnonzero(np.isfinite(along) & (data["branch"].values != _UNLOADING))
+    order = kept[np.argsort(along[kept], kind="stable")]
+    return RecordedMotion(name, data, along[order], order)

@@ -1,0 +1,211 @@
+"""A study as a report sees it: its problem and the datasets that its stages made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.datasets.tables import Kind
+from pipeline.posing import law_comparison
+from pipeline.problem import Output, Problem, Stage
+from pipeline.runtime import UserError
+from reports.study import draft, recorded_motion, report_scene
+from reports.study.recorded_motion import RecordedMotion
+from reports.study.report_scene import ReportScene
+
+STAGES: dict[Output, Stage] = {
+    "design": "design",
+    "response": "simulate",
+    "sweep": "sweep",
+    "scatter": "scatter",
+    "verification": "verify",
+    "geometric_design": "geometric",
+    "geometric_response": "simulate",
+}
+KINDS: dict[Output, Kind] = {
+    "design": "design",
+    "response": "response",
+    "sweep": "sweep",
+    "scatter": "scatter",
+    "verification": "verification",
+    "geometric_design": "design",
+    "geometric_response": "response",
+}
+
+
+@dataclass(frozen=True)
+class RedesignResults:
+    """The design for contact on distance, and what the structures do with that contact."""
+
+    design: xr.Dataset
+    response: xr.Dataset
+
+    @property
+    def evaluations(self) -> int:
+        """Number of evaluations of the second optimisation."""
+        return int(np.isfinite(self.design["loss"]).sum())
+
+    @property
+    def changed(self) -> bool:
+        """Whether there was a second optimisation."""
+        return self.design.sizes["evaluation"] > 1
+
+
+@dataclass(frozen=True)
+class StudyResults:
+    """Problem, datasets by kind, where they are from, and why this is but a draft (if it is one).
+
+    `name` is that of the study's folder and of its figure; `files` are hashes of the datasets;
+    `compared` are its recordings beside their simulation, by name.
+    """
+
+    name: str
+    preset: str | None
+    problem: Problem
+    datasets: dict[Output, xr.Dataset]
+    files: dict[str, str]
+    draft: tuple[str, ...] = ()
+    compared: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+    @cached_property
+    def recordings(self) -> list[RecordedMotion]:
+        """The recordings along the study's course."""
+        return recorded_motion.recordings(self.problem, self.response, self.compared)
+
+    @cached_property
+    def scene(self) -> ReportScene:
+        """The harmonically driven lattice of the problem.
+
+        Raises:
+            UserError: the drive is not harmonic.
+        """
+        return report_scene.scene_of_problem(self.problem)
+
+    @property
+    def target(self) -> str:
+        """What builds the study, and the name of its folder of results."""
+        return self.name if self.preset is None else f"{self.name}@{self.preset}"
+
+    @property
+    def design(self) -> xr.Dataset:
+        """The shipped design with the histories of all methods."""
+        return self.datasets["design"]
+
+    @property
+    def response(self) -> xr.Dataset:
+        """What the structures do."""
+        return self.datasets["response"]
+
+    @property
+    def sweep(self) -> xr.Dataset:
+        """The losses over parameters, of a problem that asks for them."""
+        return self.datasets["sweep"]
+
+    @property
+    def scatter(self) -> xr.Dataset | None:
+        """Imperfect copies of the design, if the problem asks for them."""
+        return self.datasets.get("scatter")
+
+    @property
+    def verification(self) -> xr.Dataset | None:
+        """The design under finer load steps and another contact law, of a study on load steps."""
+        return self.datasets.get("verification")
+
+    @property
+    def again(self) -> RedesignResults | None:
+        """The design reconsidered with contact on distance, of a static study by the angle law."""
+        if "geometric_design" not in self.datasets:
+            return None
+        return RedesignResults(
+            self.datasets["geometric_design"], self.datasets["geometric_response"]
+        )
+
+
+def load(
+    path: Path,
+    preset: str | None,
+    files: Mapping[Output, Path],
+    comparisons: Sequence[Path] = (),
+) -> StudyResults:
+    """The study of a problem file (with a preset), its datasets, and those of its recordings.
+
+    A recording is called by the folder that its comparison lies in.
+
+    Raises:
+        UserError: a file is missing, broken, or made from another problem than this.
+    """
+    whole = problem.load(path)
+    chosen = whole if preset is None else problem.load(path, preset)
+    wanted = problem.outputs(chosen)
+    if missing := [kind for kind in wanted if kind not in files]:
+        raise UserError(
+            f"the report of this problem also shows its {missing[0]} dataset",
+            file=path,
+            remedy=f"give it as --{missing[0]}",
+        )
+    read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
+    for name, data in read.items():
+        posed = law_comparison.geometric(chosen) if name == "geometric_response" else chosen
+        check_problem(posed, STAGES[name], data, files[name])
+    compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
+    return StudyResults(
+        name=path.resolve().parent.name,
+        preset=preset,
+        problem=chosen,
+        datasets=read,
+        files={f"{kind}.nc": provenance.file_hash(files[kind]) for kind in wanted}
+        | {f"recordings/{f.parent.name}/{f.name}": provenance.file_hash(f) for f in comparisons},
+        draft=tuple(draft.reasons(chosen, whole)),
+        compared=compared,
+    )
+
+
+def built(
+    path: Path, preset: str | None, results: Path, recordings: Sequence[str] = ()
+) -> StudyResults:
+    """The study of a problem file, its datasets where the workflow puts them below `results`.
+
+    Args:
+        path: the problem file.
+        preset: one of its presets.
+        results: the folder of all results.
+        recordings: names of those that are shown.
+
+    Raises:
+        UserError: as for `load`.
+    """
+    name = path.resolve().parent.name
+    folder = results / (name if preset is None else f"{name}@{preset}")
+    wanted = problem.outputs(problem.load(path, preset))
+    compared = [folder / f"recordings/{each}/comparison.nc" for each in recordings]
+    return load(path, preset, {kind: folder / f"{kind}.nc" for kind in wanted}, compared)
+
+
+def _comparison(chosen: Problem, path: Path) -> xr.Dataset:
+    data = datasets.read(path, "comparison")
+    check_problem(chosen, "compare", data, path)
+    return data
+
+
+def check_problem(posed: Problem, stage: Stage, data: xr.Dataset, path: Path) -> None:
+    """Whether a dataset was made from this problem.
+
+    Raises:
+        UserError: it was not.
+    """
+    wanted = problem.section_hash(posed, stage)
+    if (found := data.attrs.get("problem_hash")) != wanted:
+        raise UserError(
+            "the dataset was made from another problem (or another preset)",
+            file=path,
+            key="problem_hash",
+            value=found,
+            remedy="run its stage again with this problem, or give the problem it was made from",
+        )

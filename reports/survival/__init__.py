@@ -1,1 +1,0 @@
-"""The page on what was tried to lose or to spoil results, and what survived."""

@@ -1,1 +1,0 @@
-"""A sweep over any parameters: figure, tables and page."""

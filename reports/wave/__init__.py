@@ -1,1 +1,0 @@
-"""Report of structures that waves run through."""

@@ -1,0 +1,5 @@
+"""Finds units that come near one another, and the step up to their contact."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

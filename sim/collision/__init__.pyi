@@ -1,0 +1,9 @@
+from .candidate_pairs import CandidatePairs as CandidatePairs
+from .candidate_pairs import contact_arrays as contact_arrays
+from .candidate_pairs import find_candidate_pairs as find_candidate_pairs
+from .candidate_pairs import raise_new_pairs as raise_new_pairs
+from .neighbour_list import find as find
+from .neighbour_list import pairs_in_contact as pairs_in_contact
+from .neighbour_list import term as term
+from .polygons import ContactArrays as ContactArrays
+from .step_limit import collision_free_step as collision_free_step

@@ -1,0 +1,114 @@
+"""The units that may meet: what contact on their distance adds to the fixed structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.collision.neighbour_list import MAX_STRANGERS, TERMS_PER_VERTEX
+from sim.collision.polygons import ContactArrays, NeighbourCache
+from sim.core import Ints, NewContactPairs
+from sim.structure import ConcreteParameters, Lattice, close_pairs
+
+MARGIN = 1 / 15
+"""Motion of a unit after which neighbours are searched for again, in lattice spacings."""
+
+
+@dataclass(frozen=True)
+class CandidatePairs:
+    """Units as polygons, and the pairs of them that the tangent couples.
+
+    Attributes:
+        pairs: (n_pairs, 2) units, ascending.
+        first: (n_units + 1,) start of each polygon in the vertices.
+        following: (n_vertices,) the counter-clockwise neighbour of each vertex.
+        distance: activation distance, mm.
+        length: mean length of the ligaments, mm.
+        reach: distance within which units are watched, mm.
+    """
+
+    pairs: Ints
+    first: Ints
+    following: Ints
+    distance: float
+    length: float
+    reach: float
+
+    @property
+    def owner(self) -> Ints:
+        """(n_vertices,) unit of each vertex."""
+        return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
+
+    def with_pairs(self, strangers: Ints) -> CandidatePairs:
+        """The same with more pairs (n, 2) of units."""
+        return replace(self, pairs=np.unique(np.concatenate([self.pairs, strangers]), axis=0))
+
+
+def find_candidate_pairs(lattice: Lattice, distance: float) -> CandidatePairs:
+    """The units of a lattice, of which those within one spacing at rest are expected to meet.
+
+    Others may meet as well: a solve finds out, and is repeated with them (``with_pairs``).
+    """
+    return CandidatePairs(
+        pairs=close_pairs(lattice, lattice.vertices, lattice.spacing),
+        first=np.ascontiguousarray(lattice.first_vertex),
+        following=np.ascontiguousarray(lattice.next_vertex),
+        distance=distance,
+        length=float(np.linalg.norm(lattice.ligament_vectors, axis=1).mean()),
+        reach=lattice.spacing,
+    )
+
+
+def contact_arrays(
+    meeting: CandidatePairs | None, values: ConcreteParameters, n_units: int
+) -> ContactArrays:
+    """The kernels' arrays of concrete parameters; without pairs if there is nothing to meet."""
+    corner = np.array(values.corner, dtype=float, order="C")
+    if meeting is None:
+        none = np.zeros(0, dtype=np.int64)
+        meeting = CandidatePairs(none.reshape(0, 2), none, none, 1.0, 1.0, 1.0)
+    n_vertices = len(meeting.following)
+    radius = np.zeros(len(meeting.first[1:]))
+    np.maximum.at(radius, meeting.owner, np.linalg.norm(corner[:n_vertices], axis=1))
+    scale = (meeting.distance / meeting.length) ** 2
+    return ContactArrays(
+        pairs=np.ascontiguousarray(meeting.pairs),
+        first=meeting.first,
+        owner=meeting.owner,
+        following=meeting.following,
+        corner=corner,
+        centroid=np.array(values.centroid, dtype=float, order="C"),
+        radius=radius,
+        energy=float(values.contact.mean()) * scale,
+        per_stiffness=scale / len(values.contact),
+        distance=meeting.distance,
+        reach=meeting.reach,
+        margin=MARGIN * meeting.reach,
+        watch=_watch(meeting, n_units),
+    )
+
+
+def raise_new_pairs(contacts: ContactArrays) -> None:
+    """Raises ``NewContactPairs`` if a solve ended since the tangent has no room for a pair."""
+    count = contacts.watch.found[1]
+    if count > 0:
+        raise NewContactPairs(contacts.watch.strangers[:count].copy())
+
+
+def _watch(meeting: CandidatePairs, n_units: int) -> NeighbourCache:
+    """Scratch that belongs to no state yet."""
+    n_vertices, n_watched = len(meeting.following), len(meeting.first[1:])
+    return NeighbourCache(
+        state=np.full(3 * n_units, np.inf),
+        place=np.zeros((n_vertices, 2)),
+        centre=np.zeros((n_watched, 2)),
+        searched=np.full(3 * n_units, np.inf),
+        moved=np.zeros(n_watched),
+        gap=np.zeros(len(meeting.pairs)),
+        room=np.zeros(1),
+        strangers=np.zeros((MAX_STRANGERS, 2), dtype=np.int64),
+        terms=np.zeros((TERMS_PER_VERTEX * n_vertices, 3), dtype=np.int64),
+        found=np.zeros(2, dtype=np.int64),
+        overlap=np.full(2, -1),
+    )

@@ -1,0 +1,147 @@
+"""Outlines of units in a state: where they are, how near two come, and whether they cross."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.core import Floats, Ints, compiled
+
+
+class NeighbourCache(NamedTuple):
+    """What is known of the last state looked at; overwritten at will.
+
+    Attributes:
+        state: (n_dofs,) that state.
+        place: (n_vertices, 2) its vertices, mm.
+        centre: (n_units, 2) its centroids, mm.
+        searched: (n_dofs,) the state of the last sweep.
+        moved: (n_units,) bound of the motion of each unit's points since then, mm.
+        gap: (n_pairs,) distance of the pairs then, or a lower bound of it, mm.
+        room: (1,) smallest distance of two strangers then, or a lower bound of it, mm.
+        strangers: (MAX_STRANGERS, 2) units of pairs that the tangent has no room for.
+        terms: (n, 3) vertex, and the start and end of an edge; the end is -1 for a vertex alone.
+        found: (2,) number of terms, -1 if the state is not admissible, and number of strangers.
+        overlap: (2,) units that overlap, if the state is not admissible.
+    """
+
+    state: Floats
+    place: Floats
+    centre: Floats
+    searched: Floats
+    moved: Floats
+    gap: Floats
+    room: Floats
+    strangers: Ints
+    terms: Ints
+    found: Ints
+    overlap: Ints
+
+
+class ContactArrays(NamedTuple):
+    """Units that may meet, as the kernels take them; without pairs there is no contact.
+
+    Attributes:
+        pairs: (n_pairs, 2) units, ascending, whose coupling the tangent has room for.
+        first: (n_units + 1,) start of each polygon in the vertices.
+        owner: (n_vertices,) unit of each vertex.
+        following: (n_vertices,) its counter-clockwise neighbour.
+        corner: (n_vertices, 2) arm at rest, mm.
+        centroid: (n_units, 2) at rest, mm.
+        radius: (n_units,) longest arm, mm.
+        energy: scale of the barrier, N mm.
+        per_stiffness: its derivative by the contact stiffness of a single ligament, rad^2.
+        distance: activation distance, mm.
+        reach: distance up to which the sweep finds pairs, mm.
+        margin: motion of a unit after which it is repeated, mm.
+        watch: scratch.
+    """
+
+    pairs: Ints
+    first: Ints
+    owner: Ints
+    following: Ints
+    corner: Floats
+    centroid: Floats
+    radius: Floats
+    energy: float
+    per_stiffness: float
+    distance: float
+    reach: float
+    margin: float
+    watch: NeighbourCache
+
+
+@compiled
+def place_vertices(motion: Floats, contacts: ContactArrays) -> None:
+    """Notes the positions of all vertices and centroids in a state."""
+    watch = contacts.watch
+    for unit in range(len(contacts.radius)):
+        c, s = math.cos(motion[3 * unit + 2]), math.sin(motion[3 * unit + 2])
+        x = contacts.centroid[unit, 0] + motion[3 * unit]
+        y = contacts.centroid[unit, 1] + motion[3 * unit + 1]
+        watch.centre[unit, 0], watch.centre[unit, 1] = x, y
+        for v in range(contacts.first[unit], contacts.first[unit + 1]):
+            rx, ry = contacts.corner[v, 0], contacts.corner[v, 1]
+            watch.place[v, 0] = x + c * rx - s * ry
+            watch.place[v, 1] = y + s * rx + c * ry
+
+
+@compiled
+def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
+    """Squared distance of vertex ``v`` to the edge from ``p`` to ``q``."""
+    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
+    dx, dy = place[v, 0] - place[p, 0], place[v, 1] - place[p, 1]
+    along = min(max((dx * ex + dy * ey) / (ex * ex + ey * ey), 0.0), 1.0)
+    dx -= along * ex
+    dy -= along * ey
+    return dx * dx + dy * dy
+
+
+@compiled
+def is_inside(v: int, unit: int, contacts: ContactArrays) -> bool:
+    """Whether vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
+    place, inside = contacts.watch.place, False
+    x, y = place[v, 0], place[v, 1]
+    for p in range(contacts.first[unit], contacts.first[unit + 1]):
+        q = contacts.following[p]
+        if (place[p, 1] > y) != (place[q, 1] > y):
+            share = (y - place[p, 1]) / (place[q, 1] - place[p, 1])
+            if x < place[p, 0] + share * (place[q, 0] - place[p, 0]):
+                inside = not inside
+    return inside
+
+
+@compiled
+def _side(p: int, q: int, v: int, place: Floats) -> bool:
+    """Whether vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
+    ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
+    return ex * (place[v, 1] - place[p, 1]) > ey * (place[v, 0] - place[p, 0])
+
+
+@compiled
+def crosses(v: int, unit: int, contacts: ContactArrays) -> bool:
+    """Whether the edge that starts at ``v`` crosses one of a unit's."""
+    place, w = contacts.watch.place, contacts.following[v]
+    for p in range(contacts.first[unit], contacts.first[unit + 1]):
+        q = contacts.following[p]
+        apart = _side(v, w, p, place) == _side(v, w, q, place)
+        if not apart and _side(p, q, v, place) != _side(p, q, w, place):
+            return True
+    return False
+
+
+@compiled
+def gap_between(a: int, b: int, contacts: ContactArrays) -> float:
+    """Distance of the outlines of two units, zero if they cross."""
+    smallest = np.inf
+    for one, other in ((a, b), (b, a)):
+        for v in range(contacts.first[one], contacts.first[one + 1]):
+            if one == a and crosses(v, other, contacts):
+                return 0.0
+            for p in range(contacts.first[other], contacts.first[other + 1]):
+                q = contacts.following[p]
+                smallest = min(smallest, _square_to_edge(v, p, q, contacts.watch.place))
+    return math.sqrt(smallest)

@@ -1,0 +1,132 @@
+"""The requirements on a design as one vector function, with a sparse Jacobian.
+
+Values and local derivatives are evaluated together, place by place, and scattered into the Jacobian
+through a map computed once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse as sp
+from jax import Array
+
+from sim.constraints.manufacturability import (
+    ConstraintKind,
+    Limits,
+    Margin,
+    kinds,
+    vertices_of,
+    worst,
+)
+from sim.core import Floats, Ints
+from sim.structure import DesignSpace
+
+
+@dataclass(frozen=True)
+class ConstraintVector:
+    """All requirements on a design as one vector function ``c(x) >= 0``, in mm."""
+
+    space: DesignSpace
+    limits: Limits
+
+    @cached_property
+    def kinds(self) -> tuple[ConstraintKind, ...]:
+        """Requirements at the places that the design variables can change."""
+        return kinds(self.space.lattice, self.limits, self.space.free_vertices)
+
+    @property
+    def n_constraints(self) -> int:
+        """Number of values."""
+        return sum(len(kind.places) for kind in self.kinds)
+
+    def __call__(self, design: Floats) -> tuple[Floats, sp.csr_array]:
+        """Values (n_constraints,) at a design vector (n_variables,) and their sparse Jacobian.
+
+        The pattern of the Jacobian (n_constraints, n_variables) never changes.
+        """
+        values, slopes = self._local(jnp.asarray(self.vertices(design)))
+        pattern, scatter = self._scatter
+        data = scatter @ np.asarray(slopes)
+        shape = (self.n_constraints, self.space.n_variables)
+        return np.array(values), sp.csr_array((data, *pattern), shape=shape)
+
+    def values(self, design: Floats) -> Floats:
+        """Constraint values (n_constraints,) alone."""
+        return np.array(self._local(jnp.asarray(self.vertices(design)))[0])
+
+    def vertices(self, design: Floats) -> Floats:
+        """Vertices (n_vertices, 2) of a design vector."""
+        shifts = (self._expansion @ design).reshape(-1, 2)
+        return self.space.lattice.vertices + shifts
+
+    def margins(self, design: Floats) -> dict[str, Margin]:
+        """Smallest margin of each kind at the places that the design can change."""
+        return worst(self.space.lattice, self.kinds, self.vertices(design))
+
+    def named(self, number: int) -> tuple[str, str]:
+        """Kind of one of the values, and the vertices and units that it is about, in words."""
+        for kind in self.kinds:
+            if number < len(kind.places):
+                return kind.name, vertices_of(self.space.lattice, kind.places[number])
+            number -= len(kind.places)
+        raise IndexError("there are not so many constraints")
+
+    @cached_property
+    def _local(self) -> Callable[[Array], tuple[Array, Array]]:
+        requirements = self.kinds
+
+        @jax.jit
+        def local(vertices: Array) -> tuple[Array, Array]:
+            parts = [kind.values_and_slopes(vertices) for kind in requirements]
+            empty = jnp.zeros(0)
+            return (
+                jnp.concatenate([empty, *(values for values, _ in parts)]),
+                jnp.concatenate([empty, *(slopes for _, slopes in parts)]),
+            )
+
+        return local
+
+    @cached_property
+    def _expansion(self) -> sp.csr_array:
+        """(2 n_vertices, n_variables) linear map from the design vector to the vertex shifts."""
+        space = self.space
+        position = np.full(space.lattice.n_groups, -1)
+        position[space.groups] = np.arange(len(space.groups))
+        row = position[space.lattice.group]
+        free = np.flatnonzero(row >= 0)
+        count = 2 * len(space.groups)
+        entries = (2 * free[:, None] + [0, 1]).ravel(), (2 * row[free, None] + [0, 1]).ravel()
+        ones = np.ones(2 * len(free))
+        gather = sp.csr_array((ones, entries), shape=(2 * space.lattice.n_vertices, count))
+        return sp.csr_array(gather @ space.basis)
+
+    @cached_property
+    def _scatter(self) -> tuple[tuple[Ints, Ints], sp.csr_array]:
+        """Pattern (indices, indptr) of the Jacobian and the map from local slopes to its data."""
+        rows, coordinates = _slope_targets(self.kinds)
+        spread = self._expansion[coordinates].tocoo()
+        slope, variable = spread.coords
+        key = rows[slope] * self.space.n_variables + variable
+        filled, entry = np.unique(key, return_inverse=True)
+        scatter = sp.csr_array((spread.data, (entry, slope)), shape=(len(filled), len(rows)))
+        row_of, indices = np.divmod(filled, max(self.space.n_variables, 1))
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(row_of, minlength=self.n_constraints))])
+        return (indices, indptr), scatter
+
+
+def _slope_targets(requirements: tuple[ConstraintKind, ...]) -> tuple[Ints, Ints]:
+    """Constraint row and vertex coordinate of every local slope, in the order of evaluation."""
+    rows, coordinates, start = [np.zeros(0, int)], [np.zeros(0, int)], 0
+    for kind in requirements:
+        flat = kind.places.reshape(len(kind.places), -1)
+        own = (2 * flat[:, :, None] + [0, 1]).reshape(len(flat), 2 * flat.shape[1])
+        rows.append(np.repeat(start + np.arange(len(flat)), own.shape[1]))
+        coordinates.append(own.ravel())
+        start += len(flat)
+    return np.concatenate(rows), np.concatenate(coordinates)

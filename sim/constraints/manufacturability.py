@@ -1,0 +1,237 @@
+"""Manufacturability: can the units of a design be cut, joined and moved?
+
+Every requirement is one number per place (an edge, a corner, a side of a ligament, a pair of
+units) that depends on a few vertices only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Floats, Ints, Numbers
+from sim.structure import VOID_BRANCH, Lattice, angle_between, close_pairs, unwrap
+
+ANGLE_LENGTH = 5.0
+"""Length (mm) that turns a margin in radians into one comparable to the margins in mm."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a design must respect; ``None`` leaves a requirement out.
+
+    Attributes:
+        edge_length: smallest edge of any unit, mm.
+        block_angle: smallest interior angle of a unit at any corner, rad.
+        convex: no interior angle above pi.
+        void_angle: smallest signed angle on either side of a ligament, rad.
+        gap: smallest distance between neighbouring units, bonded or across a void, mm. Exact for
+            convex units; for others that of their convex hulls, which is smaller.
+    """
+
+    edge_length: float | None = None
+    block_angle: float | None = None
+    convex: bool = False
+    void_angle: float | None = None
+    gap: float | None = None
+
+
+def edge_length(ends: Array) -> Array:
+    """Length of the edge between two vertices (2, 2)."""
+    return jnp.linalg.norm(ends[1] - ends[0])
+
+
+def block_angle(corner: Array) -> Array:
+    """Interior angle at the second of three consecutive vertices (3, 2), on [-pi/4, 7 pi/4)."""
+    return unwrap(angle_between(corner[2] - corner[1], corner[0] - corner[1]), VOID_BRANCH)
+
+
+def void_angle(sides: Array) -> Array:
+    """Angle from one edge to another, each given by two vertices (4, 2), on [-pi/4, 7 pi/4)."""
+    return unwrap(angle_between(sides[1] - sides[0], sides[3] - sides[2]), VOID_BRANCH)
+
+
+def separation(pair: Array) -> Array:
+    """Signed distance of the convex hulls of two vertex rings (2, k, 2).
+
+    The largest gap between the rings' projections over the normals of their edges and the lines
+    between their vertices: the distance if they are apart, minus the depth of penetration if not.
+    """
+    one, other = pair
+    normals = jnp.concatenate([_outward(one), -_outward(other)])
+    axes = jnp.concatenate([normals, (other[None] - one[:, None]).reshape(-1, 2)])
+    length = jnp.sqrt(jnp.maximum(jnp.sum(axes**2, axis=1), 1e-300))
+    unit_axes = axes / length[:, None]
+    gaps = jnp.min(unit_axes @ other.T, axis=1) - jnp.max(unit_axes @ one.T, axis=1)
+    return jnp.max(jnp.where(length > 1e-9, gaps, -jnp.inf))
+
+
+def _outward(ring: Array) -> Array:
+    edge = jnp.roll(ring, -1, axis=0) - ring
+    return jnp.stack([edge[:, 1], -edge[:, 0]], axis=1)
+
+
+@dataclass(frozen=True)
+class ConstraintKind:
+    """One kind of requirement: ``sign * (measure - limit) >= 0`` at every place.
+
+    Attributes:
+        name: as in the reports.
+        unit: of the measure and its margin.
+        measure: function of the place's vertices.
+        places: (n_places, ...) ids of those vertices.
+        limit: bound of the measure.
+        sign: 1 if the bound is a smallest, -1 if it is a largest value.
+    """
+
+    name: str
+    unit: str
+    measure: Callable[[Array], Array]
+    places: Ints
+    limit: float
+    sign: int = 1
+
+    @property
+    def scale(self) -> float:
+        """Factor from the margin to the constraint value (mm)."""
+        return ANGLE_LENGTH if self.unit == "rad" else 1.0
+
+    def margins(self, measured: Numbers) -> Numbers:
+        """Margins (n_places,) of what was measured there, in the unit of the kind."""
+        return self.sign * (measured - self.limit)
+
+    def values_and_slopes(self, vertices: Array) -> tuple[Array, Array]:
+        """Constraint values (n_places,) and their slopes to their vertices, flattened."""
+        values, slopes = jax.vmap(jax.value_and_grad(self.measure))(vertices[self.places])
+        factor = self.sign * self.scale
+        return factor * (values - self.limit), factor * slopes.ravel()
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Smallest margin of one kind of requirement.
+
+    Attributes:
+        kind: edge_length, block_angle, convexity, void_angle or gap.
+        value: distance to the limit, negative if violated.
+        unit: "mm" or "rad".
+        units: ids of the units at the worst place.
+        where: the same as lattice indices, for messages.
+    """
+
+    kind: str
+    value: float
+    unit: str
+    units: tuple[int, ...]
+    where: str
+
+
+def kinds(
+    lattice: Lattice, limits: Limits, moving: Ints | None = None
+) -> tuple[ConstraintKind, ...]:
+    """The requirements of a lattice, at the places that moving certain vertices can change.
+
+    Args:
+        lattice: the network; the units kept apart are those nearer than one lattice spacing.
+        limits: the requirements.
+        moving: ids of those vertices, by default all.
+    """
+    free = np.ones(lattice.n_vertices, dtype=bool)
+    if moving is not None:
+        free[:] = False
+        free[moving] = True
+    corners, edges = _corners(lattice, free), _edges(lattice, free)
+    found: list[ConstraintKind] = []
+    if limits.edge_length is not None:
+        found.append(ConstraintKind("edge_length", "mm", edge_length, edges, limits.edge_length))
+    if limits.block_angle is not None:
+        found.append(ConstraintKind("block_angle", "rad", block_angle, corners, limits.block_angle))
+    if limits.convex:
+        found.append(ConstraintKind("convexity", "rad", block_angle, corners, np.pi, -1))
+    if limits.void_angle is not None:
+        voids = _voids(lattice, free)
+        found.append(ConstraintKind("void_angle", "rad", void_angle, voids, limits.void_angle))
+    if limits.gap is not None:
+        found.append(ConstraintKind("gap", "mm", separation, _pairs(lattice, free), limits.gap))
+    return tuple(found)
+
+
+def _edges(lattice: Lattice, free: np.ndarray) -> Ints:
+    return _touched(np.stack([np.arange(lattice.n_vertices), lattice.next_vertex], axis=1), free)
+
+
+def _corners(lattice: Lattice, free: np.ndarray) -> Ints:
+    here = np.arange(lattice.n_vertices)
+    return _touched(np.stack([lattice.previous_vertex, here, lattice.next_vertex], axis=1), free)
+
+
+def _voids(lattice: Lattice, free: np.ndarray) -> Ints:
+    """Both sides of each ligament, as two edges starting at its ends (clockwise one first)."""
+    a, b = lattice.ligaments.T
+    after, before = lattice.next_vertex, lattice.previous_vertex
+    one = np.stack([b, before[b], a, after[a]], axis=1)
+    other = np.stack([a, before[a], b, after[b]], axis=1)
+    return _touched(np.concatenate([one, other]), free)
+
+
+def _pairs(lattice: Lattice, free: np.ndarray) -> Ints:
+    """Rings of neighbouring units, padded to equal length by repeating a vertex."""
+    pairs = close_pairs(lattice, lattice.vertices, lattice.spacing)
+    size = np.diff(lattice.first_vertex)
+    step = np.minimum(np.arange(size.max())[None], size[:, None] - 1)
+    rings = lattice.first_vertex[:-1, None] + step
+    return _touched(rings[pairs], free)
+
+
+def _touched(places: Ints, free: np.ndarray) -> Ints:
+    return places[free[places].any(axis=tuple(range(1, places.ndim)))]
+
+
+def margins(lattice: Lattice, vertices: Floats, limits: Limits) -> dict[str, Margin]:
+    """Smallest margin of each kind over the whole structure, free or not."""
+    return worst(lattice, kinds(lattice, limits), vertices)
+
+
+def worst(
+    lattice: Lattice, requirements: tuple[ConstraintKind, ...], vertices: Floats
+) -> dict[str, Margin]:
+    """Smallest margin of each kind among some requirements, and the units that it is about."""
+    found: dict[str, Margin] = {}
+    present = [kind for kind in requirements if len(kind.places)]
+    measures, places = tuple(k.measure for k in present), tuple(k.places for k in present)
+    for kind, measured in zip(present, _measured(measures, places, vertices), strict=True):
+        values = np.asarray(kind.margins(measured))
+        place = int(np.argmin(values))
+        units = tuple(int(unit) for unit in np.unique(lattice.unit[kind.places[place]]))
+        where = " and ".join(f"unit ({i}, {j})" for i, j in lattice.index[list(units)])
+        found[kind.name] = Margin(kind.name, float(values[place]), kind.unit, units, where)
+    return found
+
+
+@partial(jax.jit, static_argnums=0)
+def _measured(
+    measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], vertices: Floats
+) -> list[Array]:
+    """What every measure finds at its places, compiled as one."""
+    corners = jnp.asarray(vertices)
+    return [jax.vmap(of)(corners[at]) for of, at in zip(measures, places, strict=True)]
+
+
+def vertices_of(lattice: Lattice, place: Ints) -> str:
+    """The vertices of a place, by their numbers within their units."""
+    words = []
+    for unit in np.unique(lattice.unit[place]):
+        own = np.unique(place[lattice.unit[place] == unit]) - lattice.first_vertex[unit]
+        i, j = lattice.index[unit]
+        words.append(f"vertex {', '.join(map(str, own))} of unit [{i}, {j}]")
+    return " and ".join(words)
+
+
+KIND_NAMES = tuple({"convex": "convexity"}.get(field.name, field.name) for field in fields(Limits))
+"""Names of the kinds, in the order of the constraint vector."""

@@ -1,0 +1,146 @@
+"""Holds what stays fixed while parameters and drives change: joints and held dofs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from sim.collision import CandidatePairs, find_candidate_pairs
+from sim.core import Floats, Ints
+from sim.energy.network_arrays import NetworkArrays
+from sim.linalg import Pattern, number_free_dofs
+from sim.structure import ConcreteParameters, Lattice
+
+
+@dataclass(frozen=True)
+class Topology:
+    """What stays fixed while parameters and drives change.
+
+    Attributes:
+        ligament_units: (n_ligaments, 2).
+        site: (n_units, 2) where the units are, mm.
+        held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending.
+        barrier, cutoff: contact angles, rad.
+        designed: (n_designed,) ligaments whose parameters may be differentiated by.
+        rotation_scale: length that makes rotations comparable with displacements, mm.
+        meeting: the units that may meet, if contact acts on their distance; without it contact
+            acts on the void angles.
+    """
+
+    ligament_units: Ints
+    site: Floats
+    held: Ints
+    barrier: float
+    cutoff: float
+    designed: Ints
+    rotation_scale: float
+    meeting: CandidatePairs | None = None
+
+    @cached_property
+    def numbering(self) -> tuple[Ints, Pattern]:
+        """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
+        coupled = self.ligament_units
+        if self.meeting is not None:
+            coupled = np.concatenate([coupled, self.meeting.pairs])
+        return number_free_dofs(self.site, coupled, self.held)
+
+    @cached_property
+    def free_dofs(self) -> Ints:
+        """(n_free,) ids of the free dofs in the tangent's order."""
+        number = self.numbering[0]
+        return np.argsort(np.where(number < 0, len(number), number), kind="stable")[: self.n_free]
+
+    def coupling(self, pairs: Ints) -> Topology:
+        """The same with room in the tangent for contact of more pairs (n, 2) of units."""
+        assert self.meeting is not None
+        return replace(self, meeting=self.meeting.with_pairs(pairs))
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return len(self.site)
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of all dofs."""
+        return 3 * self.n_units
+
+    @property
+    def n_free(self) -> int:
+        """Number of free dofs."""
+        return self.n_dofs - len(self.held)
+
+    def network(self, values: ConcreteParameters, touching: Ints | None = None) -> NetworkArrays:
+        """The kernels' arrays of concrete parameters, with contact in ``touching`` ligaments.
+
+        If contact acts on the distance of units, there is none in any ligament.
+        """
+        n = len(self.ligament_units)
+        if self.meeting is not None:
+            touching = np.zeros(0, dtype=np.int64)
+        contact = np.empty((n, 3))
+        contact[:, 0] = values.contact
+        by_angle = self.meeting is None
+        contact[:, 1], contact[:, 2] = (
+            (self.barrier, self.cutoff) if by_angle else (-np.inf, -np.inf)
+        )
+        return NetworkArrays(
+            unit=self.ligament_units,
+            arm=np.array(values.arm, dtype=float, order="C"),
+            vector=np.array(values.vector, dtype=float, order="C"),
+            void=np.array(values.void, dtype=float, order="C"),
+            law=np.array(values.law, dtype=float, order="C"),
+            contact=contact,
+            touching=np.arange(n) if touching is None else touching,
+        )
+
+    @cached_property
+    def scale(self) -> Floats:
+        """(n_dofs,) weights that make displacements and rotations comparable, mm."""
+        return np.tile([1.0, 1.0, self.rotation_scale], self.n_units)
+
+    def smallest_void_angle(self, void: Floats, motion: Floats) -> Floats:
+        """Smallest void angle (...) of states ``motion`` (..., n_units, 3), rad."""
+        return self.smallest_void_angles(void, motion).min(axis=-1)
+
+    def smallest_void_angles(self, void: Floats, motion: Floats) -> Floats:
+        """Smaller void angle (..., n_ligaments) of each ligament, rad."""
+        a, b = self.ligament_units.T
+        turned = motion[..., a, 2] - motion[..., b, 2]
+        return np.minimum(void[:, 0] + turned, void[:, 1] - turned)
+
+
+def topology(
+    lattice: Lattice,
+    held: Ints,
+    barrier: float,
+    cutoff: float,
+    designed_units: Ints | None = None,
+    distance: float | None = None,
+) -> Topology:
+    """Topology of a lattice whose dofs ``held`` are prescribed.
+
+    With a ``distance`` (mm), contact acts on units nearer than that to one another.
+
+    Without ``designed_units`` every ligament's parameters can be differentiated by; with them only
+    those of the ligaments of these units, which must be all units with a vertex that the design
+    moves (a moved vertex shifts the centroid, and with it every arm of its unit).
+    """
+    units = lattice.ligament_units
+    designed = (
+        np.arange(len(units))
+        if designed_units is None
+        else np.flatnonzero(np.isin(units, designed_units).any(axis=1))
+    )
+    return Topology(
+        ligament_units=np.ascontiguousarray(units),
+        site=lattice.site,
+        held=np.unique(held),
+        barrier=barrier,
+        cutoff=cutoff,
+        designed=designed,
+        rotation_scale=lattice.spacing / 2,
+        meeting=None if distance is None else find_candidate_pairs(lattice, distance),
+    )

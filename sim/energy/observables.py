@@ -1,0 +1,93 @@
+"""Energies and reactions of given states."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.collision import pairs_in_contact, raise_new_pairs
+from sim.core import Floats, Ints, NewContactPairs, compiled
+from sim.energy.connectivity import Topology
+from sim.energy.ligament import LigamentStrain, ligament_strain
+from sim.energy.system import System, system_of
+from sim.energy.total import gradient
+from sim.structure import ConcreteParameters
+
+
+class Observables(NamedTuple):
+    """What is known of each state besides its motion.
+
+    Attributes:
+        strain_energy, contact_energy: (n_states,) N mm.
+        reaction: (n_states, n_units, 3) elastic and contact force on the held dofs, N and N mm; NaN
+            on free ones.
+        void_angle: (n_states,) smallest void angle, rad.
+        contact_pairs: (n_states,) pairs of units in contact: with a void closed below the cutoff
+            angle or, by the law of distance, nearer than the activation distance.
+        stretch: (n_states,) largest elongation or shortening of a ligament over its length.
+        shear, bend: (n_states,) largest shear angle and relative rotation, rad.
+    """
+
+    strain_energy: Floats
+    contact_energy: Floats
+    reaction: Floats
+    void_angle: Floats
+    contact_pairs: Ints
+    stretch: Floats
+    shear: Floats
+    bend: Floats
+
+
+@compiled
+def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pairs: Ints) -> None:
+    turn = np.empty((states.shape[1] // 3, 4))
+    for n in range(len(states)):
+        energies[n] = gradient(states[n], system, turn, forces[n])
+        pairs[n] = pairs_in_contact(states[n], system.contacts)
+
+
+def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:
+    """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
+    states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
+    energies, forces = np.empty((len(states), 2)), np.empty_like(states)
+    near = np.zeros(len(states), dtype=np.int64)
+    system = system_of(topology, values)
+    _visit(states, system, energies, forces, near)
+    try:
+        raise_new_pairs(system.contacts)
+    except NewContactPairs as met:
+        return observe(topology.coupling(met.pairs), values, motion)
+    reaction = np.full_like(states, np.nan)
+    reaction[:, topology.held] = forces[:, topology.held]
+    voids = topology.smallest_void_angles(values.void, motion)
+    given = (jnp.asarray(part) for part in (values.arm, values.vector, motion))
+    strain = _largest_strains(topology.ligament_units, *given)
+    return Observables(
+        energies[:, 0],
+        energies[:, 1],
+        reaction.reshape(motion.shape),
+        voids.min(axis=1, initial=np.pi),
+        near if topology.meeting else (voids < topology.cutoff).sum(axis=1),
+        *(np.asarray(part) for part in strain),
+    )
+
+
+@jax.jit
+def _largest_strains(
+    ligament_units: Ints, arm: Array, vector: Array, motion: Array
+) -> LigamentStrain:
+    """Largest magnitudes (n_states,) over the ligaments; the stretch relative to the length."""
+    of_all = jax.vmap(ligament_strain)
+    length = jnp.linalg.norm(vector, axis=1)
+
+    def of_state(state: Array) -> LigamentStrain:
+        ends = state[ligament_units]
+        found = of_all(ends[:, 0], ends[:, 1], arm[:, 0], arm[:, 1], vector)
+        relative = found._replace(stretch=found.stretch / length)
+        return LigamentStrain(*(jnp.abs(part).max(initial=0.0) for part in relative))
+
+    return jax.lax.map(of_state, motion)

@@ -1,0 +1,132 @@
+"""A structure with its held dofs as compiled solvers take it, and their scratch memory."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.collision import ContactArrays, contact_arrays
+from sim.core import Floats, Ints, compiled
+from sim.energy.connectivity import Topology
+from sim.energy.network_arrays import NetworkArrays, Sensitivity
+from sim.linalg import Matrix, Pattern, matrix
+from sim.structure import ConcreteParameters
+
+
+class System(NamedTuple):
+    """One structure, its inertia and the numbering of its dofs.
+
+    Attributes:
+        net: ligaments, and contact on their void angles.
+        contacts: contact on the distance of units.
+        mass, damping: (n_dofs,) diagonal.
+        free: (n_dofs,) number of each dof among the free ones, negative where held.
+        dofs: (n_free,) ids of the free dofs in the tangent's order.
+        held: (n_held,) ids of the prescribed dofs.
+        scale: (n_dofs,) weights that make rotations comparable with displacements, mm.
+        pattern: of the tangent.
+    """
+
+    net: NetworkArrays
+    contacts: ContactArrays
+    mass: Floats
+    damping: Floats
+    free: Ints
+    dofs: Ints
+    held: Ints
+    scale: Floats
+    pattern: Pattern
+
+
+class Workspace(NamedTuple):
+    """Scratch arrays of a solve, overwritten at will.
+
+    Attributes:
+        turn: (n_units, 4) of the kernels.
+        force, step, product, trial, saved, guess: (n_dofs,).
+        right: (n_free,).
+        matrix: the tangent, then its factor.
+    """
+
+    turn: Floats
+    force: Floats
+    step: Floats
+    product: Floats
+    trial: Floats
+    saved: Floats
+    guess: Floats
+    right: Floats
+    matrix: Matrix
+
+
+class Bars(NamedTuple):
+    """Loss derivatives that a reverse sweep adds to.
+
+    Attributes:
+        sensitivity: by the network's parameters.
+        mass, damping: (n_dofs,).
+        drive: by the held values, shaped as the sweep takes them.
+    """
+
+    sensitivity: Sensitivity
+    mass: Floats
+    damping: Floats
+    drive: Floats
+
+
+@compiled
+def workspace(system: System) -> Workspace:
+    """Scratch arrays that fit a system."""
+    n_dofs, n_free = len(system.mass), len(system.dofs)
+    return Workspace(
+        np.empty((n_dofs // 3, 4)),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_dofs),
+        np.empty(n_free),
+        matrix(system.pattern),
+    )
+
+
+def system_of(
+    topology: Topology, values: ConcreteParameters, touching: Ints | None = None
+) -> System:
+    """The system of concrete parameters, with contact in ``touching`` ligaments (default all)."""
+    free, pattern = topology.numbering
+    return System(
+        net=topology.network(values, touching),
+        contacts=contact_arrays(topology.meeting, values, topology.n_units),
+        mass=np.array(values.mass, dtype=float, order="C").ravel(),
+        damping=np.array(values.damping, dtype=float, order="C").ravel(),
+        free=free,
+        dofs=topology.free_dofs,
+        held=topology.held,
+        scale=topology.scale,
+        pattern=pattern,
+    )
+
+
+def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
+    """Zeros to add derivatives to."""
+    net = system.net
+    sensitivity = Sensitivity(
+        arm=np.zeros_like(net.arm),
+        vector=np.zeros_like(net.vector),
+        void=np.zeros_like(net.void),
+        law=np.zeros_like(net.law),
+        contact=np.zeros(len(net.contact)),
+        corner=np.zeros_like(system.contacts.corner),
+        centroid=np.zeros_like(system.contacts.centroid),
+    )
+    zero = np.zeros_like(system.mass)
+    return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))
+
+
+def as_values(bars: Bars) -> ConcreteParameters:
+    """The derivatives by all parameters, shaped as they are."""
+    mass, damping = bars.mass.reshape(-1, 3), bars.damping.reshape(-1, 3)
+    return ConcreteParameters(*bars.sensitivity, mass=mass, damping=damping)

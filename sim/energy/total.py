@@ -1,0 +1,72 @@
+"""The whole energy of a system: its ligaments, and contact by the law of its structure.
+
+The solvers see the energy and the admissible states through these functions alone.
+"""
+
+from __future__ import annotations
+
+from sim.collision import collision_free_step
+from sim.core import Floats, Ints, compiled
+from sim.energy import ligament_kernels, void_contact_kernels
+from sim.energy.distance_contact_kernels import (
+    add_gradient,
+    add_hessian_product,
+    add_mixed,
+    add_tangent,
+)
+from sim.energy.network_arrays import Sensitivity
+from sim.energy.system import System
+from sim.linalg import Matrix
+
+
+@compiled
+def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple[float, float]:
+    """Fills the energy gradient ``out`` (n_dofs,); returns strain and contact energy, N mm.
+
+    The contact energy of a state that is not admissible is infinite.
+    """
+    strain = ligament_kernels.gradient(motion, system.net, turn, out)
+    contact = void_contact_kernels.add_gradient(motion, system.net, out)
+    if len(system.contacts.pairs) > 0:
+        contact += add_gradient(motion, system.contacts, out)
+    return strain, contact
+
+
+@compiled
+def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> None:
+    """Adds the energy's Hessian among the free dofs to a matrix."""
+    ligament_kernels.tangent(motion, system.net, turn, system.free, matrix)
+    void_contact_kernels.add_tangent(motion, system.net, system.free, matrix)
+    if len(system.contacts.pairs) > 0:
+        add_tangent(motion, system.contacts, system.free, matrix)
+
+
+@compiled
+def hessian_product(
+    motion: Floats, system: System, turn: Floats, direction: Floats, out: Floats
+) -> None:
+    """Fills ``out`` (n_dofs,) with the Hessian times ``direction``, over all dofs."""
+    ligament_kernels.hessian_product(motion, system.net, turn, direction, out)
+    void_contact_kernels.add_hessian_product(motion, system.net, direction, out)
+    if len(system.contacts.pairs) > 0:
+        add_hessian_product(motion, system.contacts, direction, out)
+
+
+@compiled
+def mixed(
+    motion: Floats, system: System, turn: Floats, direction: Floats, which: Ints, out: Sensitivity
+) -> None:
+    """Adds d/dp of (``direction`` . dE/dmotion), of the ligaments' own p only for ``which``."""
+    ligament_kernels.mixed(motion, system.net, turn, direction, which, out)
+    void_contact_kernels.add_mixed(motion, system.net, direction, which, out)
+    if len(system.contacts.pairs) > 0:
+        add_mixed(motion, system.contacts, turn, direction, out)
+
+
+@compiled
+def admissible_step(motion: Floats, system: System, step: Floats) -> float:
+    """Largest multiple of ``step`` (n_dofs,) up to which all states are admissible."""
+    largest = void_contact_kernels.barrier_step(motion, system.net, step)
+    if len(system.contacts.pairs) > 0:
+        largest = min(largest, collision_free_step(motion, system.contacts, step))
+    return largest

@@ -1,0 +1,9 @@
+from .multifrontal import entry as entry
+from .symmetric import Matrix as Matrix
+from .symmetric import Pattern as Pattern
+from .symmetric import add as add
+from .symmetric import clear as clear
+from .symmetric import factorise as factorise
+from .symmetric import matrix as matrix
+from .symmetric import number_free_dofs as number_free_dofs
+from .symmetric import solve as solve

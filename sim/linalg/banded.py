@@ -1,0 +1,96 @@
+"""Banded Cholesky in compiled code, and an order of the dofs with a small bandwidth."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from sim.core import Floats, Ints, compiled
+from sim.linalg.lapack import dpbtrf, dpbtrs
+from sim.linalg.narrow_cholesky import factorise_narrow
+
+NARROW = 100
+"""Columns of a band up to which the own factorisation beats LAPACK's."""
+
+
+@compiled
+def factorise(band: Floats) -> bool:
+    """Cholesky factor in place of a lower band (n, width + 1); False if not positive definite."""
+    if band.shape[1] <= NARROW:
+        return factorise_narrow(band)
+    uplo = np.full(1, ord("L"), dtype=np.uint8)
+    size = np.array([band.shape[0], band.shape[1] - 1, band.shape[1], 0], dtype=np.int32)
+    dpbtrf(
+        uplo.ctypes,
+        size[0:1].ctypes,
+        size[1:2].ctypes,
+        band.ctypes,
+        size[2:3].ctypes,
+        size[3:4].ctypes,
+    )
+    return size[3] == 0
+
+
+@compiled
+def solve(factor: Floats, right: Floats) -> None:
+    """Overwrites ``right`` (n,) with the solution for a factor of ``factorise``."""
+    uplo = np.full(1, ord("L"), dtype=np.uint8)
+    size = np.array([factor.shape[0], factor.shape[1] - 1, 1, factor.shape[1], 0], dtype=np.int32)
+    dpbtrs(
+        uplo.ctypes,
+        size[0:1].ctypes,
+        size[1:2].ctypes,
+        size[2:3].ctypes,
+        factor.ctypes,
+        size[3:4].ctypes,
+        right.ctypes,
+        size[0:1].ctypes,
+        size[4:5].ctypes,
+    )
+
+
+def number_free_dofs(n_units: int, unit_pairs: Ints, held: Ints) -> tuple[NDArray[np.int64], int]:
+    """Numbers the dofs that are not held so that the tangent's band is narrow.
+
+    Args:
+        n_units: number of units, three dofs each.
+        unit_pairs: (n, 2) coupled units.
+        held: ids of the prescribed dofs.
+
+    Returns:
+        (3 n_units,) position of each dof among the free ones, -1 where held; and the half
+        bandwidth.
+    """
+    order = min(
+        (np.arange(n_units), _cuthill_mckee(n_units, unit_pairs)),
+        key=lambda units: _unit_bandwidth(units, unit_pairs),
+    )
+    is_free = np.ones(3 * n_units, dtype=bool)
+    is_free[held] = False
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    dofs = dofs[is_free[dofs]]
+    free = np.full(3 * n_units, -1, dtype=np.int64)
+    free[dofs] = np.arange(len(dofs))
+    return free, _bandwidth(free, unit_pairs)
+
+
+def _cuthill_mckee(n_units: int, unit_pairs: Ints) -> Ints:
+    graph = sp.csr_matrix(
+        (np.ones(len(unit_pairs)), (unit_pairs[:, 0], unit_pairs[:, 1])), shape=(n_units, n_units)
+    )
+    return reverse_cuthill_mckee(graph + graph.T, symmetric_mode=True).astype(np.int64)
+
+
+def _unit_bandwidth(order: Ints, unit_pairs: Ints) -> int:
+    place = np.argsort(order)
+    return int(np.abs(place[unit_pairs[:, 0]] - place[unit_pairs[:, 1]]).max(initial=0))
+
+
+def _bandwidth(free: Ints, unit_pairs: Ints) -> int:
+    dofs = free.reshape(-1, 3)[unit_pairs].reshape(len(unit_pairs), 6)
+    highest = np.where(dofs < 0, -1, dofs).max(axis=1)
+    lowest = np.where(dofs < 0, np.iinfo(np.int64).max, dofs).min(axis=1)
+    used = highest >= 0
+    return max(2, int((highest - lowest)[used].max(initial=0)))

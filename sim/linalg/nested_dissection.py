@@ -1,0 +1,182 @@
+"""Nested dissection: an order of the dofs in which a sparse Cholesky factor fills little.
+
+A network is cut in two along a straight line by the units next to it, and so on; the units of a cut
+come after those of both sides. Each cut, and each part too small to be cut, is a front: its dofs
+are eliminated together as one dense block, coupled to later dofs, the front's boundary.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.core import Floats, Ints
+
+SMALLEST_PART = 8
+"""Units that are no longer cut: smaller fronts cost more in calls than they save in fill."""
+
+
+class Fronts(NamedTuple):
+    """Fronts in the order of elimination. A front's matrix has its own dofs, then its boundary.
+
+    Attributes:
+        first: (n_fronts + 1,) first own dof, with the end appended.
+        edge: (n_fronts + 1,) where a front's part of ``boundary`` starts.
+        boundary: later dofs that fronts are coupled to, ascending in each front.
+        place: position of each of these in the matrix of the parent, the front that is next to
+            eliminate one of the boundary.
+        child: (n_fronts + 1,) where a front's part of ``children`` starts.
+        children: fronts by parent.
+        panel: (n_fronts + 1,) where a front's own columns start among the factor's values.
+        update: (n_fronts,) where its boundary's block starts in the scratch memory.
+        owner: (n,) front that eliminates each dof.
+        scratch: (1,) size of the scratch memory.
+    """
+
+    first: Ints
+    edge: Ints
+    boundary: Ints
+    place: Ints
+    child: Ints
+    children: Ints
+    panel: Ints
+    update: Ints
+    owner: Ints
+    scratch: Ints
+
+
+def no_fronts() -> Fronts:
+    """Fronts of nothing."""
+    start, none = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    return Fronts(start, start, none, none, start, none, start, none, none, start)
+
+
+def dissect(
+    site: Floats, pairs: Ints, n_dofs: Ints
+) -> tuple[NDArray[np.int64], list[NDArray[np.int64]], list[NDArray[np.int64]]]:
+    """Order of the units that have dofs, and the fronts.
+
+    Args:
+        site: (n_units, 2) where the units are.
+        pairs: (n_pairs, 2) coupled units.
+        n_dofs: (n_units,) free dofs of each unit.
+
+    Returns:
+        units in order; for each front its own units and its boundary, both as places in the order.
+    """
+    neighbour = _neighbours(len(site), pairs)
+    parts = _cut(np.flatnonzero(n_dofs), site, neighbour)
+    order = np.concatenate(parts)
+    place = np.full(len(site), -1)
+    place[order] = np.arange(len(order))
+    ends = np.cumsum([len(part) for part in parts])
+    passed: list[list[Ints]] = [[] for _ in parts]
+    own, boundaries = [], []
+    for part, end, handed in zip(parts, ends, passed, strict=True):
+        touched = np.unique(np.concatenate([place[neighbour[part]].ravel(), *handed]))
+        boundary = touched[touched >= end]
+        if len(boundary):
+            passed[np.searchsorted(ends, boundary[0], side="right")].append(boundary)
+        own.append(np.arange(end - len(part), end))
+        boundaries.append(boundary)
+    return order, own, boundaries
+
+
+def _neighbours(n_units: int, pairs: Ints) -> Ints:
+    """(n_units, most) coupled units of each, filled up with the unit itself."""
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    counts = np.bincount(both[:, 0], minlength=n_units)
+    table = np.repeat(np.arange(n_units)[:, None], max(1, int(counts.max(initial=0))), axis=1)
+    starts = np.cumsum(counts) - counts
+    table[both[:, 0], np.arange(len(both)) - np.repeat(starts, counts)] = both[:, 1]
+    return table
+
+
+def _cut(units: Ints, site: Floats, neighbour: Ints) -> list[Ints]:
+    """The parts of a set of units in order of elimination, none of them empty."""
+    if len(units) <= SMALLEST_PART:
+        return [units] if len(units) else []
+    here = site[units]
+    axis = int(np.argmax(np.ptp(here, axis=0)))
+    along = here[:, axis]
+    one = along < np.median(along) - 1e-9 * np.ptp(along)
+    if not one.any():
+        one = np.arange(len(units)) < len(units) // 2
+    left, right = units[one], units[~one]
+    near_right = np.isin(neighbour[right], left).any(axis=1)
+    near_left = np.isin(neighbour[left], right).any(axis=1)
+    if near_left.sum() < near_right.sum():
+        between, left = left[near_left], left[~near_left]
+    else:
+        between, right = right[near_right], right[~near_right]
+    last = [between] if len(between) else []
+    return [*_cut(left, site, neighbour), *_cut(right, site, neighbour), *last]
+
+
+def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
+    """Fronts in dofs.
+
+    Args:
+        own: of each front, its units as places in the order of elimination.
+        boundaries: the later units that it is coupled to.
+        n_dofs: (n_ordered,) dofs of each unit in the order of elimination.
+    """
+    ends = np.concatenate([[0], np.cumsum(n_dofs)])
+
+    def dofs(places: Ints) -> Ints:
+        counts = n_dofs[places]
+        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.repeat(ends[places], counts) + within
+
+    first = np.array([ends[part[0]] for part in own] + [ends[-1]])
+    rows = [dofs(boundary) for boundary in boundaries]
+    owner = np.repeat(np.arange(len(own)), np.diff(first))
+    parent = np.array([owner[row[0]] if len(row) else -1 for row in rows])
+    place = [
+        _place(row, first[up], first[up + 1], rows[up])
+        for row, up in zip(rows, parent, strict=True)
+    ]
+    children = np.argsort(parent, kind="stable")[np.count_nonzero(parent < 0) :]
+    n_children = np.bincount(parent[parent >= 0], minlength=len(own))
+    heights = np.array([len(row) for row in rows])
+    columns = np.diff(first)
+    update, scratch = _scratch(heights**2, parent)
+    return Fronts(
+        first=first,
+        edge=_starts(heights),
+        boundary=np.concatenate(rows),
+        place=np.concatenate(place),
+        child=_starts(n_children),
+        children=children,
+        panel=_starts(columns * (columns + heights)),
+        update=update,
+        owner=owner,
+        scratch=np.array([scratch]),
+    )
+
+
+def _starts(counts: Ints) -> Ints:
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def _place(row: Ints, first: int, end: int, boundary: Ints) -> Ints:
+    """Positions of dofs in the matrix of a front with own dofs first..end and that boundary."""
+    return np.where(row < end, row - first, end - first + np.searchsorted(boundary, row))
+
+
+def _scratch(sizes: Ints, parent: Ints) -> tuple[Ints, int]:
+    """Where each front's block may lie while it waits for its parent, and the size of it all."""
+    start = np.zeros(len(sizes), dtype=np.int64)
+    living: list[int] = []
+    for front, size in enumerate(sizes):
+        at = 0
+        for one in sorted(living, key=lambda one: int(start[one])):
+            if start[one] - at >= size:
+                break
+            at = start[one] + sizes[one]
+        start[front] = at
+        living = [one for one in living if parent[one] != front] + [front]
+    return start, int((start + sizes).max(initial=0))

@@ -1,0 +1,11 @@
+from .journal import Journal as Journal
+from .journal import JournalInUseError as JournalInUseError
+from .kkt import Stationarity as Stationarity
+from .kkt import stationarity as stationarity
+from .minimisation import minimise as minimise
+from .mma import MmaOptions as MmaOptions
+from .problem import Evaluate as Evaluate
+from .problem import Evaluation as Evaluation
+from .problem import InfeasibleStartError as InfeasibleStartError
+from .problem import Result as Result
+from .sqp import SqpOptions as SqpOptions

@@ -1,0 +1,150 @@
+"""Equilibria of one case behind the common interface of the solvers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sim.collision import raise_new_pairs
+from sim.core import Floats, Ints, SimulationError
+from sim.energy import Topology, as_values, empty_bars, system_of
+from sim.quasistatics.equilibrium_path import adjoint, follow
+from sim.solvers import PrescribedMotion, refuse_floating, refuse_start
+from sim.structure import ConcreteParameters
+
+ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
+"""Of the end of a ligament at rest, mm, and per mm that the drive moves it by: what its axial
+stiffness makes of these is no force to balance."""
+
+
+@dataclass(frozen=True)
+class StaticRecord:
+    """What the reverse sweep of one case needs.
+
+    Attributes:
+        states: (n_asked, n_dofs) equilibria.
+        tangents: (n_asked, n_dofs) step to each along the path's tangent at the one before.
+        stable: (n_asked,) whether each is a minimum of the energy.
+        jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
+            point or branched.
+        counts: (4,) gradients, factorisations, shifted factorisations, increments.
+        topology: as solved, with room for all units that met; None if it was the solver's.
+    """
+
+    states: Floats
+    tangents: Floats
+    stable: Ints
+    jumped: Ints
+    counts: Ints
+    topology: Topology | None = None
+
+
+@dataclass(frozen=True)
+class StaticSolver:
+    """Finds the equilibria of one case at the asked load parameters (``dynamics.Solver``).
+
+    The load parameter takes the place of time; the velocities of free dofs are zero.
+
+    Attributes:
+        topology: the structure.
+        asked: (n_asked,) load parameters, in the order in which they are passed.
+        relative: tolerance of the residual, relative to the largest reaction.
+        absolute: its floor, N.
+        threads: cases solved side by side.
+        start: of a similar structure under the same drive, whose steps between the asked loads are
+            tried before the path is followed step by step; of the result they change no more than
+            the tolerance allows. Where that structure jumped its step is not tried. A step is the
+            tangent's, bent as it was there.
+        substeps: loads to pass on the way to each asked one, that one included.
+    """
+
+    topology: Topology
+    asked: Floats
+    relative: float = 1e-10
+    absolute: float = 1e-11
+    threads: int = 1
+    start: StaticRecord | None = None
+    substeps: int = 1
+
+    def refined(self, record: StaticRecord) -> StaticSolver:
+        """One that passes twice the loads, each to a hundred times tighter a tolerance."""
+        del record
+        return replace(self, relative=self.relative / 100, start=None, substeps=2 * self.substeps)
+
+    def coupling(self, pairs: Ints) -> StaticSolver:
+        """See ``dynamics.Solver``."""
+        return replace(self, topology=self.topology.coupling(pairs))
+
+    def forward(
+        self, values: ConcreteParameters, drive: PrescribedMotion
+    ) -> tuple[Floats, Floats, StaticRecord]:
+        """See ``dynamics.Solver``."""
+        top = self.topology
+        refuse_floating(top)
+        loads = drive.values(top.held, self._passed)
+        states, tangents = (np.zeros((len(loads), top.n_dofs)) for _ in range(2))
+        stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
+        counts = np.zeros(4, dtype=np.int64)
+        bends, trusted = self._known(states)
+        system = system_of(top, values)
+        rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
+            initial=0
+        )
+        floor = max(self.absolute, rounding * float(values.law[:, 0].max()))
+        refuse_start(top, values, system.contacts, np.zeros(top.n_dofs))
+        reached, fraction = follow(
+            loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
+            counts,
+        )  # fmt: skip
+        raise_new_pairs(system.contacts)
+        if reached < len(loads):
+            where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()
+            unit = int(top.ligament_units[where, 0])
+            raise SimulationError(
+                f"no equilibrium found beyond load {reached // self.substeps} of"
+                f" {len(self.asked)} (at {fraction:.3g} of"
+                f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
+                " stable state; try a smaller load or more load steps",
+                step=reached // self.substeps,
+                unit=unit,
+                states=states[:reached][self.substeps - 1 :: self.substeps],
+            )
+        last = slice(self.substeps - 1, None, self.substeps)
+        on_the_way = jumped.reshape(-1, self.substeps).max(axis=1)
+        record = StaticRecord(
+            states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts, top
+        )
+        return states[last].copy(), np.zeros_like(states[last]), record
+
+    @property
+    def _passed(self) -> Floats:
+        """(n_asked * substeps,) load parameters of all loads passed; the path starts at zero."""
+        way = np.diff(self.asked, prepend=0.0)
+        left = np.arange(self.substeps - 1, -1, -1) / self.substeps
+        return (self.asked[:, None] - way[:, None] * left).ravel()
+
+    def _known(self, states: Floats) -> tuple[Floats, Ints]:
+        """Departure of the start's path from its tangents, and where it may serve."""
+        start = self.start
+        if start is None or start.states.shape != states.shape:
+            return states, np.zeros(len(states), dtype=np.int64)
+        steps = np.diff(start.states, axis=0, prepend=0.0)
+        return steps - start.tangents, 1 - start.jumped
+
+    def backward(
+        self, values: ConcreteParameters, record: StaticRecord, bar_u: Floats, bar_v: Floats
+    ) -> tuple[ConcreteParameters, Floats, Floats]:
+        """See ``dynamics.Solver``."""
+        del bar_v
+        top = record.topology or self.topology
+        system = system_of(top, values)
+        bars = empty_bars(system, (len(record.states), len(top.held)))
+        unstable = adjoint(record.states, bar_u, system, top.designed, bars)
+        if unstable >= 0:
+            raise SimulationError(
+                f"the equilibrium at load {unstable} is not a minimum of the energy, so it has no"
+                " gradient to follow; try another design or more load steps",
+                step=unstable,
+            )
+        return as_values(bars), self.asked, bars.drive

@@ -1,0 +1,5 @@
+"""Poses a design problem: scene, plan, objective, and the loss with its gradient."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,112 @@
+"""Mimicking functions: how far a response is from its target, per load case, in JAX."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Floats, Ints, Numbers
+from sim.energy import LigamentLaw, ligament_energy
+from sim.structure import Parameters
+
+
+class DisplacementMimicking(NamedTuple):
+    """Weighted sum of |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest).
+
+    Attributes:
+        units: (n,) region of interest.
+        spacing: s, mm.
+        weights: (n_asked,) quadrature weights.
+    """
+
+    units: Ints
+    spacing: float
+    weights: Floats
+
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        del parameters
+        normalised = displacement[:, :, self.units] / scales(self.spacing)
+        return jnp.einsum("ctud,ctud,t->c", normalised, normalised, self.weights)
+
+
+class RelativeMimicking(NamedTuple):
+    """Root of the weighted sum of |U - U_target|^2, relative to the size of U_target (Eq. 1).
+
+    Attributes:
+        units: (n,) region of interest.
+        spacing: s, mm.
+        weights: (n_asked,) quadrature weights.
+        target: (n_cases, n_asked, n, 3) displacement to mimic, mm, mm, rad.
+        size: (n_cases,) what counts as 1.
+    """
+
+    units: Ints
+    spacing: float
+    weights: Floats
+    target: Floats
+    size: Floats
+
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        del parameters
+        missed = (displacement[:, :, self.units] - self.target) / scales(self.spacing)
+        return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
+
+
+def combined(losses: Array, weights: Numbers, sharpness: float) -> Array:
+    """Weighted p-mean of losses (n_cases,): their mean for 1, towards the largest for a large p."""
+    if sharpness == 1.0:
+        return jnp.asarray(weights) @ losses
+    largest = jax.lax.stop_gradient(jnp.max(losses))
+    return largest * (jnp.asarray(weights) @ (losses / largest) ** sharpness) ** (1.0 / sharpness)
+
+
+def scales(spacing: float) -> Floats:
+    """(3,) divisors of ux, uy (mm) and theta (rad) that make them comparable."""
+    return np.array([spacing, spacing, 1.0])
+
+
+def extent(motion: Floats, spacing: float) -> Floats:
+    """Size |U| (n_cases, n_asked) of a region's motion (n_cases, n_asked, n, 3)."""
+    return np.asarray(np.linalg.norm(motion / scales(spacing), axis=(2, 3)))
+
+
+class StrainEnergyMimicking(NamedTuple):
+    """Weighted sum over samples of the region's strain energy, without contact, N mm (Eq. 2).
+
+    Attributes:
+        ligaments: (n,) ligaments that touch the region.
+        ligament_units: (n, 2) units that they join.
+        weights: (n_asked,) quadrature weights.
+    """
+
+    ligaments: Ints
+    ligament_units: Ints
+    weights: Floats
+
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        energies = strain_energies(displacement, parameters, self.ligaments, self.ligament_units)
+        return jnp.einsum("ctl,t->c", energies, self.weights)
+
+
+def strain_energies(
+    displacement: Numbers, parameters: Parameters[Any], ligaments: Ints, ligament_units: Ints
+) -> Array:
+    """Strain energy (..., n) of the chosen ligaments in states (..., n_units, 3), N mm."""
+    whole = jnp.asarray(displacement)
+    first, second = (whole[..., ligament_units[:, end], :] for end in range(2))
+    arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]
+    law = LigamentLaw(*parameters.law[ligaments].T)
+    ends = (values.reshape(-1, *values.shape[-2:]) for values in (first, second))
+    flat = _energies(*ends, arm[:, 0], arm[:, 1], vector, law)
+    return flat.reshape(first.shape[:-1])
+
+
+_energies = jax.jit(jax.vmap(jax.vmap(ligament_energy), in_axes=(0, 0, None, None, None, None)))
+"""Energies (n_states, n) of the ligaments between units in states (n_states, n, 3)."""

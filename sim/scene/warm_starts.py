@@ -1,0 +1,89 @@
+"""Equilibrium paths that outlive a kill: each evaluation starts from the last accepted design's.
+
+Which path a solve starts from shows in the last bits of its result, so a resumed run must start
+from the same ones. Each path is on the disc before its evaluation enters the journal, and stays
+there as long as it may be needed: the last accepted one and the newest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from sim.core import Floats
+from sim.optimise import Evaluation
+from sim.quasistatics import StaticRecord
+
+log = logging.getLogger(__name__)
+
+
+class Paths:
+    """Paths of an optimisation's designs, one record for each simulated case.
+
+    Args:
+        folder: where they are kept; made if there is none.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._accepted: str | None = None
+
+    def start(self) -> list[StaticRecord] | None:
+        """The records to start the next evaluation from: those of the last accepted design."""
+        if self._accepted is None:
+            return None
+        path = self.folder / self._accepted
+        if not path.exists():
+            log.warning("%s is gone: the next evaluation starts from scratch", path)
+            return None
+        try:
+            return _records(path)
+        except (OSError, ValueError, LookupError, EOFError, BadZipFile, zlib.error) as error:
+            log.warning("%s is damaged (%s): the next evaluation starts from scratch", path, error)
+            return None
+
+    def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
+        """Stores the records of an evaluation that was computed just now."""
+        name = _name(design)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for old in self.folder.iterdir():
+            if old.name not in (name, self._accepted):
+                old.unlink()
+        unfinished = self.folder / f"{name}.new"
+        with unfinished.open("wb") as file:
+            np.savez(
+                file,
+                states=np.stack([one.states for one in records]),
+                tangents=np.stack([one.tangents for one in records]),
+                stable=np.stack([one.stable for one in records]),
+                jumped=np.stack([one.jumped for one in records]),
+            )
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.rename(self.folder / name)
+
+    def accept(self, evaluation: Evaluation) -> None:
+        """Takes note of an evaluation, computed or read back from the journal."""
+        if evaluation.accepted and evaluation.failure is None:
+            self._accepted = _name(evaluation.x)
+
+
+def _records(path: Path) -> list[StaticRecord]:
+    """The records in a file, whose entries have checksums."""
+    with np.load(path) as stored:
+        parts = (stored[name] for name in ("states", "tangents", "stable", "jumped"))
+        return [
+            StaticRecord(states, tangents, stable, jumped, np.zeros(4, dtype=np.int64))
+            for states, tangents, stable, jumped in zip(*parts, strict=True)
+        ]
+
+
+def _name(design: Floats) -> str:
+    return hashlib.sha256(design.tobytes()).hexdigest()[:32]

@@ -1,0 +1,316 @@
+"""Simulated motion of a structure under several drives, as one differentiable function.
+
+    motion = simulate(solver, parameters, drives)
+
+is the displacement and velocity of every case at the asked times; ``jax.grad`` through it runs the
+exact adjoint of the steps taken. The solvers are ``ImplicitSolver`` (slow drives) and
+``explicit.ExplicitSolver`` (waves, tight tolerances).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any, NamedTuple, Protocol, TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.custom_derivatives import SymbolicZero
+
+from sim.core import Floats, Ints, NewContactPairs
+from sim.energy import Topology
+from sim.solvers.loads import MotionLaw, held_values
+from sim.solvers.validation import refuse_idle, refuse_nonsense
+from sim.structure import ConcreteParameters, Parameters
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Response(NamedTuple):
+    """Motion of all cases at the asked times.
+
+    Attributes:
+        displacement: (n_cases, n_asked, n_units, 3) mm, mm, rad.
+        velocity: (n_cases, n_asked, n_units, 3) mm/s, mm/s, rad/s.
+    """
+
+    displacement: Array
+    velocity: Array
+
+
+class PrescribedMotion(NamedTuple):
+    """A motion and the units that follow it; all other held dofs rest."""
+
+    units: Ints
+    motion: MotionLaw
+
+    def values(self, held: Ints, times: Floats) -> Floats:
+        """Values (n_times, n_held) of the held dofs."""
+        every = held_values(held, self.units, self.motion, _padded(times))
+        return np.asarray(every)[: len(times)]
+
+    def start(self, topology: Topology, time: float) -> Floats:
+        """State (n_dofs,) in which a motion from rest begins: the held dofs are in place."""
+        state = np.zeros(topology.n_dofs)
+        state[topology.held] = self.values(topology.held, np.array([time]))[0]
+        return state
+
+    def rates(self, held: Ints, times: Floats) -> Floats:
+        """Their rates of change, per s."""
+        every = _held_rates(held, self.units, self.motion, _padded(times))
+        return np.asarray(every)[: len(times)]
+
+
+def _padded(times: Floats) -> Floats:
+    """The times, up to a power of 2 with copies of the last: JAX compiles for every new length."""
+    return np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
+
+
+def _held_rates(held: Ints, units: Ints, motion: MotionLaw, times: Floats) -> Array:
+    at = jnp.asarray(times)
+    return jax.jvp(lambda t: held_values(held, units, motion, t), (at,), (jnp.ones_like(at),))[1]
+
+
+class Solver(Protocol):
+    """One way to integrate one case in time, forward and back."""
+
+    @property
+    def topology(self) -> Topology:
+        """The structure."""
+        ...
+
+    @property
+    def asked(self) -> Floats:
+        """Times (n_asked,) of the output, s."""
+        ...
+
+    @property
+    def threads(self) -> int:
+        """Cases solved side by side."""
+        ...
+
+    def refined(self, record: Any) -> Solver:
+        """One with half the steps that a record was made with, to estimate its error by."""
+        ...
+
+    def coupling(self, pairs: Ints) -> Solver:
+        """One with room in the tangent for contact of more pairs (n, 2) of units."""
+        ...
+
+    def forward(
+        self, values: ConcreteParameters, drive: PrescribedMotion
+    ) -> tuple[Floats, Floats, Any]:
+        """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
+
+        The held dofs' own entries are of no account: they follow from the drive.
+
+        Raises:
+            SimulationError: a step failed.
+            StrangersMeet: units met whose coupling the tangent has no room for.
+        """
+        ...
+
+    def backward(
+        self, values: ConcreteParameters, record: Any, bar_u: Floats, bar_v: Floats
+    ) -> tuple[ConcreteParameters, Floats, Floats]:
+        """Loss derivatives by the parameters, and by the drive at the times also returned."""
+        ...
+
+
+def solve_case(
+    solver: Solver, values: ConcreteParameters, drive: PrescribedMotion
+) -> tuple[Floats, Floats, Any]:
+    """One case: displacement and velocity (n_asked, n_dofs), and the solver's record.
+
+    Raises:
+        SimulationError: a step failed, or there is nothing meaningful to start from.
+    """
+    refuse_idle(solver.topology)
+    refuse_nonsense(values, drive.motion)
+    try:
+        displacement, velocity, record = solver.forward(values, drive)
+    except NewContactPairs as met:
+        return solve_case(solver.coupling(met.pairs), values, drive)
+    held = solver.topology.held
+    displacement[:, held] = drive.values(held, solver.asked)
+    velocity[:, held] = drive.rates(held, solver.asked)
+    return displacement, velocity, record
+
+
+@jax.tree_util.register_static
+class Records:
+    """What the reverse sweeps of all cases need, opaque to JAX."""
+
+    def __init__(
+        self, values: ConcreteParameters, drives: Sequence[PrescribedMotion], records: list[Any]
+    ) -> None:
+        self.values = values
+        self.drives = drives
+        self.records = records
+
+
+class Gradients(NamedTuple):
+    """Loss derivatives that a reverse sweep returns.
+
+    Attributes:
+        parameters: summed over the cases.
+        times, drive: of each case, the times and the derivatives by the held values there.
+    """
+
+    parameters: ConcreteParameters
+    times: list[Floats]
+    drive: list[Floats]
+
+
+def forward(
+    solver: Solver,
+    values: ConcreteParameters,
+    drives: Sequence[PrescribedMotion],
+    solvers: Sequence[Solver] | None = None,
+) -> tuple[Floats, Floats, Records]:
+    """Displacement and velocity (n_cases, n_asked, n_units, 3) of all cases, and their records.
+
+    With ``solvers`` (n_cases,) each case is solved by its own, otherwise alike.
+
+    Raises:
+        SimulationError: a step failed.
+    """
+    jobs = list(zip(solvers or [solver] * len(drives), drives, strict=True))
+    results = _spread(lambda job: solve_case(job[0], values, job[1]), jobs, solver.threads)
+    shape = (len(drives), -1, solver.topology.n_units, 3)
+    displacement = np.stack([u for u, _, _ in results]).reshape(shape)
+    velocity = np.stack([v for _, v, _ in results]).reshape(shape)
+    return displacement, velocity, Records(values, drives, [record for _, _, record in results])
+
+
+def backward(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
+    """Reverse sweep of ``forward`` from loss derivatives shaped as its outputs."""
+    # copies, as jax's arrays are read only: loops would be compiled once more for these
+    flat_u, flat_v = (
+        np.array(bar).reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v)
+    )
+    results = _spread(
+        lambda case: solver.backward(
+            records.values, records.records[case], flat_u[case], flat_v[case]
+        ),
+        range(len(flat_u)),
+        solver.threads,
+    )
+    parts, times, drive = zip(*results, strict=True)
+    summed = ConcreteParameters(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
+    return Gradients(summed, list(times), list(drive))
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def simulate(
+    solver: Solver, parameters: Parameters[Any], drives: tuple[PrescribedMotion, ...]
+) -> Response:
+    """Integrates every case and returns its motion at the solver's asked times.
+
+    Not for use under ``jit``: the solvers run compiled code of their own on concrete arrays.
+
+    Raises:
+        SimulationError: a step failed even after it was cut; the error names it.
+    """
+    return _forward(solver, parameters, drives)[0]
+
+
+def _forward(
+    solver: Solver, parameters: Parameters[Any], drives: tuple[PrescribedMotion, ...]
+) -> tuple[Response, Records]:
+    values = ConcreteParameters(*(np.asarray(part) for part in parameters))
+    displacement, velocity, records = forward(solver, values, drives)
+    return Response(jnp.asarray(displacement), jnp.asarray(velocity)), records
+
+
+def _forward_rule(
+    solver: Solver, parameters: Any, drives: Any
+) -> tuple[Response, tuple[Records, bool]]:
+    plain = jax.tree.map(lambda primal: primal.value, (parameters, drives), is_leaf=_is_primal)
+    driven = any(leaf.perturbed for leaf in jax.tree.leaves(drives, is_leaf=_is_primal))
+    response, records = _forward(solver, *plain)
+    return response, (records, driven)
+
+
+def _is_primal(node: Any) -> bool:
+    return hasattr(node, "perturbed")
+
+
+def _backward_rule(
+    solver: Solver, residual: tuple[Records, bool], bar: Response
+) -> tuple[Parameters[Array], Any]:
+    records, driven = residual
+    bar_u, bar_v = (_dense(part) for part in bar)
+    pulled = backward(solver, records, bar_u, bar_v)
+    total = Parameters(*(jnp.asarray(part) for part in pulled.parameters))
+    if not driven:
+        return total, jax.tree.map(_zero, records.drives)
+    held, n_dofs = solver.topology.held, solver.topology.n_dofs
+    held_u, held_v = (part.reshape(len(part), -1, n_dofs)[..., held] for part in (bar_u, bar_v))
+    return total, tuple(
+        _drive_cotangent(
+            held,
+            drive,
+            (pulled.times[case], solver.asked),
+            (pulled.drive[case], held_u[case], held_v[case]),
+        )
+        for case, drive in enumerate(records.drives)
+    )
+
+
+simulate.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
+
+
+def _dense(cotangent: Any) -> Floats:
+    if isinstance(cotangent, SymbolicZero):
+        return np.zeros(cotangent.shape)
+    return np.asarray(cotangent)
+
+
+def _zero(leaf: Any) -> Any:
+    array = np.asarray(leaf)
+    return np.zeros(
+        array.shape, jnp.asarray(array).dtype if array.dtype.kind == "f" else jax.dtypes.float0
+    )
+
+
+def _drive_cotangent(
+    held: Ints,
+    drive: PrescribedMotion,
+    times: tuple[Floats, Floats],
+    bars: tuple[Floats, Floats, Floats],
+) -> PrescribedMotion:
+    """Pulls derivatives back to the drive's own numbers.
+
+    Args:
+        held: ids of the held dofs.
+        drive: the case's drive.
+        times: those of the solver's stages and of the output.
+        bars: derivatives by the held values at both, and by their rates at the output.
+    """
+    within, asked = times
+    units = np.asarray(drive.units)
+
+    def prescribed(motion: MotionLaw) -> tuple[Array, Array, Array]:
+        return (
+            held_values(held, units, motion, within),
+            held_values(held, units, motion, asked),
+            _held_rates(held, units, motion, asked),
+        )
+
+    _, pull_back = jax.vjp(prescribed, drive.motion)
+    return PrescribedMotion(
+        _zero(drive.units), pull_back(tuple(jnp.asarray(bar) for bar in bars))[0]
+    )
+
+
+def _spread(work: Callable[[T], R], items: Sequence[T], threads: int) -> list[R]:
+    """Maps over cases on threads, in order; compiled loops run without the interpreter's lock."""
+    if threads == 1 or len(items) == 1:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, items))

@@ -1,0 +1,83 @@
+"""Many independent cases in one call: over all cores, memory flat, failures kept with a reason."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+from sim.core import Floats, SimulationError
+from sim.solvers.base import PrescribedMotion, Solver, solve_case
+from sim.structure import ConcreteParameters
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Case:
+    """One structure under one drive, the solver to use, and its number among the load cases."""
+
+    values: ConcreteParameters
+    drive: PrescribedMotion
+    solver: Solver
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class Solved:
+    """A case that was simulated.
+
+    Attributes:
+        case: the case.
+        displacement, velocity: (n_asked, n_units, 3).
+        record: the solver's.
+    """
+
+    case: Case
+    displacement: Floats
+    velocity: Floats
+    record: Any
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[R]):
+    """What came of a case: the measure's value, or why there is none."""
+
+    value: R | None
+    failure: str | None = None
+    error: SimulationError | None = None
+
+
+Measure = Callable[[Solved], R]
+"""Reduces a simulated case to what is kept of it."""
+
+
+def run_batch(cases: Iterable[Case], measure: Measure[R], threads: int = 1) -> Iterator[Outcome[R]]:
+    """Yields the outcome of every case, in order, while others are still computed.
+
+    Cases are taken from the iterable as cores fall free, at most two per thread ahead, and only
+    what ``measure`` returns is kept of them. A case whose simulation fails yields its reason.
+    """
+    if threads == 1:
+        yield from (_outcome(case, measure) for case in cases)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        ahead: deque[Future[Outcome[R]]] = deque()
+        for case in cases:
+            ahead.append(pool.submit(_outcome, case, measure))
+            if len(ahead) >= 2 * threads:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+
+
+def _outcome(case: Case, measure: Measure[R]) -> Outcome[R]:
+    shape = (-1, case.solver.topology.n_units, 3)
+    try:
+        displacement, velocity, record = solve_case(case.solver, case.values, case.drive)
+        solved = Solved(case, displacement.reshape(shape), velocity.reshape(shape), record)
+        return Outcome(measure(solved))
+    except SimulationError as error:  # of the measure too: it may simulate with finer steps
+        return Outcome(None, str(error), error)

@@ -1,0 +1,130 @@
+"""Prescribed motions of held units as functions of time, in JAX."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Ints, Numbers
+
+
+class MotionLaw(Protocol):
+    """Motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion at the given times, s."""
+        ...
+
+
+def _along(direction: float | Array, displacement: Array) -> Array:
+    """Displacement along a direction (rad) without rotation, (n_times, 3)."""
+    still = jnp.zeros_like(displacement)
+    return jnp.stack(
+        [displacement * jnp.cos(direction), displacement * jnp.sin(direction), still], axis=-1
+    )
+
+
+class Harmonic(NamedTuple):
+    """A sin(2 pi f t) along a direction, from rest with a velocity jump, as the authors drive it.
+
+    With a ``rise`` time the sine is switched on smoothly about ``delay``, and its phase starts
+    there: A (1 + tanh((t - delay) / rise)) / 2 sin(2 pi f (t - delay)).
+    """
+
+    amplitude: float | Array
+    frequency: float | Array
+    direction: float | Array = 0.0
+    rise: float | None = None
+    delay: float = 0.0
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        shifted = times - self.delay
+        wave = self.amplitude * jnp.sin(2 * jnp.pi * self.frequency * shifted)
+        if self.rise is not None:
+            wave = wave * (1 + jnp.tanh(shifted / self.rise)) / 2
+        return _along(self.direction, wave)
+
+
+class Pulse(NamedTuple):
+    """A exp(-((t - delay) / width)^2) along a direction."""
+
+    amplitude: float | Array
+    width: float
+    direction: float | Array = 0.0
+    delay: float = 0.0
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        phase = (jnp.asarray(times) - self.delay) / self.width
+        return _along(self.direction, self.amplitude * jnp.exp(-(phase**2)))
+
+
+class TanhRamp(NamedTuple):
+    """A (1 + tanh(6 (2 t / T - 1))) / 2 along a direction, the authors' quasi-static ramp."""
+
+    amplitude: float | Array
+    duration: float
+    direction: float | Array = 0.0
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        phase = 2 * jnp.asarray(times) / self.duration - 1
+        return _along(self.direction, self.amplitude * (1 + jnp.tanh(6 * phase)) / 2)
+
+
+class LinearRamp(NamedTuple):
+    """A t / T along a direction."""
+
+    amplitude: float | Array
+    duration: float
+    direction: float | Array = 0.0
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        return _along(self.direction, self.amplitude * jnp.asarray(times) / self.duration)
+
+
+class TimeSeries(NamedTuple):
+    """Measured motion, interpolated linearly.
+
+    Attributes:
+        times: (n,) s, ascending.
+        motion: (n, 3) mm, mm, rad; or (n, n_units, 3) with one motion for each driven unit.
+    """
+
+    times: Numbers
+    motion: Numbers
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) or (n_times, n_units, 3) at the given times, s."""
+        flat = jnp.reshape(self.motion, (len(self.times), -1))
+        columns = [jnp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
+        return jnp.stack(columns, axis=-1).reshape(len(times), *jnp.shape(self.motion)[1:])
+
+
+def held_dofs(clamped: Ints, driven: Ints) -> Ints:
+    """Ids of all dofs of the clamped and driven units, ascending."""
+    units = np.unique(np.concatenate([clamped, driven]))
+    return (3 * units[:, None] + np.arange(3)).ravel()
+
+
+def held_values(held: Ints, driven: Ints, motion: MotionLaw, times: Numbers) -> Array:
+    """Values (n_times, n_held) of the held dofs when ``driven`` follow ``motion``; the others rest.
+
+    Raises:
+        ValueError: a driven dof is not among the held ones.
+    """
+    dofs = (3 * np.asarray(driven)[:, None] + np.arange(3)).ravel()
+    place = np.searchsorted(held, dofs)
+    if not np.array_equal(held[np.minimum(place, len(held) - 1)], dofs):
+        raise ValueError("every dof of a driven unit must be held")
+    values = jnp.asarray(motion(jnp.asarray(times)))
+    if values.ndim == 2:
+        values = jnp.broadcast_to(values[:, None, :], (len(times), len(driven), 3))
+    selection = np.zeros((len(dofs), len(held)))
+    selection[np.arange(len(dofs)), place] = 1.0
+    return values.reshape(len(times), -1) @ selection

@@ -1,0 +1,119 @@
+"""What a solve may start from: numbers with a meaning, and units that are not in one another.
+
+Beyond its barrier a void has no force, and a unit without mass no acceleration: a solver would go
+on from there without a sign that anything is wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from sim.collision import ContactArrays, contact_arrays, find, raise_new_pairs
+from sim.core import Floats, SimulationError
+from sim.energy import Topology
+from sim.solvers.loads import MotionLaw
+from sim.structure import ConcreteParameters
+
+NEVER_NEGATIVE = {
+    "law": "stiffness of the ligaments",
+    "contact": "stiffness of contact",
+    "damping": "damping",
+}
+
+
+def refuse_nonsense(values: ConcreteParameters, motion: MotionLaw) -> None:
+    """Raises an error that names what is not finite, or negative where that has no meaning."""
+    parts = {f"{name} of the structure": part for name, part in values._asdict().items()}
+    parts["motion of the driven units"] = ravel_pytree(motion)[0]
+    for name, part in parts.items():
+        if not np.isfinite(part).all():
+            raise SimulationError(
+                f"the {name} is not everywhere a finite number; try another design (no unit without"
+                " area, no edge without length) or mend the series that drives it"
+            )
+    for field, name in NEVER_NEGATIVE.items():
+        part = getattr(values, field)
+        if part.min(initial=0.0) < 0.0:
+            raise SimulationError(
+                f"the {name} is negative in one place ({part.min():.3g}); make it zero or more"
+            )
+
+
+def refuse_idle(topology: Topology) -> None:
+    """Raises an error if nothing can move, or nothing acts on what does."""
+    if topology.n_free == 0:
+        raise SimulationError(
+            "every unit is held, so nothing is left to solve for; hold fewer units"
+        )
+    if len(topology.ligament_units) == 0:
+        raise SimulationError("no two units are joined; try a structure that has ligaments")
+
+
+def refuse_floating(topology: Topology) -> None:
+    """Raises an error that names a unit which hangs on nothing: it has no equilibrium."""
+    one, other = topology.ligament_units.T
+    joined = coo_array((np.ones(len(one)), (one, other)), shape=(topology.n_units,) * 2)
+    _, piece = connected_components(joined, directed=False)
+    floating = np.flatnonzero(~np.isin(piece, piece[topology.held // 3]))
+    if len(floating) > 0:
+        raise SimulationError(
+            f"unit {floating[0]} ({len(floating)} units in all) is joined to no unit that is held,"
+            " so it has no equilibrium; hold it, or try the structure without it",
+            unit=int(floating[0]),
+        )
+
+
+def refuse_massless(values: ConcreteParameters) -> None:
+    """Raises an error that names a unit which nothing accelerates, or the wrong way round."""
+    lightest = values.mass.min(axis=1)
+    if (lightest <= 0.0).any():
+        unit = int(lightest.argmin())
+        raise SimulationError(
+            f"unit {unit} has no mass, or less than none ({lightest[unit]:.3g}); try another design"
+            " (corners counter-clockwise, no unit without area) or a density above zero",
+            unit=unit,
+        )
+
+
+def refuse_start(
+    topology: Topology, values: ConcreteParameters, contacts: ContactArrays, start: Floats
+) -> None:
+    """Raises an error that names two units which are in one another in a state (n_dofs,)."""
+    if len(contacts.pairs) > 0 and find(start, contacts) < 0:
+        raise_new_pairs(contacts)
+        raise SimulationError(
+            f"units {contacts.watch.overlap[0]} and {contacts.watch.overlap[1]} overlap at"
+            f" {_moment(start)}; ask for a gap between units, or take contact: angle"
+        )
+    if topology.meeting is None and len(values.void) > 0:
+        angles = topology.smallest_void_angles(values.void, start.reshape(-1, 3))
+        if angles.min() <= topology.barrier:
+            one, other = topology.ligament_units[angles.argmin()]
+            raise SimulationError(
+                f"the void between units {one} and {other} is closed to"
+                f" {np.rad2deg(angles.min()):.4g} deg at {_moment(start)}, its barrier is at"
+                f" {np.rad2deg(topology.barrier):.4g} deg; ask for a larger smallest void angle, or"
+                " try a drive that starts from rest",
+                unit=int(one),
+            )
+
+
+def inadmissible(
+    topology: Topology, values: ConcreteParameters, states: Floats
+) -> NDArray[np.bool_]:
+    """Which of the states (n_states, n_dofs) have a void beyond its barrier, or an overlap."""
+    if topology.meeting is None:
+        motion = states.reshape(len(states), -1, 3)
+        return topology.smallest_void_angle(values.void, motion) <= topology.barrier
+    contacts = contact_arrays(topology.meeting, values, topology.n_units)
+    found = np.array([find(state, contacts) < 0 for state in states], dtype=bool)
+    raise_new_pairs(contacts)
+    return found
+
+
+def _moment(start: Floats) -> str:
+    return "the start of the drive" if start.any() else "rest"

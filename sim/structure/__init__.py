@@ -1,0 +1,5 @@
+"""Describes structures: lattice, geometry, material, and the vector that designs them."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

@@ -1,0 +1,111 @@
+"""Shape of the units as functions of the vertices, in JAX: centroid, inertia, arms, angles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from sim.core import Floats, Ints, Numbers
+from sim.structure.lattice import Lattice
+
+VOID_BRANCH = -jnp.pi / 4
+"""Void angles are unwrapped on [VOID_BRANCH, VOID_BRANCH + 2 pi): open voids reach beyond 270 deg,
+overlapping edges are slightly negative."""
+
+
+class Shape(NamedTuple):
+    """Reference shape of a network.
+
+    Attributes:
+        centroid: (n_units, 2) mm.
+        area: (n_units,) mm^2.
+        polar_moment: (n_units,) about the centroid, mm^4.
+        arm: (n_vertices, 2) centroid to vertex, mm.
+        void_angle: (n_ligaments, 2) opening on the two sides of each ligament, rad.
+    """
+
+    centroid: Array
+    area: Array
+    polar_moment: Array
+    arm: Array
+    void_angle: Array
+
+
+def shape(lattice: Lattice, vertices: Numbers) -> Shape:
+    """Shape of the network whose vertices lie at ``vertices`` (n_vertices, 2), in mm."""
+    return _shape(Rings(*(getattr(lattice, name) for name in Rings._fields)), jnp.asarray(vertices))
+
+
+class Rings(NamedTuple):
+    """What of a lattice its shape depends on besides the vertices: see `Lattice`."""
+
+    unit: Ints
+    site: Floats
+    ligaments: Ints
+    next_vertex: Ints
+    previous_vertex: Ints
+
+    @property
+    def n_units(self) -> int:
+        """Number of units."""
+        return len(self.site)
+
+
+@jax.jit
+def _shape(lattice: Rings, vertices: Array) -> Shape:
+    """Compiled as one: that is sooner done than each of its operations by itself."""
+    centroid, area, polar_moment = inertia(lattice, vertices)
+    arm = vertices - centroid[lattice.unit]
+    return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
+
+
+def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, Array]:
+    """Centroid, area and polar moment about the centroid of each polygon (shoelace sums).
+
+    Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
+    """
+
+    def total(values: Array) -> Array:
+        return jax.ops.segment_sum(values, lattice.unit, lattice.n_units)
+
+    here = jnp.asarray(vertices) - lattice.site[lattice.unit]
+    there = here[lattice.next_vertex]
+    cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    area = total(cross) / 2
+    offset = total((here + there) * cross[:, None]) / (6 * area[:, None])
+    squares = jnp.sum(here * here + here * there + there * there, axis=1)
+    polar_moment = total(cross * squares) / 12 - area * jnp.sum(offset**2, axis=1)
+    return jnp.asarray(lattice.site) + offset, area, polar_moment
+
+
+def void_angles(lattice: Lattice | Rings, vertices: Numbers) -> Array:
+    """Signed, unwrapped angles (n_ligaments, 2) of the voids on both sides of each ligament, rad.
+
+    The first lies between the clockwise edge of the second end and the counter-clockwise edge of
+    the first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid
+    units a and b they change by exactly theta_a - theta_b and theta_b - theta_a.
+    """
+    first, second = lattice.ligaments.T
+    one = angle_between(
+        vertices[lattice.previous_vertex[second]] - vertices[second],
+        vertices[lattice.next_vertex[first]] - vertices[first],
+    )
+    other = angle_between(
+        vertices[lattice.previous_vertex[first]] - vertices[first],
+        vertices[lattice.next_vertex[second]] - vertices[second],
+    )
+    return unwrap(jnp.stack([one, other], axis=1), VOID_BRANCH)
+
+
+def angle_between(start: Numbers, end: Numbers) -> Array:
+    """Signed angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
+    cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
+    return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))
+
+
+def unwrap(angle: Array, branch: float | Array) -> Array:
+    """Moves angles on (-pi, pi] to [branch, branch + 2 pi)."""
+    return jnp.where(angle < branch, angle + 2 * jnp.pi, angle)

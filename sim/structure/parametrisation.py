@@ -1,0 +1,68 @@
+"""Derives the parameters of a structure, by which a solve can be differentiated."""
+
+from __future__ import annotations
+
+from typing import Generic, NamedTuple, TypeAlias, TypeVar
+
+import jax.numpy as jnp
+from jax import Array
+
+from sim.core import Floats
+from sim.structure.geometry import Shape
+from sim.structure.lattice import Lattice
+from sim.structure.material import Material
+
+A = TypeVar("A")
+
+
+class Parameters(NamedTuple, Generic[A]):
+    """All that a response depends on differentiably, besides the drive.
+
+    Attributes:
+        arm: (n_ligaments, 2, 2) arms of both ends, mm.
+        vector: (n_ligaments, 2) reference ligament vectors, mm.
+        void: (n_ligaments, 2) reference void angles, rad.
+        law: (n_ligaments, 3) axial, shear, bending stiffness.
+        contact: (n_ligaments,) contact stiffness, N mm/rad^2.
+        corner: (n_vertices, 2) arms of all vertices, mm.
+        centroid: (n_units, 2) mm.
+        mass: (n_units, 3) tonne, tonne, tonne mm^2.
+        damping: (n_units, 3) tonne/s, tonne/s, tonne mm^2/s.
+    """
+
+    arm: A
+    vector: A
+    void: A
+    law: A
+    contact: A
+    corner: A
+    centroid: A
+    mass: A
+    damping: A
+
+
+ConcreteParameters: TypeAlias = Parameters[Floats]
+"""Concrete parameters, as the solvers take them."""
+
+
+def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters[Array]:
+    """Parameters of a network of the given shape; differentiable in shape and material."""
+    n = lattice.n_ligaments
+    stiffness = (material.axial, material.shear, material.bending)
+    mass, inertia = material.density * shape.area, material.density * shape.polar_moment
+    damping = (
+        material.damping_translation,
+        material.damping_translation,
+        material.damping_rotation,
+    )
+    return Parameters(
+        arm=shape.arm[lattice.ligaments],
+        vector=jnp.asarray(lattice.ligament_vectors),
+        void=shape.void_angle,
+        law=jnp.stack([jnp.broadcast_to(k, (n,)) for k in stiffness], axis=1),
+        contact=jnp.broadcast_to(jnp.asarray(material.contact, dtype=float), (n,)),
+        corner=shape.arm,
+        centroid=shape.centroid,
+        mass=jnp.stack([mass, mass, inertia], axis=1),
+        damping=jnp.stack([jnp.broadcast_to(c, (lattice.n_units,)) for c in damping], axis=1),
+    )

@@ -1,0 +1,5 @@
+"""Integrates motions in time, implicitly or explicitly, with discrete adjoints."""
+
+import lazy_loader as lazy
+
+__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

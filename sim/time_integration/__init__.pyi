@@ -1,0 +1,14 @@
+from . import esdirk_stage as esdirk_stage
+from . import explicit as explicit
+from . import implicit as implicit
+from . import time_grid as time_grid
+from .coefficients import BLANES_MOAN as BLANES_MOAN
+from .coefficients import LEAPFROG as LEAPFROG
+from .coefficients import Splitting as Splitting
+from .explicit import ExplicitRecord as ExplicitRecord
+from .explicit import ExplicitSolver as ExplicitSolver
+from .implicit import ImplicitRecord as ImplicitRecord
+from .implicit import ImplicitSolver as ImplicitSolver
+from .step_control import adapted as adapted
+from .time_grid import halved as halved
+from .time_grid import simpson_weights as simpson_weights

@@ -1,0 +1,129 @@
+"""Compiled integration of a network's motion by diagonally implicit Runge-Kutta steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.core import Floats, Ints, compiled, inlined
+from sim.energy import System, Workspace, admissible_step, gradient, workspace
+from sim.time_integration.esdirk_stage import CONVERGED, Base, solve_stage
+
+
+@inlined
+def _stage_base(
+    s: int, h: float, stages: Floats, u: Floats, v: Floats, a: Floats, base: Base
+) -> None:
+    """Fills u* and v* of stage ``s`` from the stages (n_stages, n_dofs) before it."""
+    base.u[:] = u[0]
+    base.v[:] = v[0]
+    for j in range(s):
+        base.u[:] += h * stages[s, j] * v[j]
+        base.v[:] += h * stages[s, j] * a[j]
+
+
+@inlined
+def _guess(
+    s: int, nodes: Floats, u: Floats, a: Floats, base: Base, system: System, work: Workspace,
+    motion: Floats,
+) -> None:  # fmt: skip
+    """Guess of a stage: the acceleration extrapolated over the last stages, for all dofs alike.
+
+    Held dofs are extrapolated too and moved to their values together with the others: a driven unit
+    moved alone would make the tangent indefinite.
+    """
+    if s == 1:
+        motion[:] = base.u + base.k * (base.v + base.k * a[0])
+    else:
+        w = (nodes[s] - nodes[s - 2]) / (nodes[s - 1] - nodes[s - 2])
+        motion[:] = base.u + base.k * (base.v + base.k * (w * a[s - 1] + (1.0 - w) * a[s - 2]))
+    work.step[:] = motion - u[s - 1]
+    if admissible_step(u[s - 1], system, work.step) <= 1.0:
+        motion[:] = u[s - 1]
+
+
+@inlined
+def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats, a: Floats) -> None:
+    """Puts the held dofs of the initial state in place and fills its acceleration."""
+    for i in range(len(system.held)):
+        u[system.held[i]] = drive[i]
+    a[:] = 0.0
+    gradient(u, system, work.turn, work.force)
+    for d in system.dofs:
+        a[d] = -(work.force[d] + system.damping[d] * v[d]) / system.mass[d]
+
+
+@inlined
+def _worst(system: System, step: Floats) -> int:
+    """Free dof with the largest (scaled) step."""
+    worst = system.dofs[0]
+    for d in system.dofs:
+        if abs(step[d]) * system.scale[d] > abs(step[worst]) * system.scale[worst]:
+            worst = d
+    return worst
+
+
+@compiled
+def march(
+    times: Floats,
+    drive: Floats,
+    system: System,
+    stages: Floats,
+    nodes: Floats,
+    tolerance: float,
+    u: Floats,
+    v: Floats,
+    a: Floats,
+    counts: Ints,
+) -> tuple[int, int, int]:
+    """Integrates over the fixed grid ``times``.
+
+    Args:
+        times: (n_steps + 1,) s.
+        drive: (1 + n_steps (n_stages - 1), n_held) prescribed values at the start and all stages.
+        system: the structure.
+        stages: coefficients of the method.
+        nodes: its stage times.
+        tolerance: of the stage velocity, mm/s.
+        u: (n_steps + 1, n_stages, n_dofs) displacement of all stages; row n holds those of step n,
+            the last row only the end state in its first. Its first entry is the initial state.
+        v: velocity, likewise.
+        a: acceleration, likewise; filled throughout.
+        counts: (3,) gathers gradients, factorisations and solves.
+
+    Returns:
+        status, step index reached, dof with the largest step left.
+    """
+    n_steps, n_stages = len(times) - 1, len(nodes)
+    work = workspace(system)
+    motion = np.empty(len(system.mass))
+    base_u, base_v = np.empty_like(motion), np.empty_like(motion)
+    rate, factored_k = 0.1, -1.0
+    fresh = factored_k > 0.0  # not the constant, for which the stage would be compiled once more
+    _start(drive[0], system, work, u[0, 0], v[0, 0], a[0, 0])
+    for n in range(n_steps):
+        h = times[n + 1] - times[n]
+        base = Base(base_u, base_v, h * stages[1, 1])
+        fresh = fresh and abs(base.k - factored_k) <= 1e-9 * base.k
+        if not fresh:
+            factored_k = base.k
+        for s in range(1, n_stages):
+            _stage_base(s, h, stages, u[n], v[n], a[n], base)
+            _guess(s, nodes, u[n], a[n], base, system, work, motion)
+            target = drive[n * (n_stages - 1) + s]
+            status, fresh, rate = solve_stage(
+                motion, target, base, tolerance * h, system, work, fresh, rate, counts
+            )
+            if status != CONVERGED:  # after a kink in the drive the extrapolation leads astray
+                motion[:] = u[n, s - 1]
+                status, fresh, rate = solve_stage(
+                    motion, target, base, tolerance * h, system, work, fresh, rate, counts
+                )
+            if status != CONVERGED:
+                return status, n, _worst(system, work.step)
+            u[n, s] = motion
+            v[n, s] = (motion - base.u) / base.k
+            a[n, s] = (v[n, s] - base.v) / base.k
+        u[n + 1, 0] = u[n, n_stages - 1]
+        v[n + 1, 0] = v[n, n_stages - 1]
+        a[n + 1, 0] = a[n, n_stages - 1]
+    return CONVERGED, n_steps, 0

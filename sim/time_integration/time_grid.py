@@ -1,0 +1,102 @@
+"""Time grids and dense output."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from sim.core import Floats, Ints
+
+
+def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
+    """Grid from 0 to ``duration`` (s) whose steps grow geometrically up to ``largest``.
+
+    A drive that starts with a velocity jump needs short steps first. The number of steps is even,
+    and the grid's shape depends on its arguments alone, so it can be halved and frozen.
+    """
+    n_growing = int(np.ceil(np.log(largest / first) / np.log(growth)))
+    steps = np.minimum(first * growth ** np.arange(n_growing + 1), largest)
+    if steps.sum() < duration:
+        n_more = int(np.ceil((duration - steps.sum()) / largest))
+        steps = np.concatenate([steps, np.full(n_more, largest)])
+    times = np.concatenate([[0.0], np.cumsum(steps)])
+    times = times[: np.searchsorted(times, duration * (1 - 1e-12)) + 1]
+    return times * (duration / times[-1])
+
+
+def halved(times: Floats) -> Floats:
+    """The grid with every step cut in two."""
+    middles = (times[1:] + times[:-1]) / 2
+    return np.sort(np.concatenate([times, middles]))
+
+
+def split_steps(times: Floats, steps: Ints) -> Floats:
+    """The grid with some of its steps cut in two."""
+    return np.insert(times, steps + 1, (times[steps] + times[steps + 1]) / 2)
+
+
+def steps_of(times: Floats, asked: Floats) -> Ints:
+    """The steps (n,) in which the asked times lie, each once."""
+    found = np.searchsorted(times, asked, side="right") - 1
+    return np.unique(np.clip(found, 0, len(times) - 2))
+
+
+def refuse_outside(asked: Floats, end: float) -> None:
+    """Refuses times of output that do not ascend, or that lie outside of the run.
+
+    Raises:
+        ValueError: they do so by more than rounding.
+    """
+    slack = 1e-9 * end
+    if len(asked) and (asked[0] < -slack or asked[-1] > end + slack or (np.diff(asked) < 0).any()):
+        raise ValueError(f"output times must ascend from 0 to {end:g} s, the end of the run")
+
+
+def stage_times(times: Floats, nodes: Floats) -> Floats:
+    """Times (1 + n_steps (n_stages - 1),) of the start and of every implicit stage."""
+    stages = times[:-1, None] + np.diff(times)[:, None] * nodes[None, 1:]
+    return np.concatenate([times[:1], stages.ravel()])
+
+
+def hermite_stencils(times: Floats, asked: Floats) -> tuple[np.ndarray, Floats, Floats]:
+    """Cubic Hermite interpolation between grid points.
+
+    Returns:
+        (n_asked,) step in which each asked time lies, and the weights (n_asked, 4) of value at the
+        left and right end, slope at the left and right end, in the value and in the slope.
+    """
+    interval = np.clip(np.searchsorted(times, asked, side="right") - 1, 0, len(times) - 2)
+    h = times[interval + 1] - times[interval]
+    x = (asked - times[interval]) / h
+    value = [
+        (1 + 2 * x) * (1 - x) ** 2,
+        x**2 * (3 - 2 * x),
+        h * x * (1 - x) ** 2,
+        h * x**2 * (x - 1),
+    ]
+    slope = [6 * x * (x - 1) / h, 6 * x * (1 - x) / h, (1 - x) * (1 - 3 * x), x * (3 * x - 2)]
+    return interval, np.stack(value, axis=1), np.stack(slope, axis=1)
+
+
+def hermite_matrices(times: Floats, asked: Floats) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """The same as matrices (n_asked, 2 n_times) that act on all values followed by all slopes."""
+    interval, value, slope = hermite_stencils(times, asked)
+    n = len(times)
+    columns = interval[:, None] + np.array([0, 1, n, n + 1])
+    rows = np.repeat(np.arange(len(asked)), 4)
+    return tuple(
+        sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(asked), 2 * n))
+        for weights in (value, slope)
+    )
+
+
+def simpson_weights(n: int, duration: float) -> Floats:
+    """Weights (n,) of the composite Simpson rule on equal steps; of trapezoids if n is even."""
+    h = duration / (n - 1)
+    weights = np.full(n, h)
+    if n % 2:
+        weights[1:-1:2], weights[2:-1:2] = 4 * h / 3, 2 * h / 3
+        weights[[0, -1]] = h / 3
+    else:
+        weights[[0, -1]] = h / 2
+    return weights

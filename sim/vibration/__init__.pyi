@@ -1,0 +1,11 @@
+from .bloch import UnitCell as UnitCell
+from .bloch import bands as bands
+from .bloch import brillouin_path as brillouin_path
+from .bloch import cell_of as cell_of
+from .bloch import strained as strained
+from .extreme_frequencies import highest_frequency as highest_frequency
+from .extreme_frequencies import lowest_frequency as lowest_frequency
+from .linearisation import Linear as Linear
+from .linearisation import linearised as linearised
+from .linearisation import modes as modes
+from .linearisation import transmission as transmission

@@ -1,0 +1,142 @@
+"""A structure linearised about a state: small vibrations, resonances, transmission."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from sim.core import Floats, Ints
+from sim.energy import Topology, system_of, tangent
+from sim.linalg import clear, matrix, number_free_dofs
+from sim.structure import ConcreteParameters
+
+Complexes: TypeAlias = NDArray[np.complex128]
+
+SHIFT = 1.0
+"""rad/s: keeps the shifted stiffness of a structure that floats freely from being singular."""
+
+
+class Linear(NamedTuple):
+    """M u'' + C u' + K u = -K_held u_held for small motions u of the free dofs about a state.
+
+    Attributes:
+        stiffness: (n_free, n_free) K, tangent of the energy.
+        coupling: (n_free, n_held) K_held.
+        mass, damping: (n_free,) diagonals of M and C.
+        free, held: ids (3 unit + dof).
+    """
+
+    stiffness: sp.csc_array
+    coupling: sp.csc_array
+    mass: Floats
+    damping: Floats
+    free: Ints
+    held: Ints
+
+    @property
+    def n_dofs(self) -> int:
+        """Number of all dofs."""
+        return len(self.free) + len(self.held)
+
+
+class Modes(NamedTuple):
+    """Undamped vibrations in ascending order.
+
+    Attributes:
+        square: (count,) squared angular frequency, rad^2/s^2; negative where the state is unstable.
+        shape: (count, n_units, 3) of unit modal mass.
+    """
+
+    square: Floats
+    shape: Floats
+
+    @property
+    def frequency(self) -> Floats:
+        """(count,) Hz; negative rates of growth (per s, over 2 pi) where the state is unstable."""
+        return np.asarray(np.sign(self.square) * np.sqrt(np.abs(self.square)) / (2 * np.pi))
+
+
+def linearised(
+    topology: Topology, values: ConcreteParameters, motion: Floats | None = None
+) -> Linear:
+    """The structure about a state ``motion`` (n_units, 3); by default about rest."""
+    whole = replace(topology, held=np.zeros(0, dtype=np.int64))
+    place, pattern = number_free_dofs(
+        topology.site, _coupled(topology), whole.held, by_fronts=False
+    )
+    system = system_of(whole, values)._replace(free=place, pattern=pattern)
+    made = matrix(pattern)
+    clear(made)
+    state = np.zeros(topology.n_dofs) if motion is None else np.array(motion, dtype=float).ravel()
+    tangent(state, system, np.empty((topology.n_units, 4)), made)
+    n, width = pattern.size
+    lower = sp.dia_array((made.values.reshape(n, width + 1).T, -np.arange(width + 1)), shape=(n, n))
+    full = sp.csr_array(lower + sp.tril(lower, -1).T)
+    full.eliminate_zeros()
+    free = np.setdiff1d(np.arange(topology.n_dofs), topology.held)
+    rows = full[place[free]]
+    return Linear(
+        stiffness=sp.csc_array(rows[:, place[free]]),
+        coupling=sp.csc_array(rows[:, place[topology.held]]),
+        mass=np.asarray(values.mass).ravel()[free],
+        damping=np.asarray(values.damping).ravel()[free],
+        free=free,
+        held=topology.held,
+    )
+
+
+def _coupled(topology: Topology) -> Ints:
+    if topology.meeting is None:
+        return topology.ligament_units
+    return np.concatenate([topology.ligament_units, topology.meeting.pairs])
+
+
+def modes(of: Linear, count: int, near: float = 0.0) -> Modes:
+    """The ``count`` modes whose frequency is nearest to one (rad/s), by shift-invert Lanczos.
+
+    Raises:
+        ValueError: the structure has not so many modes.
+    """
+    size = len(of.free)
+    if not 0 < count < size:
+        raise ValueError(f"{count} modes of a structure with {size} degrees of freedom")
+    start = np.random.default_rng(0).normal(size=size)
+    shift = near**2 - SHIFT**2
+    squares, shapes = spla.eigsh(
+        of.stiffness, k=count, M=sp.diags_array(of.mass).tocsc(), sigma=shift, v0=start
+    )
+    order = np.argsort(squares)
+    shape = np.zeros((count, of.n_dofs))
+    shape[:, of.free] = (shapes * _signs(shapes)).T[order]
+    return Modes(squares[order], shape.reshape(count, -1, 3))
+
+
+def _signs(shapes: Floats) -> Floats:
+    """Makes the largest entry of every mode positive: the sign of a mode is arbitrary."""
+    largest = np.abs(shapes).argmax(axis=0)
+    return np.asarray(np.sign(shapes[largest, np.arange(shapes.shape[1])]))
+
+
+def transmission(of: Linear, drives: Floats, frequencies: Floats) -> Complexes:
+    """Steady motion (n_frequencies, n_cases, n_units, 3) under harmonic motion of the held dofs.
+
+    Args:
+        of: the structure.
+        drives: (n_held, n_cases) amplitudes of the held dofs.
+        frequencies: (n_frequencies,) angular, rad/s.
+
+    Returns:
+        complex amplitudes: the real part of their product with exp(i w t) is the motion.
+    """
+    right = -(of.coupling @ drives).astype(complex)
+    out = np.zeros((len(frequencies), drives.shape[1], of.n_dofs), dtype=complex)
+    out[..., of.held] = drives.T
+    for steady, w in zip(out, frequencies, strict=True):
+        dynamic = of.stiffness + sp.diags_array(1j * w * of.damping - w**2 * of.mass)
+        steady[:, of.free] = spla.splu(sp.csc_array(dynamic)).solve(right).T
+    return out.reshape(*out.shape[:2], -1, 3)

@@ -1,0 +1,198 @@
+"""The stress suite: its verdicts, its checks on spoilt answers, and itself in small."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.stress import (
+    DISTANCE,
+    Check,
+    StressCase,
+    StressFamily,
+    StressScene,
+    balance,
+    checks,
+    pressed,
+    registry,
+    shaken,
+    squares,
+    stiffness,
+)
+from benchmarks.stress import __main__ as suite
+from benchmarks.stress.families import constants, pieces
+from benchmarks.stress.verdicts import Tally, attempted
+from sim.core import SimulationError
+from sim.quasistatics import StaticSolver
+from sim.solvers import Harmonic
+from sim.time_integration import ImplicitRecord, ImplicitSolver
+
+IN_SMALL = ("branches", "symmetry", "agreement")
+"""Families that are tried in small here, the quickest; make stress tries all."""
+
+
+def found(value: float) -> list[Check]:
+    return [Check("error", value, 1.0)]
+
+
+def refused(message: str) -> list[Check]:
+    raise SimulationError(message)
+
+
+@pytest.mark.parametrize(
+    ("attempt", "verdict"),
+    [
+        (lambda: found(1.0), "solved"),
+        (lambda: found(1.1), "wrong"),
+        (lambda: found(np.nan), "wrong"),
+        (lambda: refused("it jams; try a smaller load"), "refused"),
+        (lambda: refused("it jams"), "wrong"),
+        (lambda: [Check("none", 1 / 0, 1.0)], "wrong"),
+    ],
+)
+def test_verdicts(attempt: Callable[[], list[Check]], verdict: str) -> None:
+    assert attempted(StressCase("toy", attempt)).verdict == verdict
+
+
+def test_an_answer_to_what_has_none_is_wrong() -> None:
+    assert attempted(StressCase("toy", lambda: found(0.0), "refusal")).verdict == "wrong"
+    refusal = StressCase("toy", lambda: refused("there is none; try another"), "refusal")
+    assert attempted(refusal).verdict == "refused"
+
+
+def test_only_what_a_study_may_ask_for_counts_as_in_range() -> None:
+    family = StressFamily("toy", "", "", lambda _: ())
+    cases = [
+        StressCase("good", lambda: found(0.5)),
+        StressCase("better", lambda: found(0.1)),
+        StressCase("refused", lambda: refused("no; try another")),
+        StressCase("rightly", lambda: refused("no; try another"), "refusal"),
+        StressCase("either", lambda: refused("no; try another"), "either"),
+    ]
+    tally = Tally(family, tuple(attempted(case) for case in cases))
+    assert tally.in_range == (3, 2)
+    assert tally.counts == {"solved": 2, "refused": 3}
+    assert tally.worst == found(0.5)
+
+
+def test_the_worst_of_all_answers_is_shown() -> None:
+    beyond = [[Check("beyond, deg", value, 0.0)] for value in (-2.0, -0.5, -1.0)]
+    cases = [StressCase("toy", lambda made=made: made) for made in beyond]  # type: ignore[misc]
+    tally = Tally(StressFamily("toy", "", "", lambda _: ()), tuple(map(attempted, cases)))
+    assert tally.worst == beyond[1]
+
+
+def values_of(made: list[Check]) -> dict[str, Check]:
+    return {check.name: check for check in made}
+
+
+@pytest.fixture(scope="module", params=[None, DISTANCE], ids=["angles", "distances"])
+def plate(request: pytest.FixtureRequest) -> StressScene:
+    return pressed(squares(3), 0.15, contact_distance=request.param)
+
+
+def test_the_definition_has_the_derivatives_of_its_energy(plate: StressScene) -> None:
+    state = checks.solved(plate, StaticSolver(plate.topology, np.ones(1))).displacement[-1]
+    direction = np.random.default_rng(0).normal(size=len(state)) * 1e-5
+    ahead, behind = (balance(plate.structure, state + sign * direction) for sign in (1, -1))
+    work = (ahead.energy - behind.energy) / 2
+    here = balance(plate.structure, state)
+    assert -here.force @ direction == pytest.approx(work, rel=1e-5)
+    change = (behind.force - ahead.force) / 2
+    assert stiffness(plate.structure, state) @ direction == pytest.approx(
+        change, rel=1e-4, abs=1e-4 * np.abs(change).max()
+    )
+
+
+def test_equilibria_off_balance_and_units_in_one_another_are_found(plate: StressScene) -> None:
+    answer = checks.solved(plate, StaticSolver(plate.topology, np.ones(1)))
+    assert all(check.kept for check in checks.balanced(plate, answer))
+    assert all(check.kept for check in checks.admissible(plate, answer.displacement))
+    free = plate.topology.free_dofs
+    moved = answer.displacement.copy()
+    moved[0, free[0]] += 1e-4
+    away = values_of(checks.balanced(plate, answer._replace(displacement=moved)))
+    assert not away["distance from balance, mm/mm"].kept
+    middle = 3 * 4 + 2
+    kept = []
+    for turn in (2.0, -2.0):  # one of which closes the narrower voids around the unit
+        turned = answer.displacement.copy()
+        turned[0, middle] += turn
+        kept += [check.kept for check in checks.admissible(plate, turned)]
+    assert not all(kept)
+    moved[0, middle] = np.nan
+    assert not all(check.kept for check in checks.admissible(plate, moved))
+
+
+def test_saddles_are_found() -> None:
+    """A straight chain, pressed, stays in balance beyond the load at which it buckles."""
+    chain = pressed(squares(9, 1, bias=0.0), 0.04)
+    straight = np.zeros((1, chain.topology.n_dofs))
+    straight[0, ::3] = -0.04 * 9 * 15.0 * np.arange(9) / 8
+    answer = checks.solved(chain, StaticSolver(chain.topology, np.ones(1)))
+    made = values_of(checks.balanced(chain, answer._replace(displacement=straight)))
+    assert made["distance from balance, mm/mm"].kept
+    assert not made["falling directions of an equilibrium"].kept
+
+
+def test_stages_off_balance_are_found() -> None:
+    case = shaken(squares(3), Harmonic(1.0, 30.0), duration=0.01, frequency=30.0)
+    times = np.linspace(0.0, 0.01, 11)
+    solver = ImplicitSolver(case.topology, times, times)
+    record = checks.solved(case, solver).record
+    assert isinstance(record, ImplicitRecord)
+    assert all(check.kept for check in checks.stages(case, solver, record))
+    record.a[3] *= 1.1
+    assert not all(check.kept for check in checks.stages(case, solver, record))
+
+
+def test_drawn_designs_can_be_made_and_reach_their_bounds() -> None:
+    from benchmarks.stress import RandomDesigns
+
+    lattice = squares(4)
+    draws = RandomDesigns(lattice, np.array([5]), 7.0, 0.97)
+    vertices = draws(3)
+    assert 0.0 <= draws.at_bounds(vertices) < 0.3
+    assert np.abs(vertices - lattice.vertices).max() > 1.0
+    np.testing.assert_array_equal(vertices, draws(3))
+
+
+def test_the_suite_in_small_finds_nothing_wrong(tmp_path: Path) -> None:
+    path = tmp_path / "stress.json"
+    assert suite.main(["--small", *IN_SMALL, "--out", str(path)]) == 0
+    families = json.loads(path.read_text(encoding="utf-8"))["families"]
+    assert [each["name"] for each in families] == list(IN_SMALL)
+    assert sum(each["wrong"] for each in families) == 0
+
+
+def test_a_wrong_answer_fails_the_suite(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    family = StressFamily("toy", "", "", lambda _: [StressCase("bad", lambda: found(2.0))])
+    monkeypatch.setattr(registry, "load", lambda _: [family])
+    assert suite.main(["--out", str(tmp_path / "stress.json")]) == 1
+    assert "wrong: toy: bad: error: 2, limit 1" in capsys.readouterr().out
+
+
+def test_an_unknown_family_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert suite.main(["tides"]) == 2
+    assert "no family tides" in capsys.readouterr().err
+
+
+def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
+    alone = [case for case in pieces.family().cases(False) if "no ligament" in case.name]
+    assert len(alone) == 3
+    for case in alone:
+        outcome = attempted(case)
+        assert outcome.verdict == "refused"
+        assert "no two units are joined" in outcome.message
+
+
+def test_stages_settle_that_contract_fast_at_first_and_slowly_then() -> None:
+    name = "axial stiffness times 1e+01, shaken at 60 Hz"
+    stiff = [case for case in constants.family().cases(False) if case.name == name]
+    assert [attempted(case).verdict for case in stiff] == ["solved"]

@@ -1,0 +1,68 @@
+"""The page of a static study in headless Chromium: its figure, its loads, its colours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from selenium.webdriver import Chrome
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select
+
+from reports.figures.study_report import publish
+from tests.clients.conftest import Open
+from tests.reports import compressed_study
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    publish(
+        compressed_study.written(tmp_path_factory.mktemp("data"), compressed_study.SMILE), folder
+    )
+    return folder / "index.html"
+
+
+@pytest.fixture
+def browser(browse: Open, page: Path) -> Chrome:
+    return browse(page, 1100, 800, 1.0)
+
+
+def test_it_shows_three_structures_under_load_without_complaint(browser: Chrome) -> None:
+    captions = browser.find_elements(By.CSS_SELECTOR, "#player figcaption")
+    assert [caption.text for caption in captions] == ["Intact", "Voided", "Cloaked"]
+    browser.execute_script(
+        "const slider = document.querySelector('#player input');"
+        "slider.value = 10000; slider.dispatchEvent(new Event('input'));"
+    )
+    output = browser.find_element(By.CSS_SELECTOR, "#player output")
+    assert output.text == "u = 15.0 mm"
+    assert not browser.get_log("browser")  # type: ignore[no-untyped-call]
+
+
+def test_units_that_are_cut_out_are_not_drawn(browser: Chrome) -> None:
+    colours = browser.execute_script(
+        """
+        return [0, 1].map((index) => {
+          const canvas = document.querySelectorAll("#player .stage canvas")[index];
+          const pen = canvas.getContext("2d");
+          const at = pen.getTransform().transformPoint(new DOMPoint(105, 67.5 - 7.5));
+          return [...pen.getImageData(Math.round(at.x), Math.round(at.y), 1, 1).data];
+        });
+        """
+    )
+    assert colours[0][3] == 255
+    assert colours[1][3] == 0
+
+
+def test_colours_begin_with_that_of_the_figure(browser: Chrome) -> None:
+    menu = Select(browser.find_element(By.ID, "player-field"))
+    assert [option.text for option in menu.options] == ["u_y", "u_x", "θ"]
+    plate = browser.find_element(By.CSS_SELECTOR, ".plate svg")
+    assert plate.size["width"] > 700
+
+
+def test_a_phone_shows_all_without_scrolling_sideways(browse: Open, page: Path) -> None:
+    phone = browse(page, 390, 844, 3.0)
+    width = phone.execute_script("return document.documentElement.scrollWidth")
+    assert width <= 390

@@ -1,0 +1,58 @@
+"""A track tells the ratios of stiffness, whatever stays with its units and however it is driven."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets
+from pipeline.runtime import ROOT
+from pipeline.stages import calibrate
+from tests.pipeline.calibration.specimens import described, written
+
+SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"
+NOISE = {"displacement": "0.002 mm", "rotation": "0.01 deg"}
+
+
+def test_ratios_of_stiffness_from_motion_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(SPECIMEN, tmp_path / "squeezed.yaml")
+    track = {
+        "kind": "track",
+        "name": "motion",
+        "problem": "squeezed.yaml",
+        "structure": "altered",
+        "every": 2,
+        "virtual": {
+            "rate": "8 Hz",
+            "noise": NOISE,
+            "bias": {"displacement": "0.05 mm", "rotation": "0.2 deg"},
+        },
+    }
+    start = {
+        "density": "6.18 kg/m^2",
+        "axial_stiffness": "120 N/mm",
+        "shear_stiffness": "1.19 N/mm",
+        "bending_stiffness": "1.8 N mm/rad",
+        "damping": {"ratio": 0.0186},
+    }
+    text = described([track], ["bending_stiffness", "damping_ratio"], material=start)
+    path = written(tmp_path, text)
+    folder, out = tmp_path / "data", tmp_path / "found.nc"
+    assert calibrate.main(["synthesise", str(path), "--out-dir", str(folder), "--quiet"]) == 0
+    assert datasets.read(folder / "motion.nc", "track").attrs["synthetic"] == "yes"
+    assert calibrate.main([str(folder / "calibration.yaml"), "--out", str(out)]) == 0
+    found = datasets.read(out, "calibration")
+    bending = found.isel(parameter=0)
+    assert bending["lower"] < 1.5 < bending["upper"]
+    assert bending["standard_error"] < 0.25
+    assert found["newton_step"] < 0.05
+    assert "ratio: 0.0186  # not determined" in (tmp_path / "found.yaml").read_text()
+    assert "damping_ratio is not determined by these data" in capsys.readouterr().err
+    assert np.unique(found["channel"]).tolist() == [
+        3 * unit + dof for unit in (1, 2, 5, 6, 9, 10, 13, 14) for dof in range(3)
+    ]

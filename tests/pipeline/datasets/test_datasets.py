@@ -1,0 +1,251 @@
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.datasets.files import SchemaError, read, write
+from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, Kind
+from pipeline.runtime import UserError
+from pipeline.runtime import atomic_write as whole
+from tests.pipeline.samples import sample
+
+KINDS: tuple[Kind, ...] = tuple(TABLES)
+ORIGIN = {"problem": "{}", "problem_hash": "0" * 64}
+
+
+def names(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir()]
+
+
+@pytest.fixture
+def sweep(tmp_path: Path) -> Path:
+    """A good sweep dataset on disk."""
+    path = tmp_path / "sweep.nc"
+    write(sample("sweep"), path, "sweep", ORIGIN)
+    return path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_written_is_read(kind: Kind, tmp_path: Path) -> None:
+    dataset = sample(kind)
+    write(dataset, tmp_path / "new folder" / "file.nc", kind, ORIGIN)
+    back = read(tmp_path / "new folder" / "file.nc", kind)
+    xr.testing.assert_equal(back, dataset)
+    assert back.attrs["schema_version"] == SCHEMA_VERSION
+    assert back.attrs["problem_hash"] == ORIGIN["problem_hash"]
+    assert names(tmp_path / "new folder") == ["file.nc"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_variable_tells_its_unit_and_name(kind: Kind, tmp_path: Path) -> None:
+    write(sample(kind), tmp_path / "file.nc", kind, ORIGIN)
+    with netCDF4.Dataset(tmp_path / "file.nc") as raw:
+        for name, variable in raw.variables.items():
+            table = TABLES[kind][name]
+            assert variable.getncattr(table.unit_attribute) == table.units
+            assert variable.long_name
+            if TABLES[kind][name].flags:
+                assert len(variable.flag_values) == len(variable.flag_meanings.split())
+
+
+WRITER = """
+import sys, time
+from pathlib import Path
+from pipeline.datasets import write
+from tests.pipeline.samples import sample
+for kind, name in (("design", "a.nc"), ("response", "b.nc")):
+    write(sample(kind), Path(sys.argv[1]) / name, kind, {"problem": "{}"})
+"""
+
+
+def test_the_same_data_make_the_same_bytes(tmp_path: Path) -> None:
+    """Whatever the second, the process, the folder and the seed of Python's hashes."""
+    for seed in "12":
+        subprocess.run(
+            [sys.executable, "-c", WRITER, str(tmp_path / seed)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+        )
+    for name in ("a.nc", "b.nc"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_the_order_of_variables_and_attributes_does_not_matter(tmp_path: Path) -> None:
+    dataset = sample("sweep").assign_attrs(a="1", b="2")
+    turned = xr.Dataset(
+        {name: dataset[name] for name in reversed(list(dataset.data_vars))},
+        attrs=dict(reversed(dataset.attrs.items())),
+    )
+    write(dataset, tmp_path / "a.nc", "sweep", ORIGIN)
+    write(turned, tmp_path / "b.nc", "sweep", ORIGIN)
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_floats_survive_exactly(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    random = np.random.default_rng(seed)
+    dataset = sample("sweep")
+    bits = random.integers(0, 2**64, size=dataset["loss"].shape, dtype=np.uint64)
+    floats = bits.view(np.float64)
+    dataset["loss"].values[...] = np.where(np.isfinite(floats), floats, np.nan)
+    path = tmp_path_factory.mktemp("floats") / "sweep.nc"
+    write(dataset, path, "sweep", ORIGIN)
+    np.testing.assert_array_equal(read(path, "sweep")["loss"], dataset["loss"])
+
+
+Spoil = Callable[[xr.Dataset], xr.Dataset]
+
+SPOILT: list[tuple[Spoil, str, str]] = [
+    (lambda d: d.drop_vars("loss"), "loss", "the variable is missing"),
+    (lambda d: d.drop_vars("direction"), "direction", "the variable is missing"),
+    (lambda d: d.assign(extra=("new", [1.0])), "extra", "no such variable"),
+    (lambda d: d.assign(loss=d["loss"].T), "loss", "its dims are not (structure, case)"),
+    (lambda d: d.assign(loss=d["loss"].assign_attrs(units="mm")), "loss", "its unit is not '1'"),
+    (lambda d: d.assign(loss=d["loss"] * np.nan), "loss", "NaN where every value is needed"),
+    (lambda d: d.assign(loss=d["loss"] * np.inf), "loss", "infinite values"),
+    (lambda d: d.assign(overlaps=d["overlaps"] * 0.5), "overlaps", "its type is not int64"),
+    (lambda d: d.assign(roi=d["roi"] + 7), "roi", "a flag has no meaning (0 outside, 1 inside)"),
+    (lambda d: d.assign_coords(dof=["x", "y", "z"]), "dof", "its values are not (ux, uy, theta)"),
+]
+
+
+@pytest.mark.parametrize(("spoil", "name", "what"), SPOILT, ids=[what for *_, what in SPOILT])
+def test_a_stage_cannot_write_what_the_table_does_not_say(
+    spoil: Spoil, name: str, what: str, tmp_path: Path
+) -> None:
+    with pytest.raises(SchemaError) as caught:
+        write(spoil(sample("response")), tmp_path / "response.nc", "response", ORIGIN)
+    assert f"response dataset, {name}: " in str(caught.value)
+    assert what in str(caught.value)
+    assert not names(tmp_path)
+
+
+@pytest.mark.parametrize(("spoil", "name", "what"), SPOILT, ids=[what for *_, what in SPOILT])
+def test_a_file_that_breaks_its_table_is_refused(
+    spoil: Spoil, name: str, what: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "response.nc"
+    write(sample("response"), path, "response", ORIGIN)
+    spoilt = spoil(read(path, "response"))
+    spoilt.to_netcdf(path)
+    with pytest.raises(UserError) as caught:
+        read(path, "response")
+    assert (caught.value.file, caught.value.key) == (str(path), name)
+    assert what in caught.value.what
+    assert "run the stage" in str(caught.value.remedy)
+
+
+def test_the_shipped_method_must_be_told(tmp_path: Path) -> None:
+    dataset = sample("design")
+    del dataset.attrs["shipped_method"]
+    with pytest.raises(SchemaError, match="shipped_method: the attribute is missing"):
+        write(dataset, tmp_path / "design.nc", "design", ORIGIN)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_refused(share: float, sweep: Path) -> None:
+    whole = sweep.read_bytes()
+    sweep.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(
+        UserError, match=r"not a readable netCDF file|its seal is missing"
+    ) as caught:
+        read(sweep, "sweep")
+    assert caught.value.file == str(sweep)
+
+
+def test_a_foreign_file_is_refused(tmp_path: Path) -> None:
+    foreign = tmp_path / "ocean.nc"
+    xr.Dataset({"salinity": ("depth", [35.0])}).to_netcdf(foreign)
+    with pytest.raises(UserError, match="none of this workflow's"):
+        read(foreign, "sweep")
+    (tmp_path / "text.nc").write_text("no netCDF", encoding="utf-8")
+    with pytest.raises(UserError, match="not a readable netCDF file"):
+        read(tmp_path / "text.nc", "sweep")
+
+
+def test_a_dataset_of_another_kind_or_version_is_refused(sweep: Path) -> None:
+    with pytest.raises(UserError, match="a design dataset is wanted") as caught:
+        read(sweep, "design")
+    assert caught.value.value == "sweep"
+    for version, remedy in ((SCHEMA_VERSION + 1, "update this software"), (0, "delete it and run")):
+        with netCDF4.Dataset(sweep, "a") as raw:
+            raw.schema_version = version
+        with pytest.raises(UserError, match="schema version") as caught:
+            read(sweep, "sweep")
+        assert remedy in str(caught.value.remedy)
+
+
+def test_a_missing_file_says_what_to_run(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such dataset") as caught:
+        read(tmp_path / "sweep.nc", "sweep")
+    assert "run the stage" in str(caught.value.remedy)
+
+
+@pytest.mark.parametrize(
+    ("number", "what"),
+    [
+        (errno.ENOSPC, "the disk is full"),
+        (errno.EROFS, "the file system is read-only"),
+        (errno.EACCES, "no permission"),
+    ],
+)
+def test_a_refused_write_leaves_the_old_file(
+    number: int, what: str, sweep: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = sweep.read_bytes()
+
+    def refuse(path: Path) -> None:
+        del path
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(whole, "sync", refuse)
+    with pytest.raises(UserError, match=what) as caught:
+        write(sample("sweep", seed=1), sweep, "sweep", ORIGIN)
+    assert caught.value.file == str(sweep)
+    assert sweep.read_bytes() == before
+    assert names(sweep.parent) == [sweep.name]
+
+
+LIMITED = """
+import resource, signal, sys
+from pipeline.datasets import write
+from pipeline.runtime.errors import UserError
+from tests.pipeline.samples import sample
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+try:
+    write(sample("design"), sys.argv[1], "design", {"problem": "{}"})
+except UserError as error:
+    print(error.what, error.file, sep="|")
+"""
+
+
+def test_a_write_that_fails_halfway_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    """Past the limit of file sizes the HDF5 library fails just as on a full disk."""
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, str(tmp_path / "design.nc")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    told = f"the file would be too large|{tmp_path / 'design.nc'}"
+    assert done.stdout.strip() == told, done.stderr
+    assert not names(tmp_path)
+
+
+def test_a_folder_that_is_a_file_is_told(sweep: Path) -> None:
+    with pytest.raises(UserError) as caught:
+        write(sample("sweep"), sweep / "sweep.nc", "sweep", ORIGIN)
+    assert caught.value.file == str(sweep / "sweep.nc")

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline.datasets import provenance
+from pipeline.problem import from_canonical, section_hash
+from pipeline.problem.reading import load
+
+
+def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
+    problem = load(fig2)
+    told = provenance.attributes(
+        problem, "simulate", parents={"design": fig2}, plan={"skipped": ["reference"]}
+    )
+    assert all(isinstance(value, str) for value in told.values())
+    assert told["problem_hash"] == section_hash(problem, "simulate")
+    assert from_canonical(told["problem"]).response == problem.response
+    assert json.loads(told["parents"]) == {"design": provenance.file_hash(fig2)}
+    assert json.loads(told["plan"]) == {"skipped": ["reference"]}
+    assert json.loads(told["packages"])["numpy"]
+    assert provenance.attributes(problem, "simulate")["plan"] == "{}"
+
+
+def test_a_method_stores_its_own_part(fig2: Path) -> None:
+    told = provenance.attributes(load(fig2), "design", method="mma")
+    assert list(from_canonical(told["problem"]).optimiser.methods.chosen) == ["mma"]
+
+
+def test_the_commit_is_unknown_outside_a_checkout(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    provenance.git_commit.cache_clear()
+    assert provenance.git_commit() == "unknown"
+    provenance.git_commit.cache_clear()
+
+
+def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "PACKAGES", ("no-such-package",))
+    provenance.package_versions.cache_clear()
+    assert provenance.package_versions()["no-such-package"] == "absent"
+    provenance.package_versions.cache_clear()
+
+
+def test_the_hash_of_a_folder_goes_by_names_and_contents(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    for folder in (first, second):
+        folder.mkdir()
+        (folder / "0.png").write_bytes(b"one")
+        (folder / "1.png").write_bytes(b"two")
+    assert provenance.file_hash(first) == provenance.file_hash(second)
+    (second / "1.png").rename(second / "2.png")
+    renamed = provenance.file_hash(second)
+    (second / "2.png").write_bytes(b"other")
+    assert len({provenance.file_hash(first), renamed, provenance.file_hash(second)}) == 3

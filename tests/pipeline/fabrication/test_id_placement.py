@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from shapely import LineString, Polygon, box
+
+from pipeline.fabrication.engraving import extent, fitted, text
+from pipeline.fabrication.engraving.orientation_mark import mark
+from pipeline.fabrication.parts import column_letters, labels
+from pipeline.fabrication.units.tracking_dots import dots
+from pipeline.problem.sections import Labels, Markers
+
+WIDE = box(0.0, 0.0, 20.0, 12.0)
+BAND = box(0.0, 0.0, 1.5, 25.0)
+
+
+def test_text_fills_the_extent_that_it_claims() -> None:
+    drawn = shapely.total_bounds([LineString(stroke) for stroke in text("H8", 3.0)])
+    width, height = extent("H8", 3.0)
+    assert drawn == pytest.approx([-width / 2, -height / 2, width / 2, height / 2])
+
+
+@pytest.mark.parametrize("outline", [WIDE, BAND])
+def test_id_lies_inside_even_a_band_narrower_than_a_letter_is_high(outline: Polygon) -> None:
+    placed = fitted("H12", outline, outline, Labels())
+    assert placed is not None
+    strokes = shapely.union_all([LineString(stroke) for stroke in placed.strokes])
+    assert outline.covers(strokes)
+    assert max(np.ptp(strokes.bounds[::2]), np.ptp(strokes.bounds[1::2])) >= 2.0
+
+
+def test_underside_is_the_mirror_image_of_the_top() -> None:
+    placed = fitted("F7", WIDE, WIDE, Labels())
+    assert placed is not None
+    for top, below in zip(placed.strokes, placed.mirrored, strict=True):
+        assert below[:, 1] == pytest.approx(top[:, 1])
+        assert below[:, 0] == pytest.approx(20.0 - top[:, 0])
+
+
+def test_arrow_points_up_and_keeps_off_the_id() -> None:
+    placed = fitted("F7", WIDE, WIDE, Labels())
+    assert placed is not None
+    stem, shaft = mark(WIDE, WIDE, placed.box, Labels())
+    assert stem[1, 1] == max(stem[:, 1]) > stem[0, 1]
+    assert shaft[1] == pytest.approx(stem[1])
+    assert not placed.box.intersects(LineString(stem))
+
+
+def test_dots_lie_about_the_centroid_and_shrink_where_there_is_no_room() -> None:
+    first, second = dots(WIDE, Markers())
+    assert np.add(first.centre, second.centre) / 2 == pytest.approx([10.0, 6.0])
+    assert np.hypot(*np.subtract(first.centre, second.centre)) == pytest.approx(6.0)
+    assert {dot.diameter for dot in dots(BAND, Markers())} == {1.0}
+
+
+def test_labels_are_unique() -> None:
+    assert labels([(0, 0), (1, 0), (26, 11)]) == ["A1", "B1", "AA12"]
+    assert labels([(0, 0), (0, 0), (1, 0)]) == ["A1a", "A1b", "B1a"]
+    assert len({column_letters(column) for column in range(800)}) == 800

@@ -1,0 +1,182 @@
+"""A whole package passes its checks as written, and fails them once any file of it is damaged."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.datasets import file_hash
+from pipeline.fabrication.checks import assembled_specimen, bill_checks, check_package
+from pipeline.fabrication.checks.expected_parts import of_design
+from pipeline.fabrication.checks.package_record import PackageRecord
+from pipeline.fabrication.papers import manifest
+from pipeline.fabrication.readback import read_meshes
+from pipeline.problem import Problem
+from pipeline.runtime import UserError
+from tests.pipeline.fabrication import built
+
+UNITS = "laser/units_sheet1_nominal"
+KERF = "laser/units_sheet1_kerf0.15"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Problem]:
+    folder = tmp_path_factory.mktemp("whole") / "cloaked"
+    return folder, built.write(folder)
+
+
+@pytest.fixture
+def package(whole: tuple[Path, Problem], tmp_path: Path) -> Path:
+    return Path(shutil.copytree(whole[0], tmp_path / "cloaked"))
+
+
+def refused(package: Path, asked: Problem) -> str:
+    """What the checks say to a package whose manifest tells of its files as they are."""
+    path = package / manifest.NAME
+    if path.exists():
+        told = json.loads(path.read_text())
+        files = [file for file in package.rglob("*") if file.is_file() and file != path]
+        told["files"] = {f.relative_to(package).as_posix(): file_hash(f) for f in files}
+        path.write_text(json.dumps(told))
+    with pytest.raises(UserError) as raised:
+        check(package, asked)
+    return str(raised.value)
+
+
+def check(package: Path, asked: Problem) -> None:
+    pictures = package.with_name("faults")
+    check_package(package, built.design(), "cloaked", asked.fabrication, pictures)
+
+
+def edited(name: str, before: str, after: str, count: int = 1) -> Callable[[Path], None]:
+    """Replaces text in a file."""
+
+    def damage(package: Path) -> None:
+        text = (package / name).read_text(encoding="utf-8")
+        assert before in text
+        (package / name).write_text(text.replace(before, after, count), encoding="utf-8")
+
+    return damage
+
+
+def gone(name: str) -> Callable[[Path], None]:
+    return lambda package: (package / name).unlink()
+
+
+def all_gone(pattern: str) -> Callable[[Path], None]:
+    def damage(package: Path) -> None:
+        for path in package.glob(pattern):
+            path.unlink()
+
+    return damage
+
+
+def copied(name: str, to: str) -> Callable[[Path], None]:
+    def damage(package: Path) -> None:
+        shutil.copy(package / name, package / to)
+
+    return damage
+
+
+def halved(name: str) -> Callable[[Path], None]:
+    def damage(package: Path) -> None:
+        content = (package / name).read_bytes()
+        (package / name).write_bytes(content[: len(content) // 2])
+
+    return damage
+
+
+def scaled(name: str, factor: float) -> Callable[[Path], None]:
+    """The triangles of an STL file, larger or smaller."""
+
+    def damage(package: Path) -> None:
+        content = (package / name).read_bytes()
+        record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+        facets = np.frombuffer(content[84:], dtype=record).copy()
+        facets["corners"] *= np.float32(factor)
+        (package / name).write_bytes(content[:84] + facets.tobytes())
+
+    return damage
+
+
+DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "inches": (edited(f"{UNITS}.dxf", "$INSUNITS\n 70\n4", "$INSUNITS\n 70\n1"), "$INSUNITS is 1"),
+    "id swapped": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nZ9\n"), "unit A1: it is missing"),
+    "id twice": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nB1\n"), "unit A1: it is missing"),
+    "layer": (edited(f"{UNITS}_r12.dxf", "CUT_OUTER", "CUT_OTHER", -1), "a layer of name"),
+    "svg id": (edited(f"{UNITS}.svg", 'label="C2"', 'label="C9"'), "other parts, layers"),
+    "svg scale": (edited(f"{UNITS}.svg", 'width="600mm"', 'width="600cm"'), "the page does not"),
+    "r12 missing": (gone(f"{UNITS}_r12.dxf"), "units_sheet1_nominal_r12.dxf"),
+    "kerf missing": (
+        all_gone(f"{KERF}*"),
+        "there is no sheet of units for a kerf of 0.15 mm",
+    ),
+    "no kerf made good": (copied(f"{UNITS}.dxf", f"{KERF}.dxf"), "another size or place"),
+    "dxf cut short": (halved(f"{UNITS}.dxf"), "cannot be read back"),
+    "unit missing": (gone("print/units/B1.stl"), "unit B1: it is missing"),
+    "another unit": (copied("print/units/A1.stl", "print/units/B1.stl"), "unit B1"),
+    "one unit more": (copied("print/units/A1.stl", "print/units/D7.stl"), "unit D7"),
+    "stl larger": (scaled("print/units/A1.stl", 1.01), "part A1: it is 8.181 mm high"),
+    "stl cut short": (halved("print/units/A1.stl"), "cannot be read back"),
+    "assembled larger": (scaled("print/assembled.stl", 1.5), "unit C1 is not in its place"),
+    "3mf cut short": (halved("print/units_plate1.3mf"), "cannot be read back"),
+    "fixture broken": (halved("fixture/JIG1.stl"), "cannot be read back"),
+    "bill": (edited("bom.csv", "unit,B2,1", "unit,B2,2"), "unit B2: it is there 2 times"),
+    "shims": (edited("bom.csv", "shim,S8.25,", "spare,S8.25,"), "8 on the sheets, 0 in the bill"),
+    "too few shims": (edited("bom.csv", "shim,S8.25,8,", "shim,S8.25,7,"), "8 on the sheets, 7 in"),
+    "another shim": (edited("bom.csv", "8.2500,8.1000", "8.2700,8.1000"), "it is not 8.27 x 8.10"),
+    "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
+}
+
+
+def test_a_package_passes_as_it_is_written(whole: tuple[Path, Problem]) -> None:
+    check(*whole)
+    assert not whole[0].with_name("faults").exists()
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_a_damaged_package_is_refused(
+    package: Path, whole: tuple[Path, Problem], name: str
+) -> None:
+    damage, expected = DAMAGES[name]
+    damage(package)
+    assert expected in refused(package, whole[1])
+
+
+def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
+    package: Path, whole: tuple[Path, Problem]
+) -> None:
+    edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
+    wanted, asked = of_design(built.design(), "cloaked"), whole[1].fabrication
+    found = assembled_specimen.shapes(
+        read_meshes.read_stl(package / "print/assembled.stl"), wanted, asked
+    )
+    told = [
+        fault.what for fault in bill_checks.check(PackageRecord(package, wanted, found, asked, {}))
+    ]
+    assert told == ["no shim is 8.25 mm long, from slot end to slot end"] * len(wanted.joints)
+
+
+@pytest.mark.parametrize("name", ["bom.csv", "laser/comb_sheet1_nominal.svg"])
+def test_a_file_that_was_changed_afterwards_is_found(
+    package: Path, whole: tuple[Path, Problem], name: str
+) -> None:
+    (package / name).write_bytes((package / name).read_bytes() + b"\n")
+    with pytest.raises(UserError, match="is another file than listed"):
+        check(package, whole[1])
+
+
+def test_the_same_design_gives_the_same_bytes(whole: tuple[Path, Problem], tmp_path: Path) -> None:
+    built.write(tmp_path / "cloaked")
+    first, second = (
+        {p.relative_to(f).as_posix(): file_hash(p) for p in f.rglob("*") if p.is_file()}
+        for f in (whole[0], tmp_path / "cloaked")
+    )
+    assert first == second
+    suffixes = {Path(name).suffix for name in first}
+    assert suffixes == {".dxf", ".svg", ".stl", ".3mf", ".pdf", ".csv", ".json"}

@@ -1,0 +1,146 @@
+"""Designs for more than one load, and for imperfect copies."""
+
+from __future__ import annotations
+
+import json
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline import datasets
+from pipeline.posing import design_scene
+from pipeline.problem.reading import load, overlaid
+from pipeline.runtime import UserError
+from pipeline.stages import design, robust_gains, select
+from reports.products.robust_gains import build
+from sim.solvers import Harmonic
+from tests.pipeline.static import HOLE, write
+
+ROBUST = """  region: surroundings
+  robust:
+    loads:
+      - { frequency: 8 Hz }
+      - { amplitude: 3 mm, weight: 0.5 }
+    sharpness: 8
+    copies: 2
+    geometry: 0.02
+"""
+
+
+@pytest.fixture
+def robust(fig2: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "problem.yaml"
+    path.write_text(fig2.read_text().replace("  region: surroundings\n", ROBUST, 1))
+    return path
+
+
+def test_the_drives_own_cases_come_first(robust: Path) -> None:
+    scene = design_scene(load(robust), robust.parent)
+    drives = [motion for motion in scene.motions if isinstance(motion, Harmonic)]
+    assert [each.frequency for each in drives] == [2.0] * 4 + [8.0] * 4 + [2.0] * 4
+    assert [each.amplitude for each in drives] == [4.5] * 8 + [3.0] * 4
+    np.testing.assert_allclose(scene.weights, np.repeat([0.1, 0.1, 0.05], 4))
+    assert scene.frequency == 8.0
+    assert scene.copies is not None
+    assert scene.copies.shape == (2, scene.lattice.n_groups, 2)
+    assert 0.29 < np.abs(scene.copies).max() <= 0.3
+
+
+def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
+    robust: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "design_sqp.nc"
+    words = ["--problem", str(robust), "--preset", "quick", "--method", "sqp", "--quiet"]
+    assert design.main([*words, "--out", str(out)]) == 0
+    made = datasets.read(out, "design_method")
+    assert made.sizes["case"] == 4
+    assert float(made["best_loss"]) < float(made["loss"][0])
+    assert (made["loss"] > 0).all()
+
+
+def test_a_drive_without_a_frequency_has_no_other_loads(robust: Path) -> None:
+    text = robust.read_text().replace("kind: harmonic", "kind: linear_ramp\n  duration: 1 s")
+    text = text.replace("  frequency: 2 Hz\n", "").replace("  periods: 2\n", "  duration: 1 s\n", 1)
+    before, _, rest = text.partition("\nsweep:\n")
+    robust.write_text(before + rest[rest.index("\nreport:") :].partition("\npresets:")[0])
+    with pytest.raises(UserError, match="no frequency to vary") as caught:
+        load(robust)
+    assert caught.value.key == "objective.robust.loads"
+
+
+PRESETS = """
+presets:
+  tolerant:
+    objective:
+      robust: { copies: 2 }
+"""
+
+
+def test_the_gain_of_a_preset_is_over_the_studys_own_design(
+    hole: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(tmp_path, HOLE + PRESETS, size=5, amplitude=3.0)
+    shipped, out = Path(hole[1]).with_name("design.nc"), tmp_path / "gains.nc"
+    words = ["--problem", str(path), "--quiet", "--out", str(out), "--designs"]
+    assert robust_gains.main([*words, f"plain={shipped}", f"tolerant={shipped}"]) == 0
+    made = datasets.read(out, "gains").squeeze()
+    counts = [made[name].item() for name in ("preset", "loads", "copies")]
+    assert counts == ["tolerant", 1, 16]
+    assert made["loss_plain"] == made["loss_own"] < made["loss_altered"]
+    best = float(datasets.read(shipped, "design")["best_loss"].min())
+    assert float(made["price"]) == float(made["loss_drive"]) == pytest.approx(best, rel=1e-4)
+    assert made["price"].attrs["units"] == "1"
+    page = tmp_path / "page"
+    assert build.main([*words[:3], "--gains", str(out), "--out-dir", str(page)]) == 0
+    text = (page / "index.html").read_text(encoding="utf-8")
+    assert "<td>tolerant</td>" in text
+    assert "<td>0.0%</td>" in text
+    assert robust_gains.main([*words, f"plain={shipped}"]) == 2
+    assert "one of a preset" in capsys.readouterr().err
+
+
+def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
+    own, pulse = load(fig2), load(fig2, "pulse")
+    assert pulse.asks_more_than(own)
+    assert not load(fig2, "edge3").asks_more_than(own)
+    scene = design_scene(pulse, fig2.parent)
+    times = np.linspace(0.0, 0.4, 401)
+    largest = max(np.abs(drive.motion(times)).max() for drive in scene.drives)
+    assert largest == pytest.approx(4.5)
+
+
+def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path) -> None:
+    content = yaml.safe_load(fig2.read_text())
+    presets, again = content["presets"], {"optimiser": {"start": "study"}}
+    presets["again"] = overlaid(deepcopy(presets["quick"]), again)
+    path = tmp_path / "problem.yaml"
+    path.write_text(yaml.safe_dump(content))
+    words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset"]
+    own, chosen, out = (tmp_path / name for name in ("sqp.nc", "design.nc", "again.nc"))
+    assert design.main([*words, "quick", "--out", str(own)]) == 0
+    picked = ["--problem", str(path), "--preset", "quick", "--quiet", "--designs", str(own)]
+    assert select.main([*picked, "--out", str(chosen)]) == 0
+    assert design.main([*words, "again", "--start", str(chosen), "--out", str(out)]) == 0
+    before, after = (datasets.read(name, "design_method") for name in (own, out))
+    assert float(after["loss"][0]) == pytest.approx(float(before["best_loss"]), rel=1e-6)
+    assert json.loads(after.attrs["parents"])["start"]
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_a_start_is_given_where_one_is_asked_for(
+    fig2: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], given: bool
+) -> None:
+    words = ["--problem", str(fig2), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
+    more = ["--start", str(tmp_path / "design.nc")] if given else ["--preset", "worst"]
+    assert design.main([*words, *more]) == 2
+    assert "optimiser.start" in capsys.readouterr().err
+
+
+def test_a_study_does_not_start_from_itself(fig2: Path, tmp_path: Path) -> None:
+    path = tmp_path / "problem.yaml"
+    path.write_text(fig2.read_text().replace("  seed: 0\n", "  seed: 0\n  start: study\n", 1))
+    with pytest.raises(UserError, match="cannot start from its own design"):
+        load(path)

@@ -1,0 +1,320 @@
+"""Every mistake in a problem file is told with its key, its value and a remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.problem.reading import load, preset_names
+from pipeline.runtime import UserError
+from tests.pipeline.conftest import Refusal
+
+ROWS = "  rows: 15\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "what", "key", "remedy"),
+    [
+        ("spacing:", "spacng:", "unknown key", "lattice.spacng", "did you mean 'spacing'?"),
+        ("objective:", "goal:", "unknown key", "goal", "known here: title, doc, lattice"),
+        (ROWS, "", "missing key", "lattice.rows", "add it"),
+        ("spacing: 15 mm", "spacing: 15", "the unit is missing", "lattice.spacing", '"15 mm"'),
+        (
+            "radius: 67.5 mm",
+            "radius: 4.5 s",
+            "the unit 's' is not that of a length",
+            "cloak.disc.radius",
+            "a length is wanted here",
+        ),
+        ("spacing: 15 mm", "spacing: .nan", "not a number with a unit", "lattice.spacing", "mm"),
+        (
+            "axial_stiffness: 120 N/mm",
+            "axial_stiffness: -120 N/mm",
+            "a stiffness must be greater than zero",
+            "material.axial_stiffness",
+            "give a value greater than zero",
+        ),
+        (
+            "density: 6.18 kg/m^2",
+            "density: 0 kg/m^2",
+            "a mass per area must be greater than zero",
+            "material.density",
+            "6.18 kg/m^2",
+        ),
+        (
+            "edge_length: 5 mm",
+            "edge_length: -5 mm",
+            "a length must be greater than zero",
+            "constraints.edge_length",
+            "greater than zero",
+        ),
+        ("ratio: 0.0186", "ratio: -1", "too small", "material.damping.ratio", "at least 0"),
+        ("ratio: 0.0186", "ratio: .inf", "not a finite number", "material.damping.ratio", "finite"),
+        (
+            "ratio: 0.0186",
+            "translation: 1 kg/s",
+            "one form of damping is wanted",
+            "material.damping",
+            "give ratio, or translation and rotation",
+        ),
+        (
+            "periods: 2",
+            "periods: 2\n  duration: 1 s",
+            "periods and duration exclude each other",
+            "horizon",
+            "exactly one",
+        ),
+        ("columns: 15", "columns: 15.5", "not a whole number", "lattice.columns", "whole"),
+        ("columns: 15", "columns: wide", "not a whole number", "lattice.columns", "whole number"),
+        ("columns: 15", "columns: 0", "too small", "lattice.columns", "at least 1"),
+        ("kind: harmonic", "kind: harmonics", "unknown kind", "drive", "'ramp_harmonic'"),
+        ("  kind: harmonic", "  # kind", "the key `kind` is missing", "drive", "add it"),
+        ("accuracy: default", "accuracy: best", "not one of the", "solver.accuracy", "'tight'"),
+        ("units: centre", "units: middle", "not one of the choices", "drive.units", "'centre'"),
+        (
+            "weights: [0.25, 0.25, 0.25, 0.25]",
+            "weights: [0.5, 0.5]",
+            "2 weights for 4 directions",
+            "drive.weights",
+            "one weight per direction",
+        ),
+        (
+            "weights: [0.25, 0.25, 0.25, 0.25]",
+            "weights: [1, 1, 1, 1]",
+            "the weights add up to 4",
+            "drive.weights",
+            "scale them to add up to 1",
+        ),
+        (
+            "radius: 67.5 mm",
+            "radius: 130 mm",
+            "cloak of radius 130 mm reaches beyond the lattice",
+            "cloak.disc.radius",
+            "within 112.5 mm of its centre (105, 105) mm",
+        ),
+        (
+            "centre: centre",
+            "centre: [200 mm, 105 mm]",
+            "reaches beyond the lattice",
+            "cloak.disc.radius",
+            "within 17.5 mm",
+        ),
+        (
+            "radius: 67.5 mm",
+            "radius: 670 mm",
+            "cloak of radius 670 mm reaches beyond the lattice",
+            "cloak.disc.radius",
+            "within 112.5 mm of its centre (105, 105) mm",
+        ),
+        (
+            "centre: centre",
+            "centre: [105 mm, 1 m]",
+            "the centre of the cloak lies outside the lattice",
+            "cloak.disc.centre",
+            "span 210 by 210 mm",
+        ),
+        ("radius: 67.5 mm", "radius: 10 mm", "no unit lies in the cloak", "cloak", "enlarge it"),
+        (
+            "  disc:\n    centre: centre\n    radius: 67.5 mm",
+            "  ring:\n    inner: 60 mm\n    outer: 50 mm",
+            "inner radius (60 mm) is not below the outer (50 mm)",
+            "cloak.ring.inner",
+            "keep it below 50 mm",
+        ),
+        (
+            "region: surroundings",
+            "region: { disc: { radius: 7 mm, centre: [7.5 mm, 7.5 mm] } }",
+            "no unit lies in the region of interest",
+            "objective.region",
+            "",
+        ),
+        (
+            "edge_length: 5 mm",
+            "edge_length: 10 mm",
+            "infeasible at the start: the undeformed units have 9.59421 mm",
+            "constraints.edge_length",
+            "at most 9.59 mm",
+        ),
+        (
+            "block_angle: 30 deg",
+            "block_angle: 91 deg",
+            "infeasible at the start",
+            "constraints.block_angle",
+            "at most 90 deg",
+        ),
+        (
+            "void_angle: 0 deg",
+            "void_angle: 51 deg",
+            "infeasible at the start",
+            "constraints.void_angle",
+            "at most 50 deg",
+        ),
+        ("gap: 0.2 mm", "gap: 3 mm", "infeasible at the start", "constraints.gap", "2.25 mm"),
+        (
+            "units: centre",
+            "units: { units: [[14, 0]] }",
+            "unit [14, 0] is driven and clamped",
+            "drive.units",
+            "drive or clamp it, not both",
+        ),
+        (
+            "units: corners",
+            "units: { units: [[15, 0]] }",
+            "unit [15, 0] is not in the lattice",
+            "supports[0].units",
+            "i runs to 14",
+        ),
+        (
+            "columns: 15",
+            "columns: 14",
+            "a lattice of even size has no centre unit",
+            "drive.units",
+            "i runs to 13",
+        ),
+        (
+            "barrier_angle: -15 deg",
+            "barrier_angle: -5 deg",
+            "the barrier (-5 deg) is not below the cut-off (-10 deg)",
+            "contact.barrier_angle",
+            "below -10 deg",
+        ),
+        (
+            "cutoff_angle: -10 deg",
+            "cutoff_angle: 60 deg",
+            "the undeformed lattice is in contact",
+            "contact.cutoff_angle",
+            "below 50 deg",
+        ),
+        (
+            "ligament_length: 2.25 mm",
+            "ligament_length: 15 mm",
+            "leave no room for units",
+            "lattice.ligament_length",
+            "below the spacing",
+        ),
+        ("bias_angle: 20 deg", "bias_angle: 50 deg", "closes", "lattice.bias_angle", "45 deg"),
+        ("symmetry: C4", "symmetry: C3", "not one of the", "optimiser.symmetry", "'C4'"),
+        (
+            "trust_radius: 0.25 mm",
+            "trust_radius: 5 mm",
+            "larger than its maximum",
+            "optimiser.trust_radius",
+            "at or below 1 mm",
+        ),
+        (
+            "to: 180 deg",
+            "to: 0 deg",
+            "do not ascend",
+            "sweep.grid.drive.directions.to",
+            "above `from`",
+        ),
+        (
+            "to: 180 deg",
+            "to: 3 rad",
+            "in several units",
+            "sweep.grid.drive.directions",
+            "in the same unit",
+        ),
+        (
+            "drive.frequency: {",
+            "drive.freqency: {",
+            "unknown key",
+            "sweep.grid.drive.freqency",
+            "did you mean 'frequency'",
+        ),
+        (
+            "from: 2 Hz, to: 16 Hz",
+            "from: 2, to: 16",
+            "the unit is missing",
+            "sweep.grid.drive.frequency",
+            "2 Hz",
+        ),
+        ("samples: 200", "samples: 1", "too small", "horizon.samples", "at least 2"),
+        ("samples: 200", "samples: 1000000000", "too large", "horizon.samples", "at most 1000000"),
+        ("convex: true", "convex: maybe", "neither true nor false", "constraints.convex", "true"),
+        ("title: Shielding", "title: 3 #", "not a text", "title", "quotes"),
+    ],
+)
+def test_a_mistake_is_told(
+    refusal: Refusal, old: str, new: str, what: str, key: str, remedy: str
+) -> None:
+    error = refusal(old, new)
+    assert what in error.what
+    assert error.key == key
+    assert remedy in str(error.remedy)
+    assert error.line is not None
+
+
+def test_line_and_value_are_those_of_the_file(refusal: Refusal, fig2: Path) -> None:
+    error = refusal("axial_stiffness: 120 N/mm", "axial_stiffness: -120 N/mm")
+    lines = fig2.read_text(encoding="utf-8").splitlines()
+    assert error.line == 1 + next(
+        index for index, line in enumerate(lines) if "axial_stiffness" in line
+    )
+    assert error.value == "-120 N/mm"
+
+
+def test_the_message_fits_a_screen(refusal: Refusal) -> None:
+    error = refusal("spacing: 15 mm", f"spacing: {'9' * 5000} m m m")
+    assert max(map(len, str(error).splitlines())) < 200
+
+
+def test_a_fault_in_a_preset_is_found_there(refusal: Refusal, fig2: Path) -> None:
+    error = refusal("edge_length: 3 mm", "edge_length: 30 mm", "edge3")
+    assert error.key == "presets.edge3.constraints.edge_length"
+    lines = fig2.read_text(encoding="utf-8").splitlines()
+    assert error.line == 1 + lines.index(
+        next(line for line in lines if "edge_length: 3 mm" in line)
+    )
+
+
+def test_an_unknown_preset_lists_those_there_are(fig2: Path) -> None:
+    with pytest.raises(UserError, match="no preset 'quik'") as caught:
+        load(fig2, "quik")
+    told = f"did you mean 'quick'? presets here: {', '.join(preset_names(fig2))}"
+    assert caught.value.remedy == told
+
+
+def test_presets_are_mappings(refusal: Refusal) -> None:
+    assert refusal("\npresets:", "\npresets: 3\nrest:", "quick").key == "presets"
+    assert refusal("  edge3:\n    title", "  edge3: 3\n  x:\n    title", "edge3").line is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "line"),
+    [
+        ("lattice: [1, 2\nrows: 3\n", "not valid YAML", 2),
+        ("a:\n\tb: 1\n", "not valid YAML", 2),
+        ("a: 1\nb: 2\na: 3\n", "the key 'a' is given twice", 3),
+        ("a: &x 1\nb: *x\n", "aliases (*name) are not supported", 2),
+        ("a: !!python/object:os.system {}\n", "not valid YAML", 1),
+        ("- 1\n- 2\n", "does not hold keys and values", None),
+        ("just words\n", "does not hold keys and values", None),
+        ("", "does not hold keys and values", None),
+        ("a: \x07\n", "not YAML", None),
+        ("? [1, 2]\n: 3\n", "a key must be one word", 1),
+        ("[" * 5000, "nested too deeply", None),
+        ("a: " + "x" * 300_000, "more than 262144", None),
+        ("---\na: 1\n---\nb: 2\n", "not valid YAML", 3),
+    ],
+)
+def test_text_that_is_no_problem(tmp_path: Path, text: str, what: str, line: int | None) -> None:
+    path = tmp_path / "problem.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(UserError) as caught:
+        load(path)
+    assert what in caught.value.what
+    assert caught.value.remedy
+    if line is not None:
+        assert caught.value.line == line
+
+
+def test_a_file_must_be_there_and_be_text(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such file"):
+        load(tmp_path / "none.yaml")
+    with pytest.raises(UserError, match="a folder"):
+        load(tmp_path)
+    (tmp_path / "latin.yaml").write_bytes(b"title: \xe4\n")
+    with pytest.raises(UserError, match="not a UTF-8 text"):
+        load(tmp_path / "latin.yaml")

@@ -1,0 +1,205 @@
+"""Kagome lattices and lattices from files, through the same chain as squares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from ezdxf.enums import InsertUnits
+from ezdxf.filemanagement import new
+
+from pipeline import datasets
+from pipeline.problem import canonical_json, cloak_units, from_canonical, interest_units, void_units
+from pipeline.problem.outlines.network_files import COLUMNS
+from pipeline.problem.reading import load
+from pipeline.problem.sections import selected_units
+from pipeline.runtime import UserError
+from pipeline.stages import design, select, simulate
+from sim.structure import Lattice, quads
+from tests.pipeline.static import HOLE, MIMIC, write
+
+SQUARES = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
+QUADS = (
+    "  kind: quads\n  columns: 5\n  rows: 5\n  spacing: 15 mm\n  ligament_length: 2.25 mm\n"
+    "  bias_angle: 20 deg\n"
+)
+
+
+def as_csv(path: Path, lattice: Lattice) -> None:
+    rows = [",".join(COLUMNS)]
+    rows += [
+        f"unit,{u},{x!r},{y!r}" for u, (x, y) in zip(lattice.unit, listed(lattice), strict=True)
+    ]
+    for number, ends in enumerate(lattice.vertices[lattice.ligaments].tolist()):
+        rows += [f"ligament,{number},{x!r},{y!r}" for x, y in ends]
+    path.write_text("\n".join(rows))
+
+
+def listed(lattice: Lattice) -> list[list[float]]:
+    found: list[list[float]] = lattice.vertices.tolist()
+    return found
+
+
+def as_netcdf(path: Path, lattice: Lattice) -> None:
+    corner = lattice.ligaments - lattice.first_vertex[lattice.ligament_units]
+    xr.Dataset(
+        {
+            "vertices": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
+            "ligament_unit": (("ligament", "end"), lattice.ligament_units),
+            "ligament_vertex": (("ligament", "end"), corner),
+        }
+    ).to_netcdf(path)
+
+
+def as_dxf(path: Path, lattice: Lattice) -> None:
+    """As one draws it by hand: in cm, some units clockwise, ends of ligaments not quite met."""
+    drawing = new(units=InsertUnits.Centimeters)
+    space = drawing.modelspace()
+    for unit in range(lattice.n_units):
+        ring = lattice.vertices[lattice.unit == unit] / 10
+        space.add_lwpolyline(ring[:: -1 if unit % 3 else 1].tolist(), close=True)
+    for start, end in (lattice.vertices[lattice.ligaments] / 10 + 0.01).tolist():
+        space.add_line(start, end)
+    drawing.saveas(path)
+
+
+WRITERS: dict[str, Callable[[Path, Lattice], None]] = {
+    "csv": as_csv,
+    "nc": as_netcdf,
+    "dxf": as_dxf,
+}
+
+
+def from_file(folder: Path, name: str) -> Path:
+    """A problem whose lattice is the squares of `name`."""
+    path = write(folder, HOLE, size=5, amplitude=3.0)
+    text = path.read_text()
+    assert QUADS in text
+    path.write_text(text.replace(QUADS, f"  kind: file\n  file: {name}\n  spacing: 15 mm\n"))
+    return path
+
+
+def run(problem: Path) -> tuple[xr.Dataset, xr.Dataset]:
+    """Design and response of a problem, through the stages."""
+    study = ["--problem", str(problem), "--quiet", "--out"]
+    made, chosen, moved = (
+        str(problem.with_name(f"{name}.nc")) for name in ("design_sqp", "d", "r")
+    )
+    assert design.main([*study, made, "--method", "sqp"]) == 0
+    assert select.main([*study, chosen, "--designs", made]) == 0
+    assert simulate.main([*study, moved, "--design", chosen]) == 0
+    return datasets.read(chosen, "design"), datasets.read(moved, "response")
+
+
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_listed_lattice_is_the_one_that_was_listed(tmp_path: Path, suffix: str) -> None:
+    WRITERS[suffix](tmp_path / f"x.{suffix}", SQUARES)
+    problem = load(from_file(tmp_path, f"x.{suffix}"))
+    plain = load(write(tmp_path, HOLE, size=5))
+    for ids in (void_units, cloak_units, interest_units):
+        assert ids(problem) == ids(plain)
+    for side in ("left", "right", "top", "bottom", "corners", "centre"):
+        wanted = selected_units(side, plain.lattice)
+        assert selected_units(side, problem.lattice) == wanted
+    found = from_canonical(canonical_json(problem)).lattice.network()
+    np.testing.assert_allclose(np.sort(found.vertices, axis=0), np.sort(SQUARES.vertices, axis=0))
+    np.testing.assert_array_equal(found.ligament_units, SQUARES.ligament_units)
+
+
+def test_a_drawing_runs_as_the_lattice_that_it_shows(tmp_path: Path) -> None:
+    as_dxf(tmp_path / "hand.dxf", SQUARES)
+    _, drawn = run(from_file(tmp_path, "hand.dxf"))
+    altered, cloaked = drawn["loss"].values[1:, 0]
+    assert altered == pytest.approx(0.1714, abs=1e-4)
+    assert cloaked < 0.9 * altered
+
+
+KAGOME = """  kind: kagome
+  columns: 5
+  rows: 5
+  spacing: 15 mm
+  ligament_length: 2.25 mm
+  bias: 1.5 mm
+"""
+
+
+def test_a_kagome_lattice_from_problem_to_response(tmp_path: Path) -> None:
+    hole = (
+        "void: { disc: { centre: [37.5 mm, 37.5 mm], radius: 8 mm } }\n"
+        "cloak: { disc: { centre: [37.5 mm, 37.5 mm], radius: 28 mm } }\n" + MIMIC
+    )
+    path = write(tmp_path, hole, size=5, amplitude=2.0)
+    text = path.read_text().replace(QUADS, KAGOME).replace("block_angle: 30", "block_angle: 10")
+    path.write_text(text.replace("edge_length: 3 mm", "edge_length: 1 mm"))
+    shipped, moved = run(path)
+    assert shipped.sizes["vertex"] == 3
+    assert shipped.sizes["unit"] == 50
+    void = np.flatnonzero(shipped["region"] == 3)
+    assert shipped["i"].values[void].tolist() == [4, 5]
+    assert shipped["j"].values[void].tolist() == [2, 2]
+    assert (shipped["i"].values[shipped["support"] == 2] >= 8).all()
+    intact, altered, cloaked = moved["loss"].values[:, 0]
+    assert intact == 0.0
+    assert cloaked < 0.9 * altered
+    assert (moved["overlaps"] == 0).all()
+
+
+def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
+    hole = (
+        "void: { disc: { centre: [112.5 mm, 112.5 mm], radius: 35 mm } }\n"
+        "cloak: { disc: { centre: [112.5 mm, 112.5 mm], radius: 75 mm } }\n" + MIMIC
+    )
+    path = write(tmp_path, hole, size=5)
+    kagome = KAGOME.replace(": 5\n", ": 15\n")
+    path.write_text(path.read_text().replace(QUADS, kagome))
+    problem = load(path)
+    lattice = problem.lattice.network()
+    assert (lattice.n_units, lattice.n_ligaments) == (450, 225 + 2 * 14 * 15)
+    assert len(selected_units("left", problem.lattice)) == 30
+    assert len(void_units(problem)) + len(cloak_units(problem)) == pytest.approx(157, abs=4)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "what"),
+    [
+        ("x.csv", "unit;x;y", "the columns of the list are wrong"),
+        ("x.csv", "kind,number,x (mm),y (mm)\nunit,one,1,2", "row 2 of the list is no corner"),
+        ("x.csv", "kind,number,x (mm),y (mm)\nligament,7,1,2", "ligament 7 has 1 ends"),
+        ("x.csv", "kind,number,x (mm),y (mm)\n", "the file has no units"),
+        ("x.nc", "no netCDF", "not a readable lattice"),
+        ("x.dxf", "no drawing", "not a readable DXF"),
+        ("x.txt", "", "not a kind of file that lattices are read from"),
+        ("y.csv", None, "no such file"),
+    ],
+)
+def test_a_bad_list_is_told(tmp_path: Path, name: str, content: str | None, what: str) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    with pytest.raises(UserError) as caught:
+        load(from_file(tmp_path, name))
+    assert what in caught.value.what
+    assert (caught.value.key, caught.value.value) == ("lattice.file", name)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda text: text + "\nligament,99,0,0,", "row 182 of the list"),
+        (lambda text: text + "\nligament,99,0,0\nligament,99,30,30", "ends 6.78 mm away from any"),
+        (
+            lambda text: text + "\nligament,99,6.375,-2.32\nligament,99,2.32,6.375",
+            "begins and ends at the same unit",
+        ),
+        (lambda text: text + "\nunit,99,0,0\nunit,99,1,1", "a polygon of 2 corners has no area"),
+    ],
+    ids=["row", "far", "same", "flat"],
+)
+def test_bad_ligaments_are_told(tmp_path: Path, change: Callable[[str], str], what: str) -> None:
+    as_csv(tmp_path / "x.csv", SQUARES)
+    (tmp_path / "x.csv").write_text(change((tmp_path / "x.csv").read_text()))
+    with pytest.raises(UserError) as caught:
+        load(from_file(tmp_path, "x.csv"))
+    assert what in caught.value.what

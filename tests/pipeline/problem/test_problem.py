@@ -1,0 +1,184 @@
+from __future__ import annotations
+
+import hashlib
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.problem import (
+    Problem,
+    Stage,
+    canonical_json,
+    cloak_units,
+    content_hash,
+    from_canonical,
+    interest_units,
+    section_hash,
+)
+from pipeline.problem.reading import load, overlaid, preset_names
+from pipeline.problem.sections import Quads
+from pipeline.runtime import UserError
+
+ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
+NAMES = ("edge3", "free", "text", *ROBUST, "quick")
+PRESETS = (None, *NAMES)
+
+
+def edited(fig2: Path, folder: Path, old: str, new: str) -> Problem:
+    text = fig2.read_text(encoding="utf-8")
+    assert old in text
+    path = folder / "problem.yaml"
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return load(path)
+
+
+def test_fig2_is_as_the_authors_ran_it(fig2: Path) -> None:
+    problem = load(fig2)
+    assert problem.lattice.ligament_length == 0.15 * problem.lattice.spacing
+    assert isinstance(problem.lattice, Quads)
+    assert problem.lattice.edge_length == pytest.approx(9.594, abs=1e-3)
+    assert problem.horizon_time == 1.0
+    assert problem.material.density == 6.18e-9
+    assert problem.damping_coefficients == pytest.approx((2.876e-5, 1.19e-4), rel=2e-3)
+    assert [math.degrees(angle) for angle in problem.drive.directions] == [0.0, 45.0, 90.0, 135.0]  # type: ignore[union-attr]
+    assert problem.drive.case_weights == (0.25,) * 4
+
+
+def test_fig2_regions_have_the_sizes_of_the_paper(fig2: Path) -> None:
+    problem = load(fig2)
+    assert len(cloak_units(problem)) == 68
+    assert len(interest_units(problem)) == 156
+    assert 112 not in {*cloak_units(problem), *interest_units(problem)}
+
+
+def test_presets_change_what_they_name(fig2: Path) -> None:
+    assert preset_names(fig2) == NAMES
+    assert load(fig2, "edge3").constraints.edge_length == 3.0
+    assert load(fig2, "edge3").constraints.block_angle == load(fig2).constraints.block_angle
+    text = load(fig2, "text")
+    assert text.lattice.ligament_length == 2.3
+    assert text.damping_coefficients == pytest.approx((2.9e-5, 1.2e-4))
+    assert len(cloak_units(text)) == 48
+    assert load(fig2, "quick").solver.accuracy == "draft"
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_canonical_text_restores_the_problem(fig2: Path, preset: str | None) -> None:
+    problem = load(fig2, preset)
+    assert from_canonical(canonical_json(problem)) == problem
+    assert content_hash(from_canonical(canonical_json(problem))) == content_hash(problem)
+    assert from_canonical(canonical_json(problem, "design", "sqp")).optimiser.methods.mma is None
+
+
+def test_comments_spelling_and_order_do_not_change_the_hash(fig2: Path, tmp_path: Path) -> None:
+    same = edited(
+        fig2,
+        tmp_path,
+        "  spacing: 15 mm\n  ligament_length: 2.25 mm",
+        ("  ligament_length: 0.225 cm # as run\n  spacing: 0.015 m"),
+    )
+    assert content_hash(same) == content_hash(load(fig2))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "changed"),
+    [
+        ("title: Shielding", "title: Hiding", set()),
+        ("samples: 401", "samples: 201", {"simulate"}),
+        ("points: 13", "points: 7", {"sweep"}),
+        ("edge_length: 5 mm", "edge_length: 4 mm", {"design", "simulate", "sweep"}),
+    ],
+)
+def test_a_key_changes_the_stages_that_depend_on_it(
+    fig2: Path, tmp_path: Path, old: str, new: str, changed: set[str]
+) -> None:
+    before, after = load(fig2), edited(fig2, tmp_path, old, new)
+    stages: tuple[Stage, ...] = ("design", "simulate", "sweep")
+    assert {
+        stage for stage in stages if section_hash(before, stage) != section_hash(after, stage)
+    } == changed
+    assert section_hash(before, "report") != section_hash(after, "report")
+
+
+def test_a_method_depends_on_its_own_budget(fig2: Path, tmp_path: Path) -> None:
+    before, after = load(fig2), edited(fig2, tmp_path, "evaluations: 60", "evaluations: 61")
+    assert section_hash(before, "design", "sqp") == section_hash(after, "design", "sqp")
+    assert section_hash(before, "design", "mma") != section_hash(after, "design", "mma")
+
+
+mappings = st.recursive(
+    st.integers() | st.text(max_size=3),
+    lambda inner: st.dictionaries(st.sampled_from("abc"), inner, max_size=3),
+).filter(lambda value: isinstance(value, dict))
+
+
+@given(mappings)
+def test_nothing_laid_over_changes_nothing(base: dict[str, object]) -> None:
+    assert overlaid(base, {}) == base
+
+
+@given(mappings, mappings)
+def test_an_overlay_wins_and_is_idempotent(
+    base: dict[str, object], overlay: dict[str, object]
+) -> None:
+    once = overlaid(base, overlay)
+    assert overlaid(once, overlay) == once
+    assert set(once) == set(base) | set(overlay)
+
+
+def test_null_removes_a_key() -> None:
+    assert overlaid({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
+
+
+SERIES = """drive:
+  kind: time_series
+  units: centre
+  file: motion.csv
+"""
+
+
+def with_series(fig2: Path, folder: Path, series: str) -> Path:
+    text = fig2.read_text(encoding="utf-8").replace(
+        "  periods: 2\n  samples", "  duration: 1 s\n  samples"
+    )
+    head, _, rest = text.partition("drive:\n")
+    _, _, tail = rest.partition("horizon:\n")
+    path = folder / "problem.yaml"
+    path.write_text(f"{head}{series}horizon:\n{tail.partition('sweep:')[0]}", encoding="utf-8")
+    return path
+
+
+def test_a_measured_motion_enters_by_its_content(fig2: Path, tmp_path: Path) -> None:
+    path = with_series(fig2, tmp_path, SERIES)
+    (tmp_path / "motion.csv").write_text("0,0,0,0\n", encoding="utf-8")
+    before = load(path)
+    (tmp_path / "motion.csv").write_text("0,0,0,1\n", encoding="utf-8")
+    assert content_hash(load(path)) != content_hash(before)
+    assert before.drive.case_weights == (1.0,)
+
+
+def test_a_measured_motion_must_be_there_and_as_meant(fig2: Path, tmp_path: Path) -> None:
+    path = with_series(fig2, tmp_path, SERIES)
+    with pytest.raises(UserError, match="cannot be read"):
+        load(path)
+    (tmp_path / "motion.csv").write_bytes(b"0")
+    wrong = hashlib.sha256(b"1").hexdigest()
+    with pytest.raises(UserError, match="not the file that was meant") as caught:
+        load(with_series(fig2, tmp_path, f"{SERIES}  sha256: {wrong}\n"))
+    assert caught.value.key == "drive.sha256"
+
+
+def test_loading_leaves_the_heavy_libraries_alone(fig2: Path) -> None:
+    code = (
+        "import sys; from pipeline.problem import load; load(sys.argv[1]);"
+        "print([name for name in ('jax', 'numba', 'xarray') if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(fig2)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,216 @@
+"""Shapes of voids: polygons, curves, formulas and images, with size, centre and orientation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.problem import canonical_json, cloak_units, content_hash, from_canonical, void_units
+from pipeline.problem.outlines import Outline, extents
+from pipeline.problem.reading import load
+from pipeline.runtime import UserError
+from tests.pipeline.static import MIMIC, write
+
+SHAPES = Path(__file__).parents[3] / "experiments/shapes"
+CLOAK = "cloak: { disc: { radius: 175 mm } }\n"
+MIDDLE = (217.5, 217.5)
+
+Placed = Callable[..., tuple[Outline, ...]]
+
+
+@pytest.fixture
+def placed(tmp_path: Path) -> Placed:
+    """The outlines (mm) of a void in a lattice of 30 x 30 units."""
+
+    def outlines(void: str) -> tuple[Outline, ...]:
+        problem = load(write(tmp_path, f"void: {{ {void} }}\n{CLOAK}{MIMIC}", 30))
+        assert problem.void is not None
+        return problem.void.outlines(problem.lattice.centre_site)
+
+    return outlines
+
+
+def box(outlines: tuple[Outline, ...]) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([point for outline in outlines for point in outline])
+    return points.min(axis=0), points.max(axis=0)
+
+
+def draw(path: Path, flip: bool = False) -> Path:
+    """An L of 40 x 60 pixels, its foot to the right."""
+    image = np.full((100, 100), 255, np.uint8)
+    image[20:80, 30:45] = 0
+    image[65:80, 30:70] = 0
+    cv2.imwrite(str(path), image[::-1] if flip else image)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "x0"),
+    [
+        ("shamrock.png", 285, 225.0),
+        ("cat.png", 240, 228.75),
+        ("dolphin.png", 240, 210.0),
+        ("logo.jpg", 240, 225.0),
+    ],
+)
+def test_images_of_the_studies(
+    placed: Placed, tmp_path: Path, name: str, size: int, x0: float
+) -> None:
+    asked = f"size: [{size} mm, {size} mm], centre: [{x0} mm, 221.25 mm]"
+    low, high = box(placed(f"image: {{ file: {SHAPES / name}, {asked} }}, loose: remove"))
+    np.testing.assert_allclose((low + high) / 2, [x0, 221.25])
+    np.testing.assert_allclose(high - low, size)
+    problem = load(tmp_path / "problem.yaml")
+    assert 60 < len(void_units(problem)) < 190
+    assert len(cloak_units(problem)) > 200
+
+
+def test_what_a_void_cuts_loose_can_go_too(tmp_path: Path) -> None:
+    ring = "void: { ring: { inner: 20 mm, outer: 50 mm }, loose: remove }\n"
+    loose = load(write(tmp_path, f"{ring}{CLOAK}{MIMIC}", 30))
+    whole = load(write(tmp_path, f"void: {{ disc: {{ radius: 50 mm }} }}\n{CLOAK}{MIMIC}", 30))
+    assert void_units(loose) == void_units(whole)
+
+
+def test_an_image_is_upright_and_keeps_its_proportions(placed: Placed, tmp_path: Path) -> None:
+    (shape,) = placed(f"image: {{ file: {draw(tmp_path / 'l.png').name}, width: 80 mm }}")
+    assert extents(shape) == pytest.approx((80.0, 80 * 59 / 39), rel=0.02)
+    points = np.array(shape)
+    foot = points[points[:, 1] < MIDDLE[1] - 40]
+    assert np.ptp(foot[:, 0]) == pytest.approx(80.0)
+    assert np.ptp(points[points[:, 1] > MIDDLE[1] + 20][:, 0]) < 35
+
+
+def test_an_image_turns_counter_clockwise(placed: Placed, tmp_path: Path) -> None:
+    given = f"file: {draw(tmp_path / 'l.png').name}, width: 80 mm, centre: [200 mm, 210 mm]"
+    upright, turned = placed(f"image: {{ {given} }}"), None
+    turned = placed(f"image: {{ {given}, orientation: 90 deg }}")
+    x, y = (np.array(upright[0]) - [200, 210]).T
+    np.testing.assert_allclose(np.array(turned[0]), np.stack([200 - y, 210 + x], axis=1))
+
+
+def test_a_drawing_is_read_as_an_image_is(placed: Placed, tmp_path: Path) -> None:
+    path = "M30 20 h15 v45 h25 v15 h-40 z"
+    svg = tmp_path / "l.svg"
+    svg.write_text(f'<svg xmlns="http://www.w3.org/2000/svg"><path d="{path}"/></svg>')
+    (drawn,) = placed("image: { file: l.svg, width: 80 mm }")
+    assert extents(drawn) == pytest.approx((80.0, 120.0))
+    corner = np.array(drawn)[np.argmax(np.array(drawn) @ [1, -1])]
+    np.testing.assert_allclose(corner, [MIDDLE[0] + 40, MIDDLE[1] - 60])
+
+
+def test_holes_are_no_part_of_the_shape(tmp_path: Path) -> None:
+    image = draw(tmp_path / "ring.png")
+    pixels = np.full((90, 90), 255, np.uint8)
+    cv2.circle(pixels, (45, 45), 40, 0, -1)
+    cv2.circle(pixels, (45, 45), 30, 255, -1)
+    cv2.imwrite(str(image), pixels)
+    void = "void: { image: { file: ring.png, width: 240 mm } }\n"
+    with pytest.raises(UserError, match="splits the lattice"):
+        load(write(tmp_path, f"{void}{CLOAK}{MIMIC}", 30))
+
+
+def test_curves(placed: Placed) -> None:
+    (heart,) = placed("curve: { kind: heart, size: [270 mm, 198 mm], centre: [225 mm, 221.25 mm] }")
+    formula = (
+        'curve: { kind: formula, x: "16 sin(t)^3", y: "13 * cos(t) - 5 * cos(2 * t)'
+        ' - 2 * cos(3 * t) - cos(4 * t)", size: [270 mm, 198 mm], centre: [225 mm, 221.25 mm],'
+        " points: 49 }"
+    )
+    (same,) = placed(formula.replace("16 sin", "16 * sin"))
+    assert len(heart) == 50
+    np.testing.assert_allclose(np.array(same), np.array(heart)[:49], atol=1e-9)
+    (polygon,) = placed(
+        "polygon: { vertices: [[100 mm, 100 mm], [140 mm, 100 mm], [120 mm, 130 mm]],"
+        " orientation: 180 deg }"
+    )
+    np.testing.assert_allclose(polygon, [(140, 130), (100, 130), (120, 100)])
+
+
+def test_a_cloak_around_the_void(tmp_path: Path) -> None:
+    disc = "void: { disc: { radius: 40 mm } }\n"
+    around = load(write(tmp_path, f"{disc}cloak: {{ around: {{ distance: 50.1 mm }} }}\n{MIMIC}"))
+    round_one = load(write(tmp_path, f"{disc}cloak: {{ disc: {{ radius: 90 mm }} }}\n{MIMIC}"))
+    assert cloak_units(around) == cloak_units(round_one)
+
+
+def test_the_problem_holds_what_the_image_showed(tmp_path: Path) -> None:
+    image = draw(tmp_path / "l.png")
+    void = "void: { image: { file: l.png, width: 80 mm } }\n"
+    path = write(tmp_path, f"{void}{CLOAK}{MIMIC}", 30)
+    problem = load(path)
+    draw(image, flip=True)
+    assert content_hash(load(path)) != content_hash(problem)
+    image.unlink()
+    again = from_canonical(canonical_json(problem))
+    assert content_hash(again) == content_hash(problem)
+    assert void_units(again) == void_units(problem)
+
+
+def grey(path: Path) -> None:
+    cv2.imwrite(str(path), np.tile(np.arange(256, dtype=np.uint8), (64, 1)))
+
+
+def blank(path: Path) -> None:
+    cv2.imwrite(str(path), np.full((64, 64), 255, np.uint8))
+
+
+def text(path: Path) -> None:
+    path.write_text("no image")
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "what"),
+    [
+        (grey, "x.png", "the image is not binary: 40% of its pixels are neither dark nor light"),
+        (blank, "x.png", "the image shows no shape"),
+        (text, "x.png", "not a readable image"),
+        (text, "x.svg", "not a readable SVG"),
+        (blank, "none.png", "the image cannot be read: No such file"),
+    ],
+    ids=["grey", "blank", "text", "drawing", "missing"],
+)
+def test_a_bad_image_is_told(
+    tmp_path: Path, make: Callable[[Path], None], name: str, what: str
+) -> None:
+    make(tmp_path / f"x{Path(name).suffix}")
+    void = f"void: {{ image: {{ file: {name}, width: 9 mm }} }}\n"
+    path = write(tmp_path, f"{void}{CLOAK}{MIMIC}", 30)
+    with pytest.raises(UserError) as caught:
+        load(path)
+    assert what in caught.value.what
+    assert caught.value.key == "void.image.file"
+    assert caught.value.value == name
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("x", "what"),
+    [
+        ("2 * ", "not a formula"),
+        ("__import__('os')", "is not understood"),
+        ("sqrt(t - 9)", "no value at t = 0.5"),
+        ("9 ^ 9 ^ 9 ^ 9", "no value"),
+        ("3", "no extent"),
+        ("u", "'u' is not understood"),
+    ],
+)
+def test_a_bad_formula_is_told(tmp_path: Path, x: str, what: str) -> None:
+    curve = f'curve: {{ kind: formula, x: "{x}", y: "sin(t)", size: [9 mm, 9 mm] }}'
+    with pytest.raises(UserError) as caught:
+        load(write(tmp_path, f"void: {{ {curve} }}\n{CLOAK}{MIMIC}", 30))
+    assert what in caught.value.what
+    assert caught.value.key == "void.curve.x"
+
+
+def test_points_on_the_rim_are_inside() -> None:
+    from pipeline.problem.outlines import inside
+
+    square = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
+    points = [(1.0, 0.0), (0.0, 0.0), (2.0, 1.0), (1.0, 1.0), (2.1, 1.0), (1.0, math.nan)]
+    assert inside(points, (square,), 1e-9) == [True, True, True, True, False, False]

@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import argparse
+import errno
+import logging
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import UserError, cli
+
+LOG = logging.getLogger("pipeline.toy")
+ARGUMENTS = ("--problem", "problem.yaml")
+
+
+def run(error: BaseException | None, *options: str) -> int:
+    def work(args: argparse.Namespace) -> None:
+        LOG.info("working on %s", args.problem)
+        LOG.debug("details")
+        if error is not None:
+            raise error
+
+    parser = cli.parser("pipeline.toy", "Do nothing.")
+    return cli.run(work, parser, [*ARGUMENTS, *options])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "told"),
+    [
+        (None, 0, ""),
+        (UserError("it is wrong", file="a.yaml", remedy="mend it"), 2, "error: it is wrong\n"),
+        (OSError(errno.ENOSPC, "full", "/results"), 1, "error: the disk is full\n"),
+        (OSError(errno.EROFS, "ro", "/results"), 1, "error: the file system is read-only\n"),
+        (FileNotFoundError(errno.ENOENT, "No such file", "/a"), 1, "error: No such file\n"),
+        (OSError("odd"), 1, "error: odd\n"),
+        (MemoryError(), 1, "error: the memory is full\n"),
+        (KeyboardInterrupt(), 130, "interrupted: run the same command again to finish\n"),
+        (ZeroDivisionError("by 0"), 1, "error: a bug: ZeroDivisionError: by 0"),
+    ],
+)
+def test_every_end_has_its_code_and_words(
+    error: BaseException | None,
+    code: int,
+    told: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    log = tmp_path / "logs" / "toy.log"
+    assert run(error, "--log", str(log)) == code
+    printed = capsys.readouterr()
+    assert printed.err.startswith(f"working on problem.yaml\n{told}")
+    assert not printed.out
+    assert "Traceback" not in printed.err
+    kept = log.read_text(encoding="utf-8")
+    assert "working on problem.yaml" in kept
+    assert "details" in kept
+    assert told in kept
+    bug = error is not None and isinstance(error, OSError | MemoryError | ZeroDivisionError)
+    assert ("Traceback" in kept) == bug
+
+
+def test_a_bug_names_the_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "toy.log"
+    run(ZeroDivisionError("by 0"), "--log", str(log), "--quiet")
+    line = f"error: a bug: ZeroDivisionError: by 0; its traceback is in {log}\n"
+    assert capsys.readouterr().err == line
+
+
+def test_a_bug_without_a_log_shows_its_traceback(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(ZeroDivisionError("by 0")) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_quiet_prints_errors_only(capsys: pytest.CaptureFixture[str]) -> None:
+    run(None, "--quiet")
+    assert not capsys.readouterr().err
+    run(UserError("wrong"), "--quiet")
+    assert capsys.readouterr().err == "error: wrong\n"
+
+
+def test_a_log_that_cannot_be_written_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert run(None, "--log", str(tmp_path / "file" / "toy.log")) == 2
+    assert capsys.readouterr().err.startswith("error: ")
+
+
+def test_a_second_run_adds_to_the_log(tmp_path: Path) -> None:
+    log = tmp_path / "toy.log"
+    run(None, "--log", str(log))
+    run(None, "--log", str(log))
+    assert log.read_text(encoding="utf-8").count("working on") == 2
+
+
+def test_an_error_shows_only_what_it_knows() -> None:
+    assert str(UserError("wrong")) == "wrong"
+    whole = UserError("wrong", file="a.yaml", line=3, key="b", value="x" * 999, remedy="mend it")
+    lines = str(whole).splitlines()
+    assert lines[0] == "wrong"
+    assert lines[1] == "  file:   a.yaml, line 3"
+    assert lines[3].startswith("  value:  'xxx")
+    assert len(lines[3]) < 140
+    assert lines[4] == "  remedy: mend it"
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys; from pipeline import cli; cli.parser('pipeline.toy', 'Do.').format_help();"
+        "print([name for name in ('jax', 'numpy', 'pydantic', 'tqdm') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+TERMINATED = """
+import os, signal, sys
+from pathlib import Path
+from pipeline import cli
+
+def work(args):
+    try:
+        os.kill(os.getpid(), signal.SIGTERM)
+    finally:
+        Path(sys.argv[1]).touch()
+
+sys.exit(cli.run(work, cli.parser("toy", "Do.", study=False), []))
+"""
+
+
+def test_a_termination_unwinds(tmp_path: Path) -> None:
+    mark = tmp_path / "put away"
+    command = [sys.executable, "-c", TERMINATED, str(mark)]
+    done = subprocess.run(command, capture_output=True, env=dict(os.environ), check=False)
+    assert done.returncode == 128 + signal.SIGTERM
+    assert mark.exists()

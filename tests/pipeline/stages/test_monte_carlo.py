@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets, problem
+from pipeline.posing import scene_of
+from pipeline.posing.perturbed import noises, simulate
+from pipeline.stages import monte_carlo, verify
+from sim.core import SimulationError
+from tests.pipeline import static, unchanged
+
+MORE = "robustness: { samples: 4, geometry: [0.05], stiffness: [0.1], seed: 3 }\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small study with a hole, and the design that changes nothing."""
+    folder = tmp_path_factory.mktemp("hole")
+    path = static.write(folder, static.HOLE + MORE, size=5, amplitude=3.0)
+    unchanged.write(path)
+    return folder
+
+
+def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
+    words = [
+        *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
+        *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
+    ]
+    assert monte_carlo.main(words) == 0
+    return datasets.read(out, "scatter")
+
+
+@pytest.fixture(scope="module")
+def whole(folder: Path) -> xr.Dataset:
+    return run(folder, folder / "scatter.nc")
+
+
+def test_every_copy_is_another_one(whole: xr.Dataset) -> None:
+    assert list(whole["noise"].values) == ["geometry 5 %", "stiffness 10 %"]
+    assert (whole["status"] == "ok").all()
+    assert len(np.unique(whole["loss"])) == 8
+    np.testing.assert_allclose(whole["time"], [0.25, 0.5, 0.75, 1.0])
+
+
+@pytest.mark.usefixtures("whole")
+def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
+    parts = [tmp_path / f"scatter_{k}.nc" for k in range(2)]
+    for k, part in enumerate(parts):
+        run(folder, part, k, 2)
+    out = tmp_path / "scatter.nc"
+    assert monte_carlo.main(["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    assert out.read_bytes() == (folder / "scatter.nc").read_bytes()
+
+
+def test_without_noise_every_copy_is_the_design(folder: Path) -> None:
+    asked = problem.load(folder / "problem.yaml")
+    assert asked.robustness is not None
+    none = asked.robustness.model_copy(update={"geometry": (0.0,), "stiffness": (0.0,)})
+    scene = scene_of(asked, folder)
+    made = simulate(scene, scene.lattice.vertices, none, [0, 1], 1)
+    checked = verify.checks(asked, folder, datasets.read(folder / "design.nc", "design"))
+    as_run = checked["loss"].sel(check="as run", structure="cloaked")
+    np.testing.assert_allclose(made["loss"], float(as_run), rtol=1e-9)
+
+
+def test_a_copy_that_fails_keeps_its_reason(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from sim.solvers import batch
+    from sim.solvers import solve_case as solve
+
+    calls = []
+
+    def failing(*given: object) -> object:
+        calls.append(given)
+        if len(calls) == 2:
+            raise SimulationError("no equilibrium found beyond load 3 of 4")
+        return solve(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(batch, "solve_case", failing)
+    asked = problem.load(folder / "problem.yaml")
+    assert asked.robustness is not None
+    scene = scene_of(asked, folder)
+    made = simulate(scene, scene.lattice.vertices, asked.robustness, [0, 1, 2], 1)
+    first = made.sel(noise=noises(asked.robustness)[0].name)
+    assert list(first["status"].values) == ["ok", "no equilibrium found beyond load 3 of 4", "ok"]
+    assert np.isnan(first["loss"].values).tolist() == [False, True, False]
+
+
+def test_a_problem_without_copies_is_told(
+    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    words = ["--design", str(folder / "design.nc"), "--chunk", "0", "--chunks", "1"]
+    out = ["--out", str(tmp_path / "scatter.nc")]
+    assert monte_carlo.main(["run", "--problem", str(path), *words, *out]) == 2
+    assert "robustness" in capfd.readouterr().err
+
+
+def test_finer_load_steps_pass_the_same_states(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "verification.nc"
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    assert verify.main([*words, "--out", str(out)]) == 0
+    made = datasets.read(out, "verification")
+    assert list(made["check"].values)[:3] == ["as run", "2 x load steps", "10 x load steps"]
+    finer = made.isel(check=slice(0, 3))
+    assert float(finer["departure"].max()) < 1e-6
+    loss = finer["loss"].sel(structure="cloaked")
+    assert abs(float(loss[2] / loss[0]) - 1) < 0.2
+    assert (finer["unstable"] == 0).all()

@@ -1,0 +1,74 @@
+"""A design by the angle law with contact on distance: kept where both agree, else optimised."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets, problem
+from pipeline.posing import law_comparison
+from pipeline.stages import redesign, simulate
+from tests.pipeline.static import GEOMETRIC as BUDGET
+
+
+@pytest.fixture(scope="module")
+def study(hole: list[str]) -> Path:
+    """Folder of a problem with design.nc and response.nc."""
+    folder = Path(hole[1]).parent
+    shipped, response = str(folder / "design.nc"), str(folder / "response.nc")
+    assert simulate.main([*hole, response, "--design", shipped]) == 0
+    return folder
+
+
+def reconsidered(study: Path, out: Path, factor: float) -> tuple[xr.Dataset, xr.Dataset]:
+    """The second design, were the cloak's loss with contact on distance so many times larger."""
+    response = datasets.read(study / "response.nc", "response")
+    cloak = {"structure": "cloaked", "contact_law": "geometric"}
+    response["loss_by_contact"].loc[cloak] *= factor
+    told, second, moved = out / "told.nc", out / "second.nc", out / "moved.nc"
+    datasets.write(response, told, "response", response.attrs)
+    options = ["--problem", str(study / "problem.yaml"), "--quiet", "--out"]
+    first = ["--design", str(study / "design.nc"), "--response", str(told)]
+    assert redesign.main([*options, str(second), *first]) == 0
+    assert simulate.main([*options, str(moved), "--design", str(second), "--geometric"]) == 0
+    return datasets.read(second, "design"), datasets.read(moved, "response")
+
+
+def test_a_design_on_which_both_laws_agree_is_kept(study: Path, tmp_path: Path) -> None:
+    first = datasets.read(study / "design.nc", "design")
+    second, moved = reconsidered(study, tmp_path, 1.09)
+    np.testing.assert_allclose(second["vertices"], first["vertices"], atol=1e-12)
+    assert second.sizes["evaluation"] == 1
+    angle, distance = law_comparison.cloak_losses(moved)
+    assert distance == pytest.approx(moved["loss"].sel(structure="cloaked").item(), rel=1e-9)
+    assert distance == pytest.approx(angle, rel=1e-9)
+
+
+def test_another_design_is_optimised_from_there(study: Path, tmp_path: Path) -> None:
+    first = datasets.read(study / "design.nc", "design")
+    second, moved = reconsidered(study, tmp_path, 1.11)
+    losses = second["loss"].values[0]
+    assert len(losses) == BUDGET
+    assert losses[0] == pytest.approx(float(first["best_loss"][0]), rel=1e-6)
+    assert float(second["best_loss"][0]) < losses[0]
+    assert moved["loss"].sel(structure="cloaked").item() == pytest.approx(losses.min(), rel=1e-6)
+    assert moved["overlaps"].sel(structure="cloaked").item() == 0
+
+
+def test_a_design_that_cannot_be_simulated_is_begun_anew(study: Path, tmp_path: Path) -> None:
+    second, moved = reconsidered(study, tmp_path, np.nan)
+    altered = moved["loss"].sel(structure="altered").item()
+    assert float(second["loss"][0, 0]) == pytest.approx(altered, rel=1e-6)
+
+
+def test_the_budget_enters_the_hash_of_this_stage_only(study: Path) -> None:
+    asked = problem.load(study / "problem.yaml")
+    optimiser = asked.optimiser.model_copy(
+        update={"geometric": asked.optimiser.geometric.model_copy(update={"evaluations": 9})}
+    )
+    other = asked.model_copy(update={"optimiser": optimiser})
+    assert problem.section_hash(other, "design") == problem.section_hash(asked, "design")
+    assert problem.section_hash(other, "geometric") != problem.section_hash(asked, "geometric")

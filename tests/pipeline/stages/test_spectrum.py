@@ -1,0 +1,103 @@
+"""Modes, transmission and waves of a small study, and the page that shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets
+from pipeline.stages import spectrum
+from reports.products.spectrum import build
+from tests.pipeline.static import HOLE, write
+
+ASKED = """
+spectrum:
+  modes: {modes}
+  transmission: {{ from: 1 Hz, to: 101 Hz, points: 3 }}
+  compressions: [0, {compression}]
+  waves: 3
+"""
+
+
+@pytest.fixture
+def design(hole: list[str]) -> Path:
+    return Path(hole[1]).with_name("design.nc")
+
+
+def options(folder: Path, modes: int = 4, compression: float = 0.02) -> list[str]:
+    folder.mkdir(exist_ok=True)
+    asked = ASKED.format(modes=modes, compression=compression)
+    path = write(folder, HOLE + asked, size=5, amplitude=3.0)
+    return ["--problem", str(path), "--quiet"]
+
+
+def analysed(design: Path, folder: Path) -> Path:
+    out = folder / "spectrum.nc"
+    words = [*options(folder), "--design", str(design), "--out", str(out)]
+    assert spectrum.main(words) == 0
+    return out
+
+
+def test_every_structure_about_every_equilibrium(design: Path, tmp_path: Path) -> None:
+    found: xr.Dataset = datasets.read(analysed(design, tmp_path), "spectrum")
+    assert found["structure"].values.tolist() == ["intact", "altered", "cloaked"]
+    assert found["state"].values.tolist() == ["at rest", "loaded"]
+    assert (found["frequency"] > 0).all()
+    assert (found["frequency"].diff("mode") >= 0).all()
+    void = found["region"] == 3
+    assert found["mode_shape"].sel(structure="cloaked", unit=void).isnull().all()
+    size = np.hypot(*found["mode_shape"].transpose("dof", ..., "unit").values[:2])
+    assert np.nanmax(size, axis=-1) == pytest.approx(1.0)
+    assert (found["equilibrium"].sel(state="at rest").fillna(0) == 0).all()
+    pushed = found["equilibrium"].sel(state="loaded", dof="ux", unit=4).values
+    assert pushed == pytest.approx(-3.0)
+    sound = found["band_frequency"].isel(wave=[0, -1], band=slice(2)).values
+    assert np.abs(sound).max() < 1e-2
+    assert found["lateral_strain"].values == pytest.approx([0.0, -0.02], abs=1e-4)
+
+
+def test_what_cannot_be_analysed_is_one_message(
+    design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "spectrum.nc")
+    plain = ["--problem", str(write(tmp_path, HOLE, size=5, amplitude=3.0)), "--quiet"]
+    many, folded = (
+        options(tmp_path / name, **asked)
+        for name, asked in (("many", {"modes": 500}), ("folded", {"compression": 0.7}))
+    )
+    for words, key in (
+        (plain, "spectrum"),
+        (many, "spectrum.modes"),
+        (folded, "spectrum.compressions"),
+    ):
+        assert spectrum.main([*words, "--design", str(design), "--out", out]) == 2
+        told = capsys.readouterr().err
+        assert f"key:    {key}" in told
+        assert "problem.yaml" in told
+    assert not Path(out).exists()
+
+
+def test_the_page_holds_the_figure_and_its_curves(design: Path, tmp_path: Path) -> None:
+    made = analysed(design, tmp_path)
+    pages = []
+    for name in ("one", "two"):
+        out = tmp_path / name
+        words = [*options(tmp_path), "--spectrum", str(made), "--out-dir", str(out)]
+        assert build.main(words) == 0
+        pages.append({path.name: path.read_bytes() for path in out.iterdir()})
+    assert pages[0] == pages[1]
+    assert b"<svg" in pages[0]["index.html"]
+    assert pages[0]["modes.csv"].startswith(b"structure,state,mode,value\n")
+    assert pages[0]["modes.csv"].count(b"\n") == 1 + 3 * 2 * 4
+
+
+def test_a_spectrum_of_another_problem_is_refused(
+    design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = analysed(design, tmp_path)
+    words = [*options(tmp_path, modes=3), "--spectrum", str(made), "--out-dir", str(tmp_path)]
+    assert build.main(words) == 2
+    assert "another problem" in capsys.readouterr().err

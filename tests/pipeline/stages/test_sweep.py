@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets, problem
+from pipeline.posing import scene_of, setting_losses
+from pipeline.problem.sections import Sweep, sweep_cases
+from pipeline.runtime import Casebook, SweepResult, UserError, case_log
+from pipeline.stages import sweep
+from sim.scene import evaluator, make_plan
+from tests.pipeline import static, unchanged
+
+GRID = """sweep:
+  grid:
+    cloak.disc.radius: [22 mm, 20 mm, 500 mm]
+    material.bending_stiffness: { from: 1 N mm/rad, to: 2 N mm/rad, points: 2 }
+"""
+RANDOM = """sweep:
+  random:
+    drive.amplitude: { from: 1 mm, to: 2 mm }
+    material.bending_stiffness: { mean: 1.5 N mm/rad, deviation: 0.1 N mm/rad }
+    cloak.disc.radius: { from: 15 mm, to: 25 mm }
+  samples: 3
+"""
+
+
+def folder_of(path: Path, more: str) -> Path:
+    unchanged.write(static.write(path, static.HOLE + more, size=5, amplitude=2.0))
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small study with a hole and a grid of parameters."""
+    return folder_of(tmp_path_factory.mktemp("hole"), GRID)
+
+
+def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
+    words = [
+        *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
+        *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
+    ]
+    assert sweep.main(words) == 0
+    return datasets.read(out, "sweep")
+
+
+@pytest.fixture(scope="module")
+def whole(folder: Path) -> xr.Dataset:
+    return run(folder, folder / "sweep.nc")
+
+
+def test_the_first_key_of_a_grid_varies_fastest(whole: xr.Dataset) -> None:
+    assert list(whole["parameter"].values) == ["cloak.disc.radius", "material.bending_stiffness"]
+    assert list(whole["parameter_units"].values) == ["mm", "N mm/rad"]
+    expected = [[22, 1], [20, 1], [500, 1], [22, 2], [20, 2], [500, 2]]
+    np.testing.assert_array_equal(whole["value"], expected)
+
+
+def test_a_case_is_the_problem_with_its_setting(folder: Path, whole: xr.Dataset) -> None:
+    path = folder / "other" / "problem.yaml"
+    path.parent.mkdir()
+    text = (folder / "problem.yaml").read_text().partition("sweep:")[0]
+    path.write_text(text.replace("bending_stiffness: 1.5", "bending_stiffness: 2"))
+    scene = scene_of(problem.load(path), folder)
+    loss, _, _ = evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
+    assert float(whole["loss_altered"][3]) == pytest.approx(loss, rel=1e-9)
+    assert float(whole["loss"][3]) == pytest.approx(loss, rel=1e-9)  # of a design without a change
+
+
+def test_a_case_that_fails_keeps_its_reason(whole: xr.Dataset) -> None:
+    fine = [True, True, False, True, True, False]
+    assert (whole["status"].values == "ok").tolist() == fine
+    assert np.isfinite(whole["loss"].values).tolist() == fine
+    assert all("cloak" in reason for reason in whole["status"].values[[2, 5]])
+
+
+def test_parts_join_to_the_whole(folder: Path, whole: xr.Dataset, tmp_path: Path) -> None:
+    del whole
+    parts = [tmp_path / f"sweep_{k}.nc" for k in range(4)]
+    for k, part in enumerate(parts):
+        run(folder, part, k, 4)
+    out = tmp_path / "sweep.nc"
+    assert sweep.main(["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
+
+
+def test_a_killed_sweep_goes_on(
+    folder: Path, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "sweep.nc"
+    (begun,) = folder.glob(".journal/sweep_*/part_0.csv")
+    kept = tmp_path / ".journal" / begun.parent.name / "part_0.csv"
+    kept.parent.mkdir(parents=True)
+    kept.write_bytes(begun.read_bytes()[: begun.read_bytes().index(b"\n3,") + 9])
+    assert sorted(case_log.known(kept.parent)) == [0, 1, 2]
+    simulated = []
+    results = setting_losses.results
+
+    def counted(*given: object) -> list[SweepResult]:
+        simulated.append(given)
+        return results(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(setting_losses, "results", counted)
+    xr.testing.assert_identical(run(folder, out), whole)
+    assert len(simulated) == 3
+    assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
+    assert kept.read_bytes() == begun.read_bytes()
+
+
+def test_results_are_read_while_they_come(tmp_path: Path) -> None:
+    path = tmp_path / "part_0.csv"
+    with Casebook(path, ["drive.amplitude"]) as book:
+        book.add([(7, ["2 mm"], SweepResult(0.1, 1 / 3, -0.2))])
+        book.add([(8, ["3 mm"], SweepResult.failed("no\nequilibrium"))])
+        found = case_log.known(tmp_path)
+    assert found[7] == SweepResult(0.1, 1 / 3, -0.2)
+    assert np.isnan(found[8].loss)
+    assert found[8].status == "no equilibrium"
+
+
+def test_random_cases_do_not_depend_on_their_number(tmp_path: Path) -> None:
+    few = problem.load(static.write(tmp_path, static.HOLE + RANDOM)).sweep
+    assert few is not None
+    many = few.model_copy(update={"samples": 50})
+    drawn = list(sweep_cases.settings(many))
+    assert list(sweep_cases.settings(few)) == drawn[:3]
+    values = np.array([[float(str(word).split()[0]) for word in case.values()] for case in drawn])
+    assert len(np.unique(values[:, 0])) == 50
+    assert ((values[:, 0] > 1) & (values[:, 0] < 2)).all()
+    assert abs(values[:, 1].mean() - 1.5) < 0.05
+
+
+def test_values_side_by_side() -> None:
+    wanted = Sweep.model_validate({"list": {"a.b": ["1 mm", "2 mm"], "c": ["x", "y"]}})
+    assert list(sweep_cases.settings(wanted)) == [
+        {"a.b": "1 mm", "c": "x"},
+        {"a.b": "2 mm", "c": "y"},
+    ]
+    assert sweep_cases.unit_of(wanted, "c") == "1"
+
+
+def test_directions_are_load_cases_of_one_scene() -> None:
+    grid = {"drive.directions": ["0 deg", "90 deg"], "drive.frequency": ["2 Hz", "3 Hz", "4 Hz"]}
+    wanted = Sweep.model_validate({"grid": grid})
+    parts = [sweep_cases.part(wanted, k, 2) for k in range(2)]
+    assert [group.numbers for part in parts for group in part] == [
+        range(2),
+        range(2, 4),
+        range(4, 6),
+    ]
+    assert parts[1][0].together == {
+        "drive.directions": ["0 deg", "90 deg"],
+        "drive.frequency": "3 Hz",
+    }
+
+
+def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
+    asked = problem.load(folder / "problem.yaml")
+    vertices = datasets.read(folder / "design.nc", "design")["vertices"]
+    for setting, why in (
+        ({"cloak.disc.radius": "500 mm"}, "cloak"),
+        ({"lattice.columns": 7}, "another number of units"),
+        ({"drive.amplitude": "-1 mm"}, "greater than zero"),
+    ):
+        with pytest.raises(setting_losses.UnposedError, match=why):
+            setting_losses.results(asked, setting, folder, vertices, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("sweep: { grid: { drive.amplitude: [1 mm, 2] } }", "several units"),
+        ("sweep: { list: { drive.amplitude: [1 mm], horizon.steps: [2, 3] } }", "more values"),
+        ("sweep: { random: { drive.amplitude: { from: 1 mm, to: 2 mm } } }", "belong together"),
+        ("sweep: { grid: { drive.hue: [1] } }", "unknown key"),
+        ("sweep: { grid: { horizon.steps: [1 mm] } }", "not a whole number"),
+    ],
+)
+def test_a_faulty_sweep_is_told(tmp_path: Path, text: str, why: str) -> None:
+    with pytest.raises(UserError, match=why):
+        problem.load(static.write(tmp_path, static.HOLE + text))

@@ -1,0 +1,85 @@
+"""A commercial DIC system's points become a track."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets
+from pipeline.stages import track
+from pipeline.tracking.frames import import_video
+from pipeline.tracking.geometry import of_design
+from tests.pipeline.virtual_lab.conftest import GRID
+
+SMALL = GRID | {"grid": [4, 4]}
+ORIGIN, ROTATION = np.array([100.0, 40.0]), np.deg2rad(30.0)
+NOISE = 0.002
+AXES = "origin: [100 mm, 40 mm]\nrotation: 30 deg\nflipped: true\n"
+
+
+@pytest.fixture
+def export(tmp_path: Path) -> tuple[Path, np.ndarray]:
+    """A YAML beside its CSV, y downwards and turned; and the motion (2, 16, 3) of the units."""
+    design = import_video.design(SMALL)
+    datasets.write(design, tmp_path / "design.nc", "design", {"problem": "{}"})
+    specimen = of_design(design)
+    random = np.random.default_rng(4)
+    motion = np.zeros((2, 16, 3))
+    motion[1] = random.uniform(-2, 2, (16, 3)) * [1, 1, 0.4]
+    turn = np.array([[np.cos(ROTATION), -np.sin(ROTATION)], [np.sin(ROTATION), np.cos(ROTATION)]])
+    lines = ["Exported by a DIC system", "", "t;X [mm];Y [mm];dX [mm];dY [mm]"]
+    for step in range(2):
+        for unit in range(16):
+            arm = random.uniform(-3, 3, (30, 2))
+            cos, sin = np.cos(motion[step, unit, 2]), np.sin(motion[step, unit, 2])
+            gone = arm @ np.array([[cos, sin], [-sin, cos]]) + motion[step, unit, :2] - arm
+            gone += NOISE * random.normal(size=gone.shape)
+            gone[0] += 1.0  # a point that went astray
+            place = (specimen.centre[unit] + arm) @ turn.T * [1, -1] + ORIGIN
+            table = np.column_stack([np.full(30, 5.0 + step), place, gone @ turn.T * [1, -1]])
+            lines += [";".join(f"{value:.6f}" for value in row) for row in table]
+    lines.append("6.0;100.0;;0.1;0.1")
+    (tmp_path / "dic.csv").write_text("\n".join(lines), encoding="utf-8")
+    names = "{time: t, x: 'X [mm]', y: 'Y [mm]', ux: 'dX [mm]', uy: 'dY [mm]'}"
+    text = f"points: dic.csv\ndesign: design.nc\ncolumns: {names}\n{AXES}"
+    (tmp_path / "points.yaml").write_text(text, encoding="utf-8")
+    return tmp_path / "points.yaml", motion
+
+
+def test_points_become_the_motions_of_their_units(export: tuple[Path, np.ndarray]) -> None:
+    path, motion = export
+    out = path.with_name("track.nc")
+    assert track.main(["points", str(path), "--out", str(out)]) == 0
+    made = datasets.read(out, "track")
+    np.testing.assert_allclose(made["time"], [0.0, 1.0])
+    error = made["displacement"].values - motion
+    assert np.abs(error[..., :2]).max() < 4 * NOISE
+    assert 0.6 < np.std(error / made["sigma"].values) < 1.4
+    assert (made["quality"] == 0).all()
+    assert made.attrs["synthetic"] == "no"
+    assert out.with_suffix(".csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        (AXES, "", "units bear points"),
+        ("X [mm]", "Z [mm]", "columns are missing"),
+        ("dic.csv", "none.csv", "no such file"),
+        ("rotation: 30 deg", "rotation: 30", "rotation"),
+    ],
+)
+def test_points_that_do_not_fit_are_refused(
+    export: tuple[Path, np.ndarray],
+    capsys: pytest.CaptureFixture[str],
+    old: str,
+    new: str,
+    told: str,
+) -> None:
+    path, _ = export
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+    assert track.main(["points", str(path), "--out", str(path.with_name("track.nc"))]) == 2
+    assert told in capsys.readouterr().err
+    assert not path.with_name("track.nc").exists()

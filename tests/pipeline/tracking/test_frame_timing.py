@@ -1,0 +1,119 @@
+"""Faults of timing and stated uncertainties, on motions that are made up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.tracking.frames import video
+from pipeline.tracking.motion import frame_timing, uncertainty
+
+NOISE = 0.004
+FRAMES = 60
+CENTRE = np.stack(np.meshgrid(*2 * [np.arange(8) * 15.0]), axis=-1).reshape(-1, 2)
+
+
+def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Units that swing in two shapes, and noise."""
+    random = np.random.default_rng(seed)
+    swing = np.sin(2 * np.pi * clock / 25)[:, None] * CENTRE[:, 0] / 60
+    sway = np.cos(2 * np.pi * clock / 37)[:, None] * CENTRE[:, 1] / 80
+    turn = 0.2 * swing * np.where(CENTRE.sum(axis=1) / 15 % 2 == 0, 1, -1)
+    made = np.stack([swing, sway, turn], axis=-1)
+    return made + NOISE * random.normal(size=made.shape)
+
+
+def faults(clock: np.ndarray, time: np.ndarray | None = None) -> dict[int, int]:
+    moved = motion(clock)
+    told = frame_timing.faults(
+        np.arange(len(clock)) / 30 if time is None else time, moved, np.full(moved.shape, NOISE)
+    )
+    return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
+
+
+def test_even_frames_have_no_fault() -> None:
+    assert faults(np.arange(FRAMES, dtype=float)) == {}
+
+
+@pytest.mark.parametrize("frame", [12, 25, 40])
+def test_a_gap_is_found(frame: int) -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[frame:] += 1
+    assert faults(clock) == {frame: frame_timing.DROPPED}
+
+
+def test_a_gap_that_the_file_tells_is_none() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[25:] += 1
+    assert faults(clock, clock / 30) == {}
+
+
+def test_frames_shown_again_are_found() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[25:] -= 1
+    moved = motion(clock)
+    moved[25] = moved[24]
+    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert np.flatnonzero(told).tolist() == [25]
+    assert told[25] == frame_timing.DUPLICATE
+
+
+@pytest.mark.parametrize("step", [0.05, 0.5, 5.0])
+def test_the_onset_of_motion_is_no_fault(step: float) -> None:
+    """A specimen that rests in the beginning and is then driven, or creeps and is then turned."""
+    clock = np.maximum(np.arange(FRAMES) - 20.0, 0.02 * (np.arange(FRAMES) - 20.0))
+    moved = step * clock[:, None, None] * (1 + CENTRE[:, :1] / 60) * np.array([1.0, -0.3, 0.01])
+    moved += NOISE * np.random.default_rng(1).normal(size=moved.shape)
+    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert np.flatnonzero(told).tolist() == []
+
+
+def wave(clock: np.ndarray) -> np.ndarray:
+    """Units over which a wave runs, of twelve frames and ten units, and noise."""
+    made = np.zeros((len(clock), len(CENTRE), 3))
+    made[..., 0] = 0.4 * np.sin(2 * np.pi * (clock[:, None] / 12 - CENTRE[:, 0] / 150))
+    return made + NOISE * np.random.default_rng(1).normal(size=made.shape)
+
+
+def test_faults_of_a_quick_wave_are_found() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    clock[15:] += 1
+    clock[40:] -= 1
+    moved = wave(clock)
+    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert {int(frame): int(told[frame]) for frame in np.flatnonzero(told)} == {
+        15: frame_timing.DROPPED,
+        40: frame_timing.DUPLICATE,
+    }
+
+
+@pytest.mark.parametrize("frames", [8, 12, 16])
+def test_the_turning_points_of_a_swing_are_no_faults(frames: int) -> None:
+    moved = np.zeros((FRAMES, len(CENTRE), 3))
+    moved[..., 0] = np.cos(2 * np.pi * (np.arange(FRAMES)[:, None] - 0.5) / frames)
+    moved += NOISE * np.random.default_rng(2).normal(size=moved.shape)
+    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    assert not told.any()
+
+
+def test_stated_uncertainty_is_that_of_the_noise() -> None:
+    clock = np.arange(FRAMES, dtype=float)
+    moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
+    moved[20:30, 5] = np.nan
+    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE / 5), CENTRE, steady)
+    assert np.median(told) == pytest.approx(NOISE, rel=0.15)
+
+
+def test_units_that_are_seen_badly_say_so() -> None:
+    random = np.random.default_rng(1)
+    clock = np.arange(FRAMES, dtype=float)
+    moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
+    moved[:, 9] += 4 * NOISE * random.normal(size=moved[:, 9].shape)
+    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE), CENTRE, steady)
+    assert np.median(told[:, 9]) > 2.5 * np.median(told)
+
+
+def test_a_varying_rate_is_told_from_rounded_stamps() -> None:
+    steady = np.arange(FRAMES) / 30
+    assert not video.uneven(np.round(steady, 3))
+    assert video.uneven(np.delete(steady, [7, 30]))

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.runtime import UserError
+from pipeline.tracking.frames import csv_columns, load_cell
+from pipeline.tracking.frames.recording import LoadCellLog
+
+TIME = np.arange(5) / 10
+
+
+def log(folder: Path, text: str) -> Path:
+    path = folder / "load.csv"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_coarse_log_is_read_on_the_clock_of_the_video(tmp_path: Path) -> None:
+    path = log(tmp_path, "time,force\n10.0,0.0\n10.2,2.0\n10.3,2.0\n")
+    found = load_cell.forces(load_cell.read(path, LoadCellLog(file="load.csv", offset=10.0)), TIME)
+    np.testing.assert_allclose(found, [0.0, 1.0, 2.0, 2.0, np.nan])
+
+
+def test_a_fine_log_is_averaged_over_each_frame(tmp_path: Path) -> None:
+    clock = np.arange(0, 0.5, 0.001)
+    force = 3.0 + clock + (-1.0) ** np.arange(len(clock))
+    rows = "\n".join(f"{t:.3f};{f:.6f}" for t, f in zip(clock, force, strict=True))
+    rows = rows.replace(".", ",")
+    path = log(tmp_path, f"Machine 7;\nt [s];F [N]\n{rows}\n")
+    cell = LoadCellLog(file="load.csv", time="t [s]", force="F [N]")
+    found = load_cell.forces(load_cell.read(path, cell), TIME)
+    np.testing.assert_allclose(found[1:4], 3.0 + TIME[1:4], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "offset", "told"),
+    [
+        ("time,load\n0,1\n", 0.0, "columns are missing"),
+        ("time,force\nx,y\n", 0.0, "no line holds numbers"),
+        ("time,force\n0,1\n0,2\n1,2\n", 0.0, "does not ascend"),
+        ("time,force\n0,1\n1,2\n", 50.0, "do not overlap"),
+    ],
+)
+def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told: str) -> None:
+    path, cell = log(tmp_path, text), LoadCellLog(file="load.csv", offset=offset)
+    with pytest.raises(UserError, match=told) as caught:
+        load_cell.check(load_cell.read(path, cell), TIME, path, cell)
+    assert caught.value.remedy
+
+
+def test_a_log_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="no such file"):
+        csv_columns.read(tmp_path / "none.csv", ["a"])

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import yaml
+
+from pipeline import datasets
+from pipeline.stages import film as virtual_lab
+from pipeline.stages import track
+from pipeline.virtual_lab.filming import Filming
+from tests.pipeline.virtual_lab.conftest import SETUP
+
+
+def recording(folder: Path, **changes: object) -> Path:
+    path = folder / "asked.yaml"
+    setup = {**SETUP, "end": "0.3 s", **changes}
+    path.write_text(yaml.safe_dump({"specimen": "dots", "virtual": setup}), encoding="utf-8")
+    return path
+
+
+def render(files: Path, asked: Path, out: Path) -> int:
+    words = ["render", str(asked), "--response", str(files / "response.nc"), "--quiet"]
+    return virtual_lab.main([*words, "--design", str(files / "design.nc"), "--out", str(out)])
+
+
+def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> None:
+    """With a load cell, and with all that comes beside the track."""
+    out = tmp_path / "run.mp4"
+    assert render(files, recording(tmp_path), out) == 0
+    (tmp_path / "load.csv").write_text("s,N\n5,0\n6,10\n", encoding="utf-8")
+    described = out.with_suffix(".yaml").read_text(encoding="utf-8")
+    assert "synthetic: true\n" in described
+    with out.with_suffix(".yaml").open("w", encoding="utf-8") as file:
+        file.write(described.replace("synthetic: true\n", ""))  # the video itself says so
+        file.write("load_cell: {file: load.csv, time: s, force: N, offset: 5}\n")
+    assert track.main([str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")]) == 0
+    made = datasets.read(tmp_path / "track.nc", "track")
+    truth = datasets.read(tmp_path / "run_truth.nc", "truth")
+    assert made.attrs["synthetic"] == truth.attrs["synthetic"] == "yes"
+    np.testing.assert_allclose(made["time"], truth["time"], atol=1e-4)
+    error = (made["displacement"] - truth["displacement"]).values
+    assert np.sqrt(np.mean(error[..., :2] ** 2)) / 0.365 < 0.06
+    np.testing.assert_allclose(made["load_force"], 10 * made["time"], atol=1e-3)
+    lines = (tmp_path / "track.csv").read_text(encoding="utf-8").splitlines()
+    assert "SYNTHETIC" in lines[0]
+    assert len(lines) == 2 + made["quality"].size
+    assert "SYNTHETIC" in (tmp_path / "track_report/index.html").read_text(encoding="utf-8")
+    assert (tmp_path / "track_report/overlay.mp4").exists()
+    with av.open(str(out)) as video:
+        assert "SYNTHETIC" in video.metadata["comment"]
+        assert float(video.streams.video[0].average_rate or 0) == 20.0
+
+
+@pytest.mark.parametrize("codec", ["h264", "ffv1"])
+def test_the_same_recording_gives_the_same_bytes(files: Path, tmp_path: Path, codec: str) -> None:
+    asked = recording(tmp_path, end="0.1 s", codec={"name": codec})
+    outs = [tmp_path / name / "run.mp4" for name in ("a", "b")]
+    assert [render(files, asked, out) for out in outs] == [0, 0]
+    first, second = (
+        [path.read_bytes() for path in sorted(out.parent.glob("run*.[mn]*"))] for out in outs
+    )
+    assert len(first) == 2
+    assert first == second
+
+
+def test_the_specimen_rests_first_and_then_moves(film: Filming) -> None:
+    assert (film.motion.pose[:3] == 0).all()
+    assert (np.abs(film.motion.pose[4:]).max(axis=(1, 2)) > 0).all()
+    np.testing.assert_allclose(film.motion.pose[12, 0, 2], -0.3 * 0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"camera": {"image": [128, 128]}}, "does not fit"),
+        ({"start": "7 s"}, "has ended by then"),
+        ({"rate": "20"}, "rate"),
+    ],
+)
+def test_what_cannot_be_filmed_is_refused(
+    files: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: dict[str, object],
+    told: str,
+) -> None:
+    out = tmp_path / "out/run.mp4"
+    assert render(files, recording(tmp_path, **change), out) == 2
+    assert told in capsys.readouterr().err
+    assert not out.parent.exists()
+
+
+def test_a_plan_tells_what_to_expect(files: Path, tmp_path: Path) -> None:
+    words = ["plan", "--response", str(files / "response.nc"), "--frames", "16", "--quiet"]
+    words += [str(recording(tmp_path)), "--codec", "ffv1", "h264:40"]
+    assert virtual_lab.main([*words, "--csv", str(tmp_path / "plan.csv")]) == 0
+    with (tmp_path / "plan.csv").open(encoding="utf-8") as file:
+        lossless, coarse = csv.DictReader(file)
+    assert lossless["codec"] == "ffv1"
+    assert float(lossless["px_per_pitch"]) == pytest.approx(41.1)
+    assert 0 < float(lossless["rmse_px"]) < float(coarse["rmse_px"])
+    assert lossless["lost_percent"] == "0"
+
+
+def test_a_plan_without_sense_is_refused(
+    files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", "--response", str(files / "response.nc"), "--csv", str(tmp_path / "plan.csv")]
+    assert virtual_lab.main([*words, "--codec", "vhs"]) == 2
+    assert virtual_lab.main([*words, "--fps", "-3"]) == 2
+    told = capsys.readouterr().err
+    assert "no such codec" in told
+    assert "greater than zero" in told
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,63 @@
+"""Sheets of marks are true to scale: read back from the PDF."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets
+from pipeline.tracking.frames import import_video
+from pipeline.virtual_lab import print_markers
+from tests.pipeline.tracking.test_dic_points import SMALL
+
+POINT = 72 / 25.4
+
+
+def drawn(path: Path) -> list[str]:
+    """The drawing commands of every page."""
+    parts = re.findall(rb"stream\r?\n(.*?)~>\s*endstream", path.read_bytes(), re.DOTALL)
+    return [zlib.decompress(base64.a85decode(part)).decode("latin-1") for part in parts]
+
+
+@pytest.fixture
+def design(tmp_path: Path) -> Path:
+    datasets.write(import_video.design(SMALL), tmp_path / "design.nc", "design", {"problem": "{}"})
+    return tmp_path / "design.nc"
+
+
+def test_faces_and_dots_have_their_size(design: Path, tmp_path: Path) -> None:
+    outs = [tmp_path / name / "marks.pdf" for name in ("a", "b")]
+    for out in outs:
+        words = ["--design", str(design), "--out", str(out), "--diameter", "2.5", "--count", "2"]
+        assert print_markers.main([*words, "--spread", "5", "--quiet"]) == 0
+    assert outs[0].read_bytes() == outs[1].read_bytes()
+    (page,) = drawn(outs[0])
+    circles = re.findall(r"([\d.]+) ([\d.]+) m((?: [\d.]+){6} c){4}", page.replace("\n", " "))
+    right = np.array([[float(x), float(y)] for x, y, _ in circles]) / POINT
+    assert len(right) == 2 * 16
+    np.testing.assert_allclose(np.linalg.norm(right[1::2] - right[::2], axis=1), 5.0, atol=1e-2)
+    bar = re.search(r"([\d.]+) 5.669\d* re", page)
+    assert bar is not None
+    assert float(bar.group(1)) / POINT == pytest.approx(100.0, abs=1e-3)
+
+
+def test_speckle_is_thrown_on_all_faces(design: Path, tmp_path: Path) -> None:
+    out = tmp_path / "speckle.pdf"
+    words = ["--design", str(design), "--out", str(out), "--kind", "speckle", "--faces", "light"]
+    assert print_markers.main([*words, "--quiet"]) == 0
+    (page,) = drawn(out)
+    assert page.count(" c ") + page.count(" c\n") > 16 * 10 * 4
+
+
+def test_dots_that_cannot_be_printed_are_refused(
+    design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "marks.pdf"
+    assert print_markers.main(["--design", str(design), "--out", str(out), "--diameter", "40"]) == 2
+    assert "cannot be printed" in capsys.readouterr().err
+    assert not out.exists()

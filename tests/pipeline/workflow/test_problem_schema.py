@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+import yaml
+
+from pipeline.workflow import problem_schema
+
+Problem = dict[str, Any]
+
+
+@pytest.fixture
+def content(fig2: Path) -> Problem:
+    """What fig2's problem file holds."""
+    content: Problem = yaml.safe_load(fig2.read_bytes())
+    return content
+
+
+@pytest.fixture(scope="module")
+def validator() -> jsonschema.Draft202012Validator:
+    """A validator of problem files."""
+    jsonschema.Draft202012Validator.check_schema(problem_schema.schema())
+    return jsonschema.Draft202012Validator(problem_schema.schema())
+
+
+def test_the_committed_schema_is_up_to_date(fig2: Path) -> None:
+    committed = fig2.parents[1] / problem_schema.DEFAULT.name
+    assert committed.read_text(encoding="utf-8") == problem_schema.text(), (
+        "run python -m pipeline.workflow.problem_schema"
+    )
+
+
+def test_the_command_writes_it(tmp_path: Path) -> None:
+    assert problem_schema.main(["--out", str(tmp_path / "schema.json")]) == 0
+    assert json.loads((tmp_path / "schema.json").read_bytes()) == problem_schema.schema()
+
+
+def test_fig2_obeys_it(validator: jsonschema.Draft202012Validator, content: Problem) -> None:
+    assert validator.is_valid(content)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value"),
+    [
+        (("lattice", "spacng"), "15 mm"),
+        (("lattice", "spacing"), 15),
+        (("lattice", "spacing"), "wide"),
+        (("drive", "kind"), "harmonics"),
+        (("presets", "quick", "latice"), {}),
+        (("presets", "quick", "lattice", "columns"), "7"),
+    ],
+)
+def test_mistakes_break_it(
+    keys: tuple[str, ...],
+    value: object,
+    validator: jsonschema.Draft202012Validator,
+    content: Problem,
+) -> None:
+    section = content
+    for key in keys[:-1]:
+        section = section[key]
+    section[keys[-1]] = value
+    assert not validator.is_valid(content)

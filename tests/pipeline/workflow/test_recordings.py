@@ -1,0 +1,55 @@
+"""Which recordings the report of a study shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.workflow.recordings import shown_recordings
+
+VIRTUAL = "structure: cloaked\nvirtual: {}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Recordings of a study that has been given one."""
+    made = tmp_path / "experiments/study/recordings"
+    made.mkdir(parents=True)
+    (made / "cloaked.yaml").write_text(VIRTUAL + "presets: [quick]\n")
+    (made / "altered.yaml").write_text(VIRTUAL.replace("cloaked", "altered"))
+    return made
+
+
+def shown(folder: Path, study: str = "study") -> list[str]:
+    return shown_recordings(study, folder.parents[2])
+
+
+def test_a_preset_shows_those_that_name_it(folder: Path) -> None:
+    assert shown(folder) == ["altered", "cloaked"]
+    assert shown(folder, "study@quick") == ["cloaked"]
+    assert shown(folder, "study@other") == []
+
+
+def test_a_study_without_recordings_shows_none(folder: Path) -> None:
+    assert shown(folder, "another") == []
+
+
+def test_a_film_takes_the_place_of_the_virtual_one_of_its_kind(folder: Path) -> None:
+    (folder / "lab7.yaml").write_text("video: lab7.mp4\nstructure: altered\n")
+    assert shown(folder) == ["cloaked", "lab7"]
+    (folder / "lab8.yaml").write_text("video: lab8.mp4\nstructure: altered\n")
+    assert shown(folder) == ["cloaked", "lab7", "lab8"]
+    (folder / "lab9.yaml").write_text("video: lab9.mp4\nstructure: cloaked\ncase: 1\n")
+    assert shown(folder) == ["cloaked", "lab7", "lab8", "lab9"]
+
+
+def test_a_film_that_a_preset_does_not_show_replaces_nothing_there(folder: Path) -> None:
+    (folder / "lab7.yaml").write_text("video: lab7.mp4\nstructure: cloaked\n")
+    assert shown(folder) == ["altered", "lab7"]
+    assert shown(folder, "study@quick") == ["cloaked"]
+
+
+def test_one_that_cannot_be_read_is_shown_so_that_its_stage_tells_why(folder: Path) -> None:
+    (folder / "broken.yaml").write_text("structure: [")
+    assert shown(folder, "study@quick") == ["broken", "cloaked"]

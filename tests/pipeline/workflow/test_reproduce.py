@@ -1,0 +1,57 @@
+"""What counts as the same results, and how a build that fails is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.workflow import reproduce
+
+
+def written(folder: Path, **files: str) -> Path:
+    for name, text in files.items():
+        path = folder / name.replace("__", "/")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    return folder
+
+
+def test_results_are_compared_and_logs_are_not(tmp_path: Path) -> None:
+    first = written(tmp_path / "a", fig2__design="x", fig2__logs__report="monday", index="i")
+    second = written(tmp_path / "b", fig2__design="x", fig2__logs__report="friday", index="i")
+    assert reproduce.differences(first, second) == (2, [])
+    written(second, fig2__design="y", more="z")
+    assert reproduce.differences(first, second) == (3, ["fig2/design", "more"])
+
+
+def build(text: str) -> object:
+    """A stand-in for the build of a target: it writes another text each time if `text` is empty."""
+    texts = iter(["first", "second"])
+    return lambda _target, folder: written(folder / "results", design=text or next(texts))
+
+
+def test_two_equal_builds_are_reproducible(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduce, "_built", build("same"))
+    assert reproduce.main(["fig2@quick"]) == 0
+    assert (
+        "fig2@quick: two builds have the same bytes (files compared: 1)" in capsys.readouterr().err
+    )
+
+
+def test_files_that_differ_are_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduce, "_built", build(""))
+    assert reproduce.main(["fig2@quick"]) == 2
+    assert "1 of 1 files differ between two builds: design" in capsys.readouterr().err
+
+
+def test_a_build_that_fails_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reproduce, "SOURCES", ())
+    assert reproduce.main(["fig2@quick"]) == 2
+    assert "the build failed" in capsys.readouterr().err

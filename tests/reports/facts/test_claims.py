@@ -1,0 +1,119 @@
+"""The list of the paper's claims, and how they are judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.runtime import UserError
+from reports.facts import Fact, claims, number
+from reports.figures.loading_path import facts as along
+from reports.figures.shielding import facts as shielding
+from reports.study import StudyResults
+
+UNIT = {"1", "mm", "ms", "deg", "%", "Hz", "s"}
+
+
+def test_claims_are_in_words_of_their_own_with_a_line_and_a_unit() -> None:
+    listed = claims.listed().claims
+    assert {claim.study for claim in listed} == {f"fig{n}" for n in range(2, 8)}
+    assert len({(claim.study, claim.fact, claim.relation) for claim in listed}) == len(listed)
+    for claim in listed:
+        value, unit, place = claims.parsed(claim.paper or claim.meaning or "")
+        assert value >= 0
+        assert unit in UNIT
+        assert place <= 1
+
+
+@pytest.mark.parametrize("name", ["fig2", "fig4", "fig5"])
+def test_every_claim_on_a_study_that_can_be_built_has_its_fact(
+    name: str, study: StudyResults, shield: StudyResults, smile: StudyResults
+) -> None:
+    known = {
+        "fig2": lambda: shielding.shielding_facts(study),
+        "fig4": lambda: along.loading_path_facts(shield),
+        "fig5": lambda: along.loading_path_facts(smile),
+    }[name]()
+    for judged in claims.judged(name, known):
+        assert judged.simulation.status in {"holds", "does not hold"}, judged.claim.fact
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("5.2 mm", (5.2, "mm", 0.1)),
+        ("64 %", (64.0, "%", 1.0)),
+        ("15 x 15", (225.0, "1", 1.0)),
+        ("0.35", (0.35, "1", 0.01)),
+    ],
+)
+def test_numbers_are_read_with_their_last_place(
+    text: str, number: tuple[float, str, float]
+) -> None:
+    assert claims.parsed(text) == pytest.approx(number)
+
+
+@pytest.mark.parametrize(
+    ("ours", "relation", "holds"),
+    [
+        (5.24, "is", True),
+        (5.26, "is", False),
+        (5.7, "about", True),
+        (5.73, "about", False),
+        (5.16, "at least", True),
+        (5.1, "at least", False),
+        (5.24, "at most", True),
+        (5.3, "at most", False),
+        (5.2, "above", False),
+        (5.3, "above", True),
+        (5.2, "below", False),
+        (5.1, "below", True),
+    ],
+)
+def test_a_relation_has_its_tolerance(ours: float, relation: claims.Relation, holds: bool) -> None:
+    assert claims.agrees(ours, relation, 5.2, 0.1) is holds
+
+
+def found(*facts: Fact) -> dict[str, claims.JudgedClaim]:
+    return {each.claim.fact: each for each in claims.judged("fig4", facts)}
+
+
+ROTATION = number("rotation_altered", "mean", 10.5, "deg")
+
+
+def test_both_holds_only_where_both_hold() -> None:
+    alone = found(ROTATION)["rotation_altered"]
+    assert (alone.simulation.status, alone.experiment.status) == ("holds", "not yet evaluated")
+    assert alone.both == "not yet evaluated"
+    measured = replace(ROTATION, key="measured_rotation_altered", value=11.5)
+    assert found(ROTATION, measured)["rotation_altered"].both == "holds"
+    off = replace(measured, value=15.0)
+    assert found(ROTATION, off)["rotation_altered"].both == "does not hold"
+
+
+def test_what_is_missing_is_told() -> None:
+    assert found()["rotation_altered"].simulation.why == "study not built"
+    assert found(ROTATION)["rotation_reduction"].simulation.why == "no result"
+    assert found(ROTATION)["rotation_altered"].experiment.why == "no recording compared"
+
+
+def test_multiples_of_the_spacing_are_lengths() -> None:
+    radius = number("interest_radius", "radius", 52.0, "mm")
+    spacing = number("spacing", "spacing", 15.0, "mm")
+    assert found(radius, spacing)["interest_radius"].simulation.status == "holds"
+    off = replace(radius, value=67.5)
+    assert found(off, spacing)["interest_radius"].simulation.status == "does not hold"
+
+
+def test_a_fact_in_another_unit_is_refused() -> None:
+    with pytest.raises(UserError, match="rotation_altered"):
+        found(replace(ROTATION, unit="rad"))
+
+
+def test_the_verdict_counts() -> None:
+    words = claims.verdict(claims.judged("fig4", [ROTATION]))
+    assert words == (
+        "Claims that hold: 1 of 9 (8 not yet evaluated) in simulation, 0 of 3 (3 not yet "
+        "evaluated) in experiment, 0 of 3 (3 not yet evaluated) in both."
+    )

@@ -1,0 +1,240 @@
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from pipeline.comparison import middle_units
+from pipeline.problem.sections import Paper
+from pipeline.runtime import UserError
+from reports.base import style
+from reports.facts import checks, fact_records
+from reports.figures import kinds
+from reports.figures.loading_path import abscissa, content, figure, measures, monte_carlo
+from reports.figures.loading_path import facts as path_facts
+from reports.figures.shielding import facts as shielding
+from reports.figures.study_report import publish
+from reports.panels import payload
+from reports.study import StudyResults
+from tests.reports import compressed_study, figure_assertions
+
+S = 15.0
+
+
+def made(study: StudyResults) -> Figure:
+    with style.styled():
+        return figure_assertions.drawn(figure.draw_loading_path(study))
+
+
+def values(study: StudyResults) -> dict[str, fact_records.Fact]:
+    known = fact_records.quoted(path_facts.loading_path_facts(study), study.problem.report.paper)
+    return {fact.key: fact for fact in known}
+
+
+def motion(study: StudyResults, structure: str) -> np.ndarray:
+    found = study.response["displacement"].sel(structure=structure).isel(case=0)
+    return np.asarray(found.values)
+
+
+def test_the_problem_decides_on_the_report(
+    study: StudyResults, shield: StudyResults, smile: StudyResults
+) -> None:
+    assert kinds.kind_of(study.problem).facts is shielding.shielding_facts
+    assert (
+        kinds.kind_of(study.problem.model_copy(update={"sweep": None})).facts
+        is path_facts.loading_path_facts
+    )
+    assert kinds.kind_of(shield.problem).facts is path_facts.loading_path_facts
+    assert kinds.kind_of(smile.problem).facts is path_facts.loading_path_facts
+
+
+def test_mean_rotation_by_hand(shield: StudyResults) -> None:
+    units = np.flatnonzero(shield.response["roi"].values)
+    for name in ("altered", "cloaked"):
+        turned = motion(shield, name)[:, units, 2]
+        expected = [np.degrees(sum(abs(turn) for turn in row) / len(units)) for row in turned]
+        found = measures.rotation(shield.response).sel(structure=name).isel(case=0)
+        np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert values(shield)["rotation_reduction"].value == pytest.approx(90.0)
+
+
+def test_mimicking_error_by_hand(smile: StudyResults) -> None:
+    units = np.flatnonzero(smile.response["roi"].values)
+    intact, altered = (motion(smile, name)[:, units] for name in ("intact", "altered"))
+
+    def size(field: np.ndarray) -> float:
+        return float(sum((x / S) ** 2 + (y / S) ** 2 + turn**2 for x, y, turn in field) ** 0.5)
+
+    expected = [size(altered[t] - intact[t]) / size(intact[-1]) for t in range(len(intact))]
+    found = measures.measure_of(smile.problem).of(smile.response).sel(structure="altered")
+    np.testing.assert_allclose(found.isel(case=0), expected, rtol=1e-12)
+    assert measures.measure_of(smile.problem).of(smile.response).sel(structure="intact").max() == 0
+
+
+def test_contraction_is_that_of_the_middle_seven_columns(smile: StudyResults) -> None:
+    waist = np.mean([np.sin(np.pi * i / 14) for i in range(4, 11)])
+    found = measures.contraction(smile.problem, smile.response).isel(case=0, time=-1)
+    for name, pull in compressed_study.DRAW.items():
+        assert float(found.sel(structure=name)) == pytest.approx(pull * waist)
+    assert middle_units(smile.problem, "bottom") == list(range(4, 11))
+
+
+def test_reaction_is_the_sum_over_the_driven_units_along_the_drive(smile: StudyResults) -> None:
+    found = measures.reaction(smile.response).isel(case=0)
+    np.testing.assert_allclose(found.isel(time=-1), list(compressed_study.FORCE.values()))
+    np.testing.assert_allclose(found.isel(time=0), 0.0)
+
+
+def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) -> None:
+    way = abscissa.course(shield.problem, shield.response)
+    np.testing.assert_allclose(way.values, np.linspace(0, 15, 9), atol=1e-12)
+    assert [way.at(k) for k in way.shown] == [
+        "0 mm (0 %)", "5.62 mm (3.8 %)", "11.2 mm (7.5 %)", "15 mm (10 %)",
+    ]  # fmt: skip
+
+
+def test_copies_are_measured_like_the_structure(shield: StudyResults, smile: StudyResults) -> None:
+    units = smile.response["roi"].values.astype(bool)
+    scaled = motion(smile, "intact")[-1, units] / [S, S, 1.0]
+    relative = np.sqrt(units.sum()) / np.linalg.norm(scaled)
+    for study, factor in ((shield, np.degrees(1.0)), (smile, relative)):
+        copies = study.scatter
+        assert copies is not None
+        found = monte_carlo.copy_curves(
+            study.problem, measures.measure_of(study.problem), study.response, copies
+        )
+        np.testing.assert_allclose(found, factor * copies["rotation"], rtol=1e-12)
+
+
+def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
+    copies = shield.scatter
+    assert copies is not None
+    second = monte_carlo.spreads(copies["loss"], copies)[1]
+    good = np.array([0.02, 0.03, 0.05, 0.06])
+    assert (second.count, second.failed, second.clashing) == (4, 1, 2)
+    assert second.middle == pytest.approx(np.median(good))
+    assert second.high == pytest.approx(np.percentile(good, 95))
+    assert "1 failed" in values(shield)["copies_geometry_5"].note
+
+
+def test_strain_of_a_shim_is_that_of_a_bent_beam() -> None:
+    """Ends turned by a and b against the chord: moments 2EI/l (2a + b) and 2EI/l (a + 2b)."""
+    length, thickness = 2.25, 0.25
+    for a, b in ((0.3, 0.1), (-0.2, 0.25), (0.1, 0.1), (-0.2, 0.2)):
+        curvature = 2 / length * max(abs(2 * a + b), abs(a + 2 * b))
+        found = checks.beam_strain(0.01, abs(a + b) / 2, abs(b - a), thickness / length)
+        assert found == pytest.approx(0.01 + curvature * thickness / 2)
+
+
+def test_a_paper_is_quoted_by_the_keys_of_the_facts(
+    shield: StudyResults, smile: StudyResults
+) -> None:
+    assert values(shield)["rotation_reduction"].paper == "64 %"
+    assert values(shield)["rotation_altered"].paper == fact_records.ABSENT
+    assert {fact.paper for fact in values(smile).values()} == {fact_records.ABSENT}
+    with pytest.raises(UserError, match="no such fact") as told:
+        fact_records.quoted(
+            path_facts.loading_path_facts(shield), Paper(figure="4", values={"rotation": "1"})
+        )
+    assert told.value.key == "report.paper.values.rotation"
+
+
+def test_facts_tell_of_load_steps(smile: StudyResults) -> None:
+    found = values(smile)
+    assert found["check_2_x_load_steps"].value == pytest.approx(0.05)
+    assert found["check_10_x_load_steps"].note == "no equilibrium found"
+    assert found["removed_units"].value == 18
+
+
+@pytest.mark.parametrize("name", ["shield", "smile"])
+def test_the_figure_is_legible(name: str, request: pytest.FixtureRequest) -> None:
+    figure_assertions.assert_legible(made(request.getfixturevalue(name)))
+
+
+def test_the_figure_names_structures_units_and_the_papers_label(shield: StudyResults) -> None:
+    words = figure_assertions.words(made(shield))
+    assert {"Uncloaked", "Cloaked", "Unloaded", "paper’s label ε (%)", "force (N)"} <= words
+    assert set("abcdef") <= words
+    drafted = dataclasses.replace(shield, draft=("9 units instead of 225",))
+    assert "DRAFT" in figure_assertions.words(made(drafted))
+    assert "DRAFT" not in words
+
+
+def test_losses_under_either_law_of_contact(shield: StudyResults) -> None:
+    dims = ("structure", "contact_law", "case")
+    losses = np.array([[[0.92], [0.9]], [[0.05], [0.06]]])
+    both = shield.response.assign_coords(contact_law=["angle", "geometric"]).assign(
+        loss_by_contact=(dims, losses, {"units": "N mm"}),
+        overlaps_by_contact=(dims, np.array([[[2.0], [0.0]], [[8.0], [0.0]]])),
+        gap_by_contact=(dims, np.full((2, 2, 1), 0.02)),
+    )
+    found = values(dataclasses.replace(shield, datasets=shield.datasets | {"response": both}))
+    note = found["contact_geometric_cloaked"].note
+    assert note.startswith("20.0 % against the angle law; none overlap")
+    assert found["contact_angle_cloaked"].note.startswith("8 pairs of units overlap")
+
+
+def test_the_second_design_is_told_of_and_drawn(shield: StudyResults) -> None:
+    assert values(shield)["second_design"].ours == "optimised again, 6 evaluations"
+    assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
+    assert values(shield)["second_overlaps"].value == 1
+    assert values(shield)["jumps_second_design"].value == 0
+    measure = made(shield).axes[-3]
+    assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
+    assert "dashed" in content.caption(shield)
+
+
+def test_a_kept_design_is_not_drawn_twice(shield: StudyResults) -> None:
+    whole = shield.datasets["geometric_design"].assign(best_evaluation=("method", [0]))
+    alone = whole.isel(evaluation=slice(1))
+    kept = dataclasses.replace(shield, datasets=shield.datasets | {"geometric_design": alone})
+    assert values(kept)["second_design"].ours.startswith("the same")
+    assert "contact_angle_second" not in values(kept)
+    assert "dashed purple" not in content.caption(kept)
+    assert not any(
+        line.get_label() == "Cloaked, no overlap" for axes in made(kept).axes for line in axes.lines
+    )
+
+
+def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
+    response = shield.response.copy(deep=True)
+    response["stability"][1, 0, 4] = checks.JUMPED
+    jumped = dataclasses.replace(shield, datasets=shield.datasets | {"response": response})
+    assert values(jumped)["jumps_cloaked"].value == 1
+    assert values(jumped)["jumps_altered"].value == 0
+    crosses = [
+        line for axes in made(jumped).axes for line in axes.lines if line.get_marker() == "x"
+    ]
+    points = np.concatenate([np.asarray(line.get_xydata()) for line in crosses])
+    np.testing.assert_allclose(points, [[7.5, 0.1 * values(shield)["rotation_altered"].value / 2]])
+    assert "crosses mark jumps" in content.caption(jumped)
+    assert "crosses" not in content.caption(shield)
+
+
+def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:
+    intact, voided, _ = payload(content.loading_path_animation(smile))["structures"]
+    count = [len(part["owner"]) for part in (intact, voided)]
+    assert count[0] - count[1] == pytest.approx(18 * 4 * 4 * 4 / 3, abs=4)  # base64 of int32
+    assert voided["name"] == "Voided"
+
+
+def test_a_motion_in_time_has_a_report_of_its_own(study: StudyResults, tmp_path: Path) -> None:
+    plain = dict(study.datasets)
+    del plain["sweep"]
+    without = study.problem.model_copy(update={"sweep": None})
+    publish(dataclasses.replace(study, problem=without, datasets=plain), tmp_path)
+    columns = (tmp_path / "path.csv").read_text(encoding="utf-8").partition("\n")[0].split(",")
+    assert "altered_motion_1" in columns
+    assert "displacement_mm" not in columns
+
+
+def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
+    names = {path.name for path in publish(shield, tmp_path)}
+    assert {"path.csv", "robustness.csv", "facts.json", "index.html"} <= names
+    html = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "After Figure 4 of Bordiga et al." in html
+    assert "as run" in html
+    assert len(html.encode()) < 6_000_000

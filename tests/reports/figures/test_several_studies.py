@@ -1,0 +1,99 @@
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline.problem.reading import Joint, joint_figure
+from pipeline.runtime import UserError
+from reports.base import style
+from reports.figures.several_studies import build, content, figure, studies
+from reports.page.publishing import publish
+from reports.study import StudyResults
+from tests.reports import compressed_study, figure_assertions
+
+ASKED = Joint(title="Two voids", studies=("fig_smile", "fig_frown"))
+
+
+@pytest.fixture(scope="module")
+def pair(smile: StudyResults) -> list[StudyResults]:
+    return [dataclasses.replace(smile, name=name) for name in ASKED.studies]
+
+
+@pytest.fixture(scope="module")
+def report(pair: list[StudyResults], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("joint")
+    publish(content.parts("fig", ASKED, pair), folder)
+    return folder
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+def test_the_figure_is_legible_with_any_number_of_studies(
+    pair: list[StudyResults], count: int
+) -> None:
+    with style.styled():
+        made = figure_assertions.drawn(figure.draw_several_studies((pair * 2)[:count]))
+    figure_assertions.assert_legible(made)
+    words = figure_assertions.words(made)
+    assert {"Intact", "Voided", "Cloaked", "Smile"} <= words
+    assert set("abcdefghijkl"[: -(-count // 2) + 3 * count]) <= words
+
+
+def test_facts_and_tables_tell_their_study(report: Path) -> None:
+    found = {fact["key"]: fact for fact in json.loads((report / "facts.json").read_text())}
+    assert found["fig_smile.mismatch_reduction"]["group"] == "Smile: Result"
+    assert found["fig_frown.mismatch_reduction"]["group"] == "Frown: Result"
+    with (report / "fig_frown_path.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == 9
+
+
+def test_the_page_shows_every_structure_once(report: Path) -> None:
+    html = (report / "index.html").read_text(encoding="utf-8")
+    data = html.partition('id="player-data">')[2].partition("</script>")[0]
+    names = [part["name"] for part in json.loads(data.replace("<\\/", "</"))["structures"]]
+    assert names == [
+        "Intact", "Smile: voided", "Smile: cloaked", "Frown: voided", "Frown: cloaked",
+    ]  # fmt: skip
+
+
+def test_command_line(tmp_path: Path) -> None:
+    experiments = tmp_path / "experiments"
+    for name in (*ASKED.studies, "fig"):
+        (experiments / name).mkdir(parents=True)
+    for name in ASKED.studies:
+        compressed_study.written(experiments / name, compressed_study.SMILE)
+    asked = experiments / "fig" / "figure.yaml"
+    asked.write_text("title: Two voids\nstudies: [fig_smile, fig_frown]\n")
+    words = ["--figure", str(asked), "--results", str(experiments)]
+    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 0
+    assert {"fig.pdf", "fig.svg", "fig.png", "index.html", "fig_frown_robustness.csv"} <= {
+        path.name for path in (tmp_path / "report").iterdir()
+    }
+
+
+def test_the_committed_figure_names_studies() -> None:
+    path = Path(__file__).parents[3] / "experiments/fig6/figure.yaml"
+    assert joint_figure.load(path).studies == ("fig6_heart", "fig6_shamrock")
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("studies: [nowhere]", "no study 'nowhere'"),
+        ("studies: []", "at least 1 item"),
+        ("study: [fig2]", "unknown key"),
+    ],
+)
+def test_a_faulty_figure_is_told(tmp_path: Path, text: str, told: str) -> None:
+    (tmp_path / "figure.yaml").write_text(text)
+    with pytest.raises(UserError, match=told):
+        joint_figure.load(tmp_path / "figure.yaml")
+
+
+def test_a_shaken_study_has_no_place_in_it(tmp_path: Path) -> None:
+    path = Path(__file__).parents[3] / "experiments/fig2/figure.yaml"
+    with pytest.raises(UserError, match="no such dataset"):
+        studies.load(path, Joint(studies=("fig2",)), None, tmp_path)

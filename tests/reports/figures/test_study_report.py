@@ -1,0 +1,87 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import UserError
+from reports.figures import study_report
+from reports.study import StudyResults
+from tests.reports import shaken_study
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def command(paths: tuple[Path, Path, Path], out: Path, preset: str | None) -> list[str]:
+    names = zip(shaken_study.KINDS, paths, strict=True)
+    given = [word for name, path in names for word in (f"--{name}", str(path))]
+    chosen = [] if preset is None else ["--preset", preset]
+    return ["--problem", str(shaken_study.PROBLEM), *chosen, *given, "--out-dir", str(out)]
+
+
+def test_report_is_complete(report: Path) -> None:
+    assert sorted(contents(report)) == [
+        "design.csv", "facts.csv", "facts.json", "fig2.pdf", "fig2.png", "fig2.svg",
+        "index.html", "loss_history.csv", "robustness.csv", "top_edge.csv",
+    ]  # fmt: skip
+
+
+def test_rebuilding_gives_the_same_bytes(study: StudyResults, report: Path, tmp_path: Path) -> None:
+    study_report.publish(study, tmp_path / "again")
+    assert contents(tmp_path / "again") == contents(report)
+
+
+def test_command_line(tmp_path: Path) -> None:
+    paths = shaken_study.write(tmp_path, "quick")
+    out = tmp_path / "report"
+    assert study_report.main(command(paths, out, "quick")) == 0
+    assert (out / "index.html").is_file()
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "design.nc", "report", "response.nc", "sweep.nc"
+    ]  # fmt: skip
+
+
+def test_datasets_of_another_problem_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    paths = shaken_study.write(tmp_path, "quick")
+    assert study_report.main(command(paths, tmp_path / "report", None)) == 2
+    told = capfd.readouterr().err
+    assert "the dataset was made from another problem" in told
+    assert "design.nc" in told
+    assert "Traceback" not in told
+    assert not (tmp_path / "report").exists()
+
+
+def test_a_build_that_fails_leaves_the_old_report(
+    quick: StudyResults, quick_report: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, beside = contents(quick_report), sorted(quick_report.parent.iterdir())
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "facts.json")
+
+    monkeypatch.setattr("reports.facts.fact_records.write_json", full)
+    with pytest.raises(UserError, match="the disk is full"):
+        study_report.publish(quick, quick_report)
+    assert contents(quick_report) == before
+    assert sorted(quick_report.parent.iterdir()) == beside
+
+
+def test_what_a_killed_build_left_goes(quick_report: Path, quick: StudyResults) -> None:
+    left = quick_report.with_name(f".{quick_report.name}.part")
+    left.mkdir()
+    (left / "index.html").write_text("half a page", encoding="utf-8")
+    before = contents(quick_report)
+    study_report.publish(quick, quick_report)
+    assert contents(quick_report) == before
+    assert not left.exists()
+
+
+def test_help_needs_no_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        study_report.main(["--help"])
+    assert end.value.code == 0
+    assert "--out-dir" in capsys.readouterr().out

@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline import problem
+from pipeline.runtime import ROOT
+from reports.figures import kinds
+from reports.figures.loading_path import measures
+from reports.figures.wave import closed_voids, facts
+from reports.figures.wave.monitored_places import relative_error
+from reports.study import StudyResults, from_dataset
+
+CUTOFF = np.deg2rad(-10.0)
+
+
+def test_a_wave_that_is_mimicked_gets_a_report_of_its_own(
+    shield: StudyResults, smile: StudyResults
+) -> None:
+    wave = problem.load(ROOT / "experiments/fig7/problem.yaml")
+    assert kinds.kind_of(wave).facts is facts.wave_facts
+    assert kinds.kind_of(shield.problem).facts is not facts.wave_facts
+    assert kinds.kind_of(smile.problem).facts is not facts.wave_facts
+
+
+def test_void_angles_of_rotated_squares(smile: StudyResults) -> None:
+    """Squares turned by 20 degrees leave voids of 50 and 130 degrees beside every ligament."""
+    part = smile.response.sel(structure="intact")
+    angles = np.degrees(closed_voids.rest_angles(from_dataset(part, 15.0)))
+    np.testing.assert_allclose(np.sort(angles, axis=1), [[50.0, 130.0]] * len(angles), atol=1e-9)
+
+
+def test_voids_close_by_the_turn_of_one_unit_against_the_other(smile: StudyResults) -> None:
+    part = smile.response.sel(structure="intact").isel(case=0, time=[0]).copy(deep=True)
+    structure = from_dataset(part, 15.0)
+    rest = closed_voids.rest_angles(structure)
+    k = int(np.argmin(rest[:, 0]))
+    assert not closed_voids.closed(smile.problem, part).any()
+    place = {"time": 0, "unit": int(structure.ligament_unit[k, 0]), "dof": 2}
+    part["displacement"][place] = CUTOFF - rest[k, 0] - 1e-6
+    found = closed_voids.closed(smile.problem, part)[0]
+    assert found[k]
+    assert closed_voids.smaller_angles(smile.problem, part)[0, k] == pytest.approx(CUTOFF - 1e-6)
+
+
+def test_edges_are_the_ligaments_of_the_outer_rows(smile: StudyResults) -> None:
+    part = smile.response.sel(structure="altered")
+    assert closed_voids.on_edges(from_dataset(part, 15.0)).sum() == 2 * 14
+
+
+def test_relative_error_by_hand(smile: StudyResults) -> None:
+    inside = smile.response["displacement"].isel(unit=smile.response["roi"].values.astype(bool))
+    scaled = inside.isel(case=0).transpose("structure", "time", "unit", "dof") / [15.0, 15.0, 1.0]
+    intact, altered = (scaled.sel(structure=name).values for name in ("intact", "altered"))
+    time = smile.response["time"].values
+
+    def size(field: np.ndarray) -> float:
+        return float(np.trapezoid((field**2).sum(axis=(1, 2)), time) ** 0.5)
+
+    found = relative_error(smile.problem, smile.response).isel(case=0)
+    assert float(found.sel(structure="altered")) == pytest.approx(
+        size(altered - intact) / size(intact)
+    )
+    assert float(found.sel(structure="intact")) == 0.0
+
+
+def test_the_size_of_a_wave_is_its_largest_in_time(smile: StudyResults) -> None:
+    scale = measures.scales(smile.problem)
+    falling = smile.response.copy(deep=True)
+    falling["displacement"] = falling["displacement"][:, :, ::-1].assign_coords(
+        time=falling["time"]
+    )
+    at_end = measures.size_of_intact(smile.response, scale, static=True)
+    np.testing.assert_allclose(measures.size_of_intact(falling, scale, static=False), at_end)

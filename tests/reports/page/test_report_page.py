@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reports.base import Table
+from reports.facts.fact_records import quoted
+from reports.figures import kinds
+from reports.figures.shielding import facts
+from reports.figures.shielding.sweep_map import frequency_map
+from reports.page import report_page
+from reports.study import StudyResults
+
+
+class Links(HTMLParser):
+    """Addresses that a page loads or points to, and the ids that it has."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.loaded: list[str] = []
+        self.hrefs: dict[str, str] = {}
+        self.ids: set[str] = set()
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        found = {name: value or "" for name, value in attrs}
+        self.ids |= {found["id"]} if "id" in found else set()
+        if "src" in found or tag == "link":
+            self.loaded.append(found.get("src", found.get("href", "")))
+        if tag == "a":
+            self.hrefs[found.get("download", found["href"])] = found["href"]
+
+
+@pytest.fixture(scope="module")
+def html(report: Path) -> str:
+    return (report / "index.html").read_text(encoding="utf-8")
+
+
+def test_page_is_small_and_self_contained(html: str) -> None:
+    assert len(html.encode()) < report_page.LARGEST_PAGE
+    links = Links(html)
+    assert all(address.startswith("data:") for address in links.loaded)
+    assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttpRequest", html)
+    assert not any(href.startswith("http") for href in links.hrefs.values())
+
+
+def test_links_lead_somewhere(html: str, report: Path) -> None:
+    links = Links(html)
+    for href in links.hrefs.values():
+        if href.startswith("#"):
+            assert href[1:] in links.ids
+        elif not href.startswith("../"):  # what other targets and stages make
+            assert href.startswith("data:") or (report / href).is_file()
+
+
+def test_inlined_tables_are_the_files_beside_the_page(html: str, report: Path) -> None:
+    tables = {name: href for name, href in Links(html).hrefs.items() if href.startswith("data:")}
+    assert sorted(tables) == [
+        "design.csv",
+        "facts.csv",
+        "loss_history.csv",
+        "robustness.csv",
+        "top_edge.csv",
+    ]
+    for name, href in tables.items():
+        assert base64.b64decode(href.partition(",")[2]) == (report / name).read_bytes()
+
+
+def test_tables_hold_what_the_panels_show(report: Path, study: StudyResults) -> None:
+    def column(name: str, heading: str) -> np.ndarray:
+        table = np.genfromtxt(
+            report / name, delimiter=",", names=True, dtype=None, encoding="utf-8", deletechars=""
+        )
+        return np.asarray(table[heading])
+
+    uy = study.response["displacement"].values[1, 1, :, 7 + 15 * 14, 1]
+    np.testing.assert_allclose(column("top_edge.csv", "cloaked_45deg_uy_mm"), uy, rtol=1e-9)
+    np.testing.assert_allclose(
+        column("robustness.csv", "J_cloaked"),
+        frequency_map(study.sweep)["loss"].values.ravel(),
+        rtol=1e-9,
+    )
+    assert len(column("loss_history.csv", "J")) == 220  # 160 by SQP, 60 by MMA
+    assert len(column("design.csv", "x_mm")) == 900
+
+
+def test_page_tells_where_it_is_from(html: str, study: StudyResults) -> None:
+    for digest in study.files.values():
+        assert digest in html
+    for data in study.datasets.values():
+        assert data.attrs["problem_hash"] in html
+    assert "<li>simulation of the unloaded reference: it is zero</li>" in html
+    assert "<li>2 of 4 load cases (altered)</li>" in html
+    assert "<dt>plan: cloaked: integrator</dt><dd>implicit</dd>" in html
+    assert "&#34;spacing&#34;: 15.0" in html
+
+
+def test_page_shows_paper_and_ours(html: str) -> None:
+    for words in ("≈ 70 %", "88.0 %", "5.2 mm", "63 %", "&lt; 0.35"):
+        assert words in html
+    assert '<th scope="col">Paper</th>' in html
+    assert "DRAFT" not in html
+
+
+def test_without_a_paper_there_is_no_column_for_it(quick: StudyResults) -> None:
+    known = quoted(facts.shielding_facts(quick), None)
+    html = report_page.render(kinds.kind_of(quick.problem).page(quick, known, [], "<svg/>", []))
+    assert "Paper</th>" not in html
+    assert "<span>paper" not in html
+
+
+def test_a_draft_says_so(quick_report: Path) -> None:
+    html = (quick_report / "index.html").read_text(encoding="utf-8")
+    assert "DRAFT" in html
+    assert "49 units instead of 225" in html
+
+
+def test_words_of_a_problem_are_escaped(quick: StudyResults) -> None:
+    hostile = dataclasses.replace(
+        quick,
+        problem=quick.problem.model_copy(update={"title": "</script><b>&", "doc": "</script><b>"}),
+    )
+    made = kinds.kind_of(hostile.problem).page(
+        hostile, facts.shielding_facts(hostile), [], "<svg/>", []
+    )
+    html = report_page.render(made)
+    assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html
+    assert html.count("</script>") == 2
+    data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)
+    assert data is not None
+    assert json.loads(data[1])["cases"][0].startswith("α")
+
+
+def test_cells_of_a_table() -> None:
+    columns = {
+        "number": np.array([1.0 / 3.0, np.nan]),
+        "count": np.array([7, -8]),
+        "text, quoted": np.array(['a, "b"', "plain"]),
+    }
+    assert Table("t.csv", "", columns).csv.decode() == (
+        'number,count,"text, quoted"\n0.3333333333,7,"a, ""b"""\n,-8,plain\n'
+    )

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+import base64
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from reports.figures.shielding.content import shielding_animation
+from reports.panels import (
+    Animation,
+    AnimationAxis,
+    AnimationClip,
+    ColourField,
+    animation_data,
+    payload,
+)
+from reports.study import RigidUnits, StudyResults
+
+
+def decoded(text: str, dtype: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype)
+
+
+def clip(motion: np.ndarray) -> AnimationClip:
+    n_units = motion.shape[2]
+    corner = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]])
+    site = np.zeros((n_units, 2))
+    site[:, 0] = 15.0 * np.arange(n_units)
+    flags = np.zeros(n_units, int)
+    none = np.zeros((0, 2), int)
+    structure = RigidUnits(site[:, None] + corner, site, none, none, flags, flags)
+    return AnimationClip("Static", "#000000", structure, motion)
+
+
+def static(motion: np.ndarray) -> dict[str, Any]:
+    axis = AnimationAxis("load", "mm", np.linspace(0, 5, motion.shape[1]), 2, False, {"slow": 1.0})
+    field = ColourField("uy", "u_y", "mm", 1.0, "signed", (-1.0, 1.0))
+    return payload(Animation(axis, ["compression"], [clip(motion)], [field]))
+
+
+def test_motion_is_right_within_the_stated_error(study: StudyResults) -> None:
+    data = payload(shielding_animation(study))
+    shift, turn = animation_data.quantisation_error(data)
+    assert shift < 1e-4
+    assert turn < 1e-5
+    frames = animation_data.kept_frames(401, 2 * 4 * 225 * 3)
+    for s in range(2):
+        for c in range(4):
+            part = data["motion"][s][c]
+            levels = decoded(part["data"], "<i2").reshape(len(frames), 225, 3)
+            exact = study.response["displacement"].values[s, c][frames]
+            error = np.abs(np.array(part["step"]) * levels - exact)
+            assert error[..., :2].max() <= 1.001 * shift
+            assert error[..., 2].max() <= 1.001 * turn
+
+
+def test_axis_keeps_both_ends(study: StudyResults) -> None:
+    data = payload(shielding_animation(study))
+    values = decoded(data["axis"]["values"], "<f4")
+    assert values[0] == 0.0
+    assert values[-1] == np.float32(2.0)
+    assert (len(values), data["axis"]["shown"], data["axis"]["saved"]) == (201, 201, 401)
+
+
+@pytest.mark.parametrize("n_frames", [1, 2, 7, 200, 401, 1800])
+@pytest.mark.parametrize("n_values", [3, 5400, 60_000, 900_000])
+def test_kept_frames_fit_the_page(n_frames: int, n_values: int) -> None:
+    frames = animation_data.kept_frames(n_frames, n_values)
+    assert frames[0] == 0
+    assert frames[-1] == n_frames - 1
+    assert len(frames) <= animation_data.MOST_STEPS + 1
+    assert len(frames) <= 3 or 2 * n_values * len(frames) <= animation_data.LARGEST_MOTION
+
+
+def test_lost_units_are_marked_as_such() -> None:
+    motion = np.ones((1, 3, 4, 3))
+    motion[0, 1, 2] = np.nan
+    levels = decoded(static(motion)["motion"][0][0]["data"], "<i2").reshape(3, 4, 3)
+    assert (levels[1, 2] == animation_data.NO_DATA).all()
+    assert (np.delete(levels.reshape(12, 3), 6, axis=0) == animation_data.LARGEST_LEVEL).all()
+
+
+def test_no_motion_is_exact() -> None:
+    data = static(np.zeros((1, 3, 4, 3)))
+    assert data["motion"][0][0]["step"] == [0.0, 0.0, 0.0]
+    assert animation_data.quantisation_error(data) == (0.0, 0.0)
+
+
+def test_a_static_study_needs_no_time() -> None:
+    data = static(np.zeros((1, 3, 4, 3)))
+    assert json.loads(json.dumps(data)) == data
+    assert (data["axis"]["name"], data["axis"]["unit"], data["axis"]["loops"]) == (
+        "load", "mm", False
+    )  # fmt: skip
+
+
+def test_polygons_are_whole(study: StudyResults) -> None:
+    shape = payload(shielding_animation(study))["structures"][1]
+    centroid = decoded(shape["centroid"], "<f4").reshape(-1, 2)
+    owner = decoded(shape["owner"], "<i4")
+    corners = decoded(shape["arm"], "<f4").reshape(-1, 2) + centroid[owner]
+    exact = study.response["vertices"].values[1].reshape(-1, 2)
+    np.testing.assert_allclose(corners, exact, atol=2e-5)
+    ligaments = decoded(shape["ligaments"], "<i4").reshape(-1, 2)
+    lengths = np.linalg.norm(np.diff(corners[ligaments], axis=1), axis=2)
+    np.testing.assert_allclose(lengths, 2.25, atol=1e-4)

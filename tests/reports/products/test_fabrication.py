@@ -1,0 +1,121 @@
+"""The page of what is built, and the pictures on it."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from reports.products.fabrication import build, pictures
+from reports.products.fabrication.renderer import Body, picture
+from tests.pipeline.fabrication import built
+
+COLOUR = "#8d62c0"
+
+
+def cube(size: float = 10.0) -> Body:
+    mesh = trimesh.creation.box((size, size, size))
+    return Body(np.asarray(mesh.vertices), np.asarray(mesh.faces), COLOUR)
+
+
+def test_a_cube_seen_from_the_top_is_a_square() -> None:
+    image = picture([cube()], 224, elevation=90.0)
+    ink = image.min(axis=2) < 250
+    rows, columns = np.unique(np.nonzero(ink)[0]), np.unique(np.nonzero(ink)[1])
+    assert len(rows) == len(columns) == 200
+    assert ink[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].all()
+
+
+def test_the_nearer_body_hides_the_farther_one() -> None:
+    low = Body(cube().vertices, cube().triangles, "#ff0000")
+    high = Body(cube().vertices * 0.5 + [0.0, 0.0, 20.0], cube().triangles, "#0000ff")
+    for bodies in ([low, high], [high, low]):
+        image = picture(bodies, 224, elevation=90.0)
+        red, _, blue = image[image.shape[0] // 2, image.shape[1] // 2]
+        assert (red, blue > 100) == (0, True)
+
+
+def test_faces_that_look_away_are_not_drawn() -> None:
+    turned = Body(cube().vertices, cube().triangles[:, ::-1], COLOUR)
+    assert not np.array_equal(picture([turned], 224), picture([cube()], 224))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pictures, "WIDTH", 300)
+        yield
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("fabrication") / "cloaked"
+    built.write(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(package: Path) -> str:
+    out = package.with_name("index.html")
+    words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
+    assert build.main([*words, "--quiet"]) == 0
+    return out.read_text(encoding="utf-8")
+
+
+def test_the_page_shows_every_sheet_and_plate(package: Path, page: str) -> None:
+    shown = re.findall(r'<figcaption><a href="([^"]+)">', page)
+    drawings = [*package.glob("laser/*_nominal.dxf"), *package.glob("*/*.3mf")]
+    wanted = {path.relative_to(package.parent).as_posix() for path in drawings}
+    assert set(shown) == wanted | {"cloaked/print/assembled.stl"}
+    for link in re.findall(r'href="(cloaked/[^"]+)"', page):
+        assert (package.parent / link).is_file()
+
+
+def test_its_pictures_have_ink(page: str) -> None:
+    found = re.findall(r'src="data:image/png;base64,([^"]+)"', page)
+    assert len(found) >= 6
+    for text in found:
+        with Image.open(io.BytesIO(base64.b64decode(text))) as image:
+            assert (np.asarray(image.convert("L")) < 230).sum() > 100
+
+
+def test_it_tells_the_figures_of_the_bill(page: str) -> None:
+    for words in ("<strong>6</strong>units", "A1 to C2", "shims with spares", "laser.kerf"):
+        assert words in page
+
+
+def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path: Path) -> None:
+    out = tmp_path / "again.html"
+    words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
+    assert build.main([*words, "--quiet"]) == 0
+    assert out.read_text(encoding="utf-8") == page
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        ('"thin_walls_mm"', '"thin_walls"', "another version of the exporter"),
+        ("{", "", "the manifest cannot be read"),
+    ],
+)
+def test_a_package_of_another_version_makes_one_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], before: str, after: str, told: str
+) -> None:
+    folder = tmp_path / "cloaked"
+    built.write(folder)
+    path = folder / "manifest.json"
+    path.write_text(path.read_text(encoding="utf-8").replace(before, after, 1), encoding="utf-8")
+    out = tmp_path / "index.html"
+    words = ["--problem", str(built.PROBLEM), "--packages", str(folder), "--out", str(out)]
+    assert build.main([*words, "--quiet"]) == 2
+    said = capsys.readouterr().err
+    assert told in said
+    assert "make the package again" in said
+    assert not out.exists()

@@ -1,0 +1,90 @@
+"""The page over everything that was built."""
+
+from __future__ import annotations
+
+import base64
+import shutil
+from pathlib import Path
+
+import pytest
+
+from reports.products.index import build, content, inventory
+from reports.study import StudyResults
+from tests.reports.page.test_report_page import Links
+
+
+@pytest.fixture(scope="module")
+def results(study: StudyResults, report: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a figure with its datasets, and of a draft without."""
+    folder = tmp_path_factory.mktemp("results")
+    shutil.copytree(report, folder / "fig2/report")
+    draft = folder / "fig2@quick/report/index.html"
+    draft.parent.mkdir(parents=True)
+    draft.write_text('<title>A draft</title><p class="draft">DRAFT</p>')
+    for name, data in study.datasets.items():
+        data.to_netcdf(folder / f"fig2/{name}.nc")
+    (folder / "fig2/fabrication").mkdir()
+    (folder / "fig2/fabrication/index.html").write_text("<p>what is built</p>")
+    (folder / "benchmark").mkdir()
+    (folder / "benchmark/fig2.csv").write_text("seconds\n1\n")
+    (folder / "stress").mkdir()
+    (folder / "stress/index.html").write_text("<p>nothing wrong</p>")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def html(results: Path) -> str:
+    assert build.main(["--results", str(results), "--quiet"]) == 0
+    return (results / "index.html").read_text(encoding="utf-8")
+
+
+def test_it_works_from_disk_and_leads_to_what_is_there(html: str, results: Path) -> None:
+    links = Links(html)
+    assert all(address.startswith("data:") for address in links.loaded)
+    for href in links.hrefs.values():
+        assert href[1:] in links.ids if href.startswith("#") else (results / href).is_file(), href
+    wanted = {"fig2/report/index.html", "fig2/design.nc", "fig2/fabrication/index.html"}
+    assert wanted | {"benchmark/fig2.csv", "stress/index.html"} <= set(links.hrefs.values())
+
+
+def test_figures_come_first_and_drafts_are_marked(results: Path, html: str) -> None:
+    names = [(built.name, built.figure, built.draft) for built in inventory.reports(results)]
+    assert names == [("fig2", True, False), ("fig2@quick", False, True)]
+    assert html.index("fig2/report/index.html") < html.index(">DRAFT<")
+
+
+def test_claims_are_judged_where_the_study_is_built(html: str) -> None:
+    assert "Figure 2: <a" in html
+    assert "<code>snakemake fig7</code> builds it" in html
+    tables = {table.name: table for table in content.tables(())}
+    assert all(each.simulation.why == "study not built" for each in tables["fig2"].claims)
+
+
+def test_datasets_carry_their_hash(results: Path, html: str) -> None:
+    for data in inventory.reports(results)[0].datasets:
+        assert f"sha256 {data.sha256}" in html
+
+
+def test_it_is_the_same_again(results: Path, html: str) -> None:
+    assert content.page(results) == html
+
+
+def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
+    assert "None has been built yet" in content.page(tmp_path)
+
+
+def test_movies_are_held_by_the_page_as_far_as_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The smallest first; others play from the file beside the page."""
+    (tmp_path / "movies").mkdir()
+    for name, size in (("S1", 50), ("S2", 20), ("S3", 30)):
+        (tmp_path / f"movies/{name}.mp4").write_bytes(name.encode() * (size // 2))
+    monkeypatch.setattr(content, "LARGEST_MOVIES", 55)
+    shown = content.page(tmp_path)
+    for name in ("S2", "S3"):
+        data = base64.b64encode((tmp_path / f"movies/{name}.mp4").read_bytes()).decode()
+        assert f'src="data:video/mp4;base64,{data}"' in shown
+    assert 'src="movies/S1.mp4"' in shown
+    assert shown.count("Too large for this page") == 1
+    assert content.page(tmp_path) == shown

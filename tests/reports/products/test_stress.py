@@ -1,0 +1,66 @@
+"""The page of the stress suite, from counts made by hand."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from reports.products.stress import build
+
+FAMILY = {
+    "name": "toy",
+    "tried_what": "two & more <cases>",
+    "judged_how": "by hand",
+    "tried": 1000,
+    "solved": 996,
+    "refused": 3,
+    "wrong": 1,
+    "in_range": 998,
+    "in_range_solved": 997,
+    "worst": [{"name": "off, mm", "value": 2.5e-7, "limit": 1e-6}],
+    "not_solved": [
+        {"case": "a", "verdict": "wrong", "wanted": "solution", "message": "off: 2, limit 1"},
+        {"case": "b", "verdict": "refused", "wanted": "refusal", "message": "no; try another"},
+    ],
+}
+
+
+@pytest.fixture
+def counts(tmp_path: Path) -> Path:
+    path = tmp_path / "stress.json"
+    path.write_text(json.dumps({"schema_version": 1, "families": [FAMILY]}), encoding="utf-8")
+    return path
+
+
+def page(counts: Path, folder: Path) -> str:
+    assert build.main(["--counts", str(counts), "--out-dir", str(folder), "--quiet"]) == 0
+    return (folder / "index.html").read_text(encoding="utf-8")
+
+
+def test_the_page_shows_counts_and_what_was_not_solved(counts: Path, tmp_path: Path) -> None:
+    html = page(counts, tmp_path / "page")
+    assert '<strong class="wrong">1</strong>' in html
+    assert "two &amp; more &lt;cases&gt;" in html
+    assert "99.8 %" in html  # 997 of 998, not rounded up
+    assert "refused, as it has no answer" in html
+    assert "off: 2, limit 1" in html
+    rows = list(csv.DictReader((tmp_path / "page/stress.csv").open(encoding="utf-8")))
+    assert [(row["name"], row["wrong"]) for row in rows] == [("toy", "1")]
+
+
+def test_the_same_counts_give_the_same_bytes(counts: Path, tmp_path: Path) -> None:
+    assert page(counts, tmp_path / "one") == page(counts, tmp_path / "other")
+
+
+@pytest.mark.parametrize("content", ["", "{}", '{"families": [{"name": "toy"}]}', "[1]"])
+def test_what_the_suite_did_not_write_is_refused(
+    content: str, counts: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    counts.write_text(content, encoding="utf-8")
+    folder = tmp_path / "page"
+    assert build.main(["--counts", str(counts), "--out-dir", str(folder)]) == 2
+    assert str(counts) in capsys.readouterr().err
+    assert not (folder / "index.html").exists()

@@ -1,0 +1,123 @@
+"""The page of a sweep over any parameters, of losses in closed form."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.problem.sections import sweep_cases, taken_apart
+from pipeline.runtime import SweepResult
+from pipeline.stages import sweep as stage
+from reports.products.sweep import build, cases
+from tests.pipeline import static
+
+CURVE = "sweep: { grid: { drive.amplitude: { from: 1 mm, to: 3 mm, points: 5 } } }"
+MAP = """sweep:
+  grid:
+    drive.amplitude: [1 mm, 2 mm, 3 mm]
+    contact.law: [angle, distance]
+"""
+RANDOM = """sweep:
+  random:
+    drive.amplitude: { from: 1 mm, to: 3 mm }
+    material.bending_stiffness: { mean: 1.5 N mm/rad, deviation: 0.1 N mm/rad }
+    material.shear_stiffness: { from: 1.1 N/mm, to: 1.3 N/mm }
+  samples: 120
+"""
+LIMIT = 2.9  # mm, above which the made-up simulation fails
+STUCK = "no equilibrium at step 3"
+
+
+def found(setting: dict[str, str]) -> SweepResult:
+    """A loss that grows with the amplitude and with nothing else; half of it with the cloak."""
+    amplitude, _ = taken_apart(setting["drive.amplitude"]) or (np.nan, "")
+    if amplitude > LIMIT:
+        return SweepResult.failed(STUCK)
+    return SweepResult(0.1 * amplitude, 0.2 * amplitude, -0.1 * amplitude)
+
+
+def paths(folder: Path, text: str) -> tuple[Path, Path]:
+    """The problem and its dataset."""
+    folder.mkdir(parents=True, exist_ok=True)
+    at = static.write(folder, static.HOLE + text, size=5)
+    asked = problem.load(at)
+    assert asked.sweep is not None
+    numbered = list(enumerate(sweep_cases.settings(asked.sweep)))
+    results = {number: found(setting) for number, setting in numbered}  # type: ignore[arg-type]
+    made = stage.dataset(asked, numbered, results)
+    datasets.write(made, folder / "sweep.nc", "sweep", provenance.attributes(asked, "sweep"))
+    return at, folder / "sweep.nc"
+
+
+def drawn(folder: Path, text: str) -> Path:
+    """The folder of the page."""
+    at, data = paths(folder, text)
+    out = folder / "sweep"
+    words = ["--problem", str(at), "--sweep", str(data), "--out-dir", str(out)]
+    assert build.main(words) == 0
+    return out
+
+
+def facts_of(page: Path) -> dict[str, float]:
+    with (page / "facts.csv").open() as file:
+        return {row["key"]: float(row["value"]) for row in csv.DictReader(file)}
+
+
+@pytest.mark.parametrize("text", [CURVE, MAP, RANDOM], ids=["curve", "map", "random"])
+def test_the_page_shows_what_the_dataset_holds(tmp_path: Path, text: str) -> None:
+    page = drawn(tmp_path, text)
+    data = datasets.read(tmp_path / "sweep.nc", "sweep")
+    html = (page / "index.html").read_text()
+    with (page / "cases.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["status"] for row in rows] == list(data["status"].values)
+    assert [float(row["loss (1)"] or "nan") for row in rows] == pytest.approx(
+        list(data["loss"].values), nan_ok=True
+    )
+    for key in data["parameter"].values:
+        assert str(key) in html
+    assert '<a href="../sweep.nc">' in html
+    assert f"<td>{STUCK}</td>" in html
+    known = facts_of(page)
+    assert known["cases"] == data.sizes["case"]
+    assert known["failed"] == sum(data["status"].values == STUCK) > 0
+    assert known["median_ratio"] == pytest.approx(50.0)
+    assert known["improved"] == pytest.approx(100.0)
+
+
+def test_the_parameter_that_matters_is_told_from_those_that_do_not(tmp_path: Path) -> None:
+    known = facts_of(drawn(tmp_path, RANDOM))
+    assert known["rank_0"] == pytest.approx(1.0)
+    assert max(abs(known["rank_1"]), abs(known["rank_2"])) < 0.3
+
+
+def test_the_same_dataset_gives_the_same_bytes(tmp_path: Path) -> None:
+    first, second = (drawn(tmp_path / name / "study", MAP) for name in ("one", "two"))
+    names = sorted(path.name for path in first.iterdir())
+    assert {"index.html", "cases.csv", "facts.csv", "sweep.pdf", "sweep.svg"} < set(names)
+    assert all((first / name).read_bytes() == (second / name).read_bytes() for name in names)
+
+
+def test_words_take_places_beside_each_other(tmp_path: Path) -> None:
+    _, data = paths(tmp_path, MAP)
+    amplitude, law = cases.axes(datasets.read(data, "sweep"))
+    assert amplitude.label == "drive.amplitude (mm)"
+    assert list(amplitude.distinct) == [1.0, 2.0, 3.0]
+    assert law.words == ("angle", "distance")
+    assert list(law.places) == [0, 0, 0, 1, 1, 1]
+
+
+def test_a_sweep_of_another_problem_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at, data = paths(tmp_path, CURVE)
+    at.write_text(at.read_text().replace("1.19 N/mm", "1.2 N/mm"))
+    words = ["--problem", str(at), "--sweep", str(data), "--out-dir", str(tmp_path / "out")]
+    assert build.main(words) != 0
+    assert "made from another problem" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

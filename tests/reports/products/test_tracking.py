@@ -1,0 +1,170 @@
+"""The overlay and the quality page of a track that is known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets
+from pipeline.datasets import provenance
+from pipeline.tracking.frames import Frame, import_video
+from reports.products.tracking import advice, build, overlay, track_quality
+from reports.products.tracking.track_quality import ExposureStatistics, StreamProperties
+
+NOISE = np.array([0.02, 0.02, 0.001])
+PIXEL = 0.5
+FRAMES, RESTING, LOST = 30, 12, 7
+
+
+@pytest.fixture
+def track() -> xr.Dataset:
+    """Five by five units: at rest with noise, then carried along; unit 7 is hidden in the end."""
+    grid = {"name": "g", "grid": [5, 5], "spacing_mm": 15.0, "ligament_gap_mm": 2.3}
+    design = import_video.design(grid | {"bias_angle_deg": 20.0})
+    random = np.random.default_rng(2)
+    pose = NOISE * random.normal(size=(FRAMES, 25, 3))
+    pose[RESTING:, :, 0] += 0.4 * np.arange(1, FRAMES - RESTING + 1)[:, None]
+    quality = np.zeros((FRAMES, 25), np.int8)
+    pose[-5:, LOST], quality[-5:, LOST] = np.nan, 2
+    sigma = np.where(np.isfinite(pose), NOISE, np.nan)
+    timing = np.zeros(FRAMES, np.int8)
+    timing[20] = 1
+    motion = ("time", "unit", "dof")
+    return xr.Dataset(
+        {
+            "vertices": design["vertices"],
+            "displacement": (motion, pose),
+            "sigma": (motion, sigma),
+            "quality": (motion[:2], quality),
+            "timing": (motion[:1], timing),
+            "frame": (motion[:1], np.arange(FRAMES)),
+            "load_force": (motion[:1], np.full(FRAMES, np.nan)),
+            "camera_homography": (
+                ("row", "column"),
+                np.array([[1 / PIXEL, 0, 20], [0, -1 / PIXEL, 150], [0, 0, 1]]),
+            ),
+            "camera_centre": (("xy",), [80.0, 80.0]),
+            "camera_radial": (("power",), [0.0, 0.0]),
+            "camera_residual": (("unit", "xy"), 0.1 * random.normal(size=(25, 2))),
+            "image_size": (("xy",), [176, 176]),
+            "blur": ((), 0.8),
+        },
+        {
+            **{name: design[name] for name in ("unit", "i", "j", "xy")},
+            "drive_displacement": (("time", "xy"), np.full((FRAMES, 2), np.nan)),
+            "time": (motion[:1], np.arange(FRAMES) / 10),
+            "dof": (motion[2:], ["ux", "uy", "theta"]),
+        },
+        {
+            "recording": '{"title": "Known", "video": "v.mkv", "synthetic": true}',
+            "synthetic": "yes",
+        },
+    )
+
+
+def grey(level: int = 120) -> np.ndarray:
+    image = np.full((176, 176), level, np.uint8)
+    image[::2] = 20
+    return image
+
+
+def of(track: xr.Dataset, alone: float = 1.0) -> track_quality.TrackQuality:
+    return track_quality.measured(track, [grey(230)] * 3, StreamProperties("ffv1", alone))
+
+
+def test_measures_are_those_of_the_track(track: xr.Dataset) -> None:
+    found = of(track)
+    assert found.pixel == pytest.approx(PIXEL)
+    assert found.pitch == pytest.approx(30.0)
+    assert found.resting == RESTING
+    np.testing.assert_allclose(found.floor, NOISE * [2, 2, 180 / np.pi], rtol=0.15)
+    np.testing.assert_allclose(found.sigma, NOISE * [2, 2, 180 / np.pi])
+    assert found.lost[-1, found.reasons.index("hidden")] == 1 / 25
+    assert found.lost[:-5].sum() == 0
+    assert (found.duplicates, found.dropped) == ([20], [])
+    assert found.fastest == pytest.approx(0.8, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"light": ExposureStatistics(0.3, 0.1, 0.0, 0.0)}, "more light"),
+        ({"light": ExposureStatistics(1.0, 0.1, 0.2, 0.0)}, "shorter exposure"),
+        ({"light": ExposureStatistics(0.9, 0.1, 0.0, 0.2)}, "flicker"),
+        ({"blur": 3.0}, "focus"),
+        ({"pitch": 14.0}, "larger dots"),
+        ({"stream": StreamProperties("h264", 0.01)}, "intra codec"),
+        ({"irregular": 0.4}, "constant frame rate"),
+        ({"fastest": 3.0}, "10 % of the interval"),
+        ({"floor": np.full(3, np.nan)}, "at rest"),
+    ],
+)
+def test_advice_names_what_is_wrong(track: xr.Dataset, change: dict[str, Any], told: str) -> None:
+    lost = np.zeros((FRAMES, 5))
+    good = of(track)._replace(lost=lost, duplicates=[], fastest=0.1, pitch=40.0)
+    assert "Nothing to improve" in advice.advice(good)[0]
+    (line,) = advice.advice(good._replace(**change))
+    assert told in line
+
+
+def test_lost_units_and_repeated_frames_come_first(track: xr.Dataset) -> None:
+    first, second, *_ = advice.advice(of(track))
+    assert "hidden" in first
+    assert "1 repeated" in second
+
+
+def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
+    frames = [Frame(k, k / 10, grey()) for k in range(FRAMES)]
+    drawn = list(overlay.images(overlay.painter(track, "displacement"), frames))
+    assert len(drawn) == FRAMES
+    lost = np.array(overlay.painter(track, "rotation").camera.project(np.array([30.0, 15.0])))
+    around = [image[_about(2 * lost)] for image in (drawn[0], drawn[-1])]
+    orange = [(area == (224, 123, 0)).all(axis=-1).sum() for area in around]
+    assert orange[0] == 0
+    assert orange[1] > 20
+    assert (drawn[-1][_about(2 * lost)] != drawn[0][_about(2 * lost)]).any()
+
+
+def _about(place: np.ndarray) -> tuple[slice, slice]:
+    column, row = np.round(place).astype(int)
+    return slice(row - 12, row + 12), slice(column - 12, column + 12)
+
+
+def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_path: Path) -> None:
+    with av.open(str(tmp_path / "v.mkv"), "w") as container:
+        stream = container.add_stream("ffv1", rate=10)
+        stream.width = stream.height = 176
+        stream.pix_fmt = "gray"
+        for _ in range(FRAMES):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(grey(), format="gray")))
+        container.mux(stream.encode(None))
+    origin = {"parents": json.dumps({"video": provenance.file_hash(tmp_path / "v.mkv")})}
+    datasets.write(track, tmp_path / "track.nc", "track", origin)
+    made = []
+    for name in ("first", "second"):
+        words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
+        assert build.main([*words, "--out-dir", str(tmp_path / name), "--quiet"]) == 0
+        folder = tmp_path / name
+        made.append([(folder / file).read_bytes() for file in ("index.html", "overlay.mp4")])
+    assert made[0] == made[1]
+    assert made[0][0].decode().count("SYNTHETIC") >= 2
+    with av.open(str(tmp_path / "first/overlay.mp4")) as shown:
+        assert "SYNTHETIC" in shown.metadata["comment"]
+        assert sum(1 for _ in shown.decode(video=0)) == FRAMES
+
+
+def test_another_video_is_refused(
+    track: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    datasets.write(track, tmp_path / "track.nc", "track", {"parents": '{"video": "abc"}'})
+    (tmp_path / "v.mkv").write_bytes(b"another")
+    words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
+    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 2
+    assert "that of another video" in capsys.readouterr().err
+    assert not (tmp_path / "report").exists()

@@ -1,0 +1,178 @@
+"""Recordings beside their simulation: figures, pages, numbers and the player's data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from pipeline.runtime import UserError
+from reports.base import style
+from reports.facts import Fact
+from reports.figures import kinds
+from reports.page import report_page
+from reports.panels import payload
+from reports.study import LABEL, StudyResults
+from reports.study.study_results import load
+from tests.reports import compressed_study, figure_assertions, recorded_study
+from tests.reports.panels.test_animation_data import decoded
+
+
+@pytest.fixture(scope="module")
+def filmed(
+    study: StudyResults,
+    shield: StudyResults,
+    smile: StudyResults,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> dict[str, StudyResults]:
+    folder = tmp_path_factory.mktemp("recordings")
+    return {
+        "shaken": recorded_study.with_recordings(
+            study, folder / "a", ("altered", 1), ("cloaked", 1)
+        ),
+        "shield": recorded_study.with_recordings(
+            shield, folder / "b", ("altered", 0), ("cloaked", 0)
+        ),
+        "smile": recorded_study.with_recordings(
+            smile, folder / "c", ("intact", 0), ("altered", 0), ("cloaked", 0)
+        ),
+    }
+
+
+@pytest.fixture(scope="module")
+def figures(filmed: dict[str, StudyResults]) -> dict[str, Figure]:
+    with style.styled():
+        return {
+            name: figure_assertions.drawn(kinds.kind_of(study.problem).figure(study))
+            for name, study in filmed.items()
+        }
+
+
+@pytest.mark.parametrize("name", ["shaken", "shield", "smile"])
+def test_figures_show_experiment_above_simulation(name: str, figures: dict[str, Figure]) -> None:
+    made = figures[name]
+    figure_assertions.assert_legible(made)
+    places = {text.get_text(): text.get_position() for text in figure_assertions.texts(made)}
+    labels = [text for text in places if LABEL in text and "\n" in text]
+    assert len(labels) >= 2
+    for label in labels:
+        beside = f"{label.splitlines()[0]}\nsimulation"
+        (x, y), (right, below) = places[label], places[beside]
+        assert y > below or x < right
+
+
+@pytest.mark.parametrize("name", ["shaken", "shield", "smile"])
+def test_measured_curves_are_dashed_with_markers(name: str, figures: dict[str, Figure]) -> None:
+    dashed = [
+        line
+        for axes in figures[name].axes
+        for line in axes.lines
+        if line.is_dashed() and line.get_marker() == "o"
+    ]
+    assert {line.get_color() for line in dashed} >= {style.ALTERED, style.CLOAKED}
+
+
+def facts(study: StudyResults) -> dict[str, Fact]:
+    return {fact.key: fact for fact in kinds.kind_of(study.problem).facts(study)}
+
+
+def test_a_measured_motion_is_told_beside_the_simulated_one(
+    filmed: dict[str, StudyResults],
+) -> None:
+    shaken, shield, smile = (facts(filmed[name]) for name in ("shaken", "shield", "smile"))
+    for name in ("altered", "cloaked"):
+        value = shaken[f"peak_to_peak_{name}"].value
+        measured = shaken[f"measured_peak_to_peak_{name}"]
+        assert measured.value == pytest.approx(recorded_study.GAIN * value, rel=0.02)
+        assert LABEL in measured.note
+    assert shaken["measured_peak_to_peak_reduction"].value == pytest.approx(88.0, abs=0.1)
+    for key in ("rotation_altered", "rotation_cloaked_most"):
+        expected = pytest.approx(recorded_study.GAIN * shield[key].value, rel=0.02)
+        assert shield[f"measured_{key}"].value == expected
+    contraction = smile["measured_contraction_intact"].value
+    assert contraction == pytest.approx(
+        recorded_study.GAIN * smile["contraction_intact"].value, rel=1e-6
+    )
+    error = smile["contraction_error_altered"].value
+    assert smile["measured_contraction_error_altered"].value == pytest.approx(error, rel=1e-6)
+
+
+def test_the_residual_of_every_recording_is_told(filmed: dict[str, StudyResults]) -> None:
+    study = filmed["shield"]
+    found = facts(study)
+    assert found["altered_0_rmse_ux"].value == 0.5
+    assert found["altered_0_frames"].value == len(study.recordings[0].along)
+    assert found["altered_0_correlation"].group == f"Recording “altered_0”: experiment ({LABEL})"
+
+
+def test_the_player_shows_it_under_its_own_load_with_the_residual(
+    filmed: dict[str, StudyResults],
+) -> None:
+    study = filmed["shaken"]
+    data = payload(kinds.kind_of(study.problem).animation(study))
+    names = [clip["name"] for clip in data["structures"]]
+    assert names[:2] == [f"Altered, experiment ({LABEL})", "Altered"]
+    cases = data["motion"][0]
+    assert [case is not None for case in cases] == [False, True, False, False]
+    assert data["residual"][1] == []
+    shape = (-1, 225, 3)
+    measured, apart = (
+        decoded(part["data"], "<i2").reshape(shape) * np.array(part["step"])
+        for part in (cases[1], data["residual"][0][1])
+    )
+    lost = np.all(np.abs(measured[5] / cases[1]["step"] + 32768) < 0.5, axis=1)
+    assert np.flatnonzero(lost).tolist() == [recorded_study.LOST]
+    here = ~lost
+    np.testing.assert_allclose(
+        apart[5, here], measured[5, here] * (1 - 1 / recorded_study.GAIN), atol=2e-4
+    )
+    assert all(field["residual"] for field in data["fields"])
+
+
+def test_pages_say_that_it_is_synthetic(filmed: dict[str, StudyResults]) -> None:
+    study = filmed["smile"]
+    kind = kinds.kind_of(study.problem)
+    html = report_page.render(kind.page(study, kind.facts(study), [], "<svg></svg>", []))
+    assert f"<b>{LABEL}</b>: these recordings were rendered" in html
+    for name in ("intact_0", "altered_0", "cloaked_0"):
+        assert f'href="../recordings/{name}/index.html"' in html
+
+
+def test_a_recording_that_was_filmed_is_not_called_synthetic(
+    filmed: dict[str, StudyResults],
+) -> None:
+    study = filmed["smile"]
+    real = {name: data.assign_attrs(synthetic="no") for name, data in study.compared.items()}
+    again = replace(study, compared=real)
+    kind = kinds.kind_of(again.problem)
+    assert LABEL not in report_page.render(
+        kind.page(again, kind.facts(again), [], "<svg></svg>", [])
+    )
+
+
+def test_only_the_way_there_is_shown_of_a_load(filmed: dict[str, StudyResults]) -> None:
+    recording = filmed["shield"].recordings[0]
+    assert len(recording.along) < recording.data.sizes["time"]
+    assert np.all(np.diff(recording.along) >= 0)
+    beyond = recording.at(recording.data["measured"], np.array([7.5, 30.0]))
+    assert np.isfinite(beyond[0, 0]).all()
+    assert np.isnan(beyond[1]).all()
+
+
+def test_comparisons_are_read_from_their_folders(tmp_path: Path) -> None:
+    made = recorded_study.with_recordings(
+        compressed_study.written(tmp_path, compressed_study.SHIELD), tmp_path, ("altered", 0)
+    )
+    files = {kind: tmp_path / f"{kind}.nc" for kind in made.datasets}
+    file = tmp_path / "altered_0/comparison.nc"
+    read = load(tmp_path / "problem.yaml", None, files, [file])
+    assert list(read.compared) == ["altered_0"]
+    assert "recordings/altered_0/comparison.nc" in read.files
+    problem = tmp_path / "problem.yaml"
+    problem.write_text(problem.read_text() + "prediction: { samples: 3 }\n")
+    with pytest.raises(UserError, match=r"comparison\.nc") as refused:
+        load(problem, None, files, [file])
+    assert "made from another problem" in str(refused.value)

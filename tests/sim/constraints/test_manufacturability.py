@@ -1,0 +1,232 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sim.constraints import KIND_NAMES, ConstraintVector, Limits, margins
+from sim.constraints.manufacturability import edge_length, separation, void_angle
+from sim.core import Floats
+from sim.optimise import SqpOptions, minimise
+from sim.structure import (
+    DesignSpace,
+    Lattice,
+    Symmetry,
+    design_space,
+    overlapping_pairs,
+    quads,
+    smallest_gap,
+    void_angles,
+)
+from sim.structure.gaps import polygons
+
+LIMITS = Limits(edge_length=5.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=0.2)
+
+
+@pytest.fixture(scope="module")
+def lattice() -> Lattice:
+    return quads(5, 5, 15.0, 2.25, np.deg2rad(20))
+
+
+@pytest.fixture(scope="module")
+def space(lattice: Lattice) -> DesignSpace:
+    return design_space(lattice, np.array([6, 7, 8, 11, 13, 16, 17, 18]), np.array([12]))
+
+
+@pytest.fixture(scope="module")
+def constraints(space: DesignSpace) -> ConstraintVector:
+    return ConstraintVector(space, LIMITS)
+
+
+def random_design(space: DesignSpace, size: float, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-size, size, space.n_variables)
+
+
+@pytest.mark.parametrize("symmetry", ["none", "C4"])
+def test_sparse_jacobian_is_that_of_the_plain_definition(
+    lattice: Lattice, symmetry: Symmetry
+) -> None:
+    cloak = np.array([6, 7, 8, 11, 13, 16, 17, 18])
+    space = design_space(lattice, cloak, np.array([12]), symmetry)
+    constraints = ConstraintVector(space, LIMITS)
+    design = random_design(space, 0.8)
+
+    def plain(x: jax.Array) -> jax.Array:
+        vertices = space.vertices(x)
+        measured = [jax.vmap(kind.measure)(vertices[kind.places]) for kind in constraints.kinds]
+        parts = zip(constraints.kinds, measured, strict=True)
+        return jnp.concatenate([kind.scale * kind.margins(values) for kind, values in parts])
+
+    values, jacobian = constraints(design)
+    np.testing.assert_allclose(values, plain(jnp.asarray(design)), atol=1e-12)
+    np.testing.assert_allclose(jacobian.toarray(), jax.jit(jax.jacobian(plain))(design), atol=1e-12)
+
+
+def test_jacobian_agrees_with_central_differences(
+    space: DesignSpace, constraints: ConstraintVector
+) -> None:
+    design, direction = random_design(space, 0.8), random_design(space, 1.0, seed=1)
+    step = 1e-6
+    ahead, behind = (constraints.values(design + sign * step * direction) for sign in (1, -1))
+    np.testing.assert_allclose(
+        constraints(design)[1] @ direction, (ahead - behind) / (2 * step), atol=1e-7
+    )
+
+
+def test_only_places_that_the_design_can_change_are_constrained(
+    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+) -> None:
+    _, jacobian = constraints(random_design(space, 0.5))
+    free = np.isin(np.arange(lattice.n_vertices), space.free_vertices)
+    touched = free | free[lattice.next_vertex]
+    assert len(constraints.kinds[0].places) == touched.sum() < lattice.n_vertices
+    rows = np.asarray(abs(jacobian).sum(axis=1)).ravel()
+    edges = slice(0, len(constraints.kinds[0].places))
+    assert (rows[edges] > 0).all()
+
+
+def test_every_corner_is_constrained_even_without_a_ligament(lattice: Lattice) -> None:
+    space = design_space(lattice, np.array([0]))
+    corners = ConstraintVector(space, Limits(block_angle=0.5)).kinds[0].places
+    assert set(range(4)) <= set(corners[:, 1])
+
+
+def block_angles(lattice: Lattice, vertices: Floats) -> Floats:
+    """Interior angle (n_vertices,) of each unit at each vertex, on [0, 2 pi), rad."""
+    following, preceding = (
+        (vertices[beside] - vertices) @ np.array([1.0, 1.0j])
+        for beside in (lattice.next_vertex, lattice.previous_vertex)
+    )
+    return np.asarray(np.mod(np.angle(preceding / following), 2 * np.pi))
+
+
+def test_margins_are_those_of_the_geometry(
+    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+) -> None:
+    vertices = constraints.vertices(random_design(space, 1.0))
+    found = margins(lattice, vertices, LIMITS)
+    edges = np.linalg.norm(vertices[lattice.next_vertex] - vertices, axis=1)
+    assert tuple(found) == KIND_NAMES
+    assert found["edge_length"].value == pytest.approx(edges.min() - 5)
+    angles = block_angles(lattice, vertices)
+    assert found["block_angle"].value == pytest.approx(angles.min() - np.pi / 6)
+    assert found["convexity"].value == pytest.approx(np.pi - angles.max())
+    assert found["void_angle"].value == pytest.approx(float(void_angles(lattice, vertices).min()))
+    assert found["gap"].value == pytest.approx(smallest_gap(lattice, vertices).distance - 0.2)
+
+
+def test_the_worst_unit_is_named(lattice: Lattice) -> None:
+    vertices = lattice.vertices.copy()
+    unit = 3 + 5 * 2
+    vertices[4 * unit] = vertices[4 * unit + 1] + [0.5, -0.5]
+    worst = margins(lattice, vertices, Limits(edge_length=5.0))["edge_length"]
+    assert worst.units == (unit,)
+    assert worst.value == pytest.approx(np.hypot(0.5, 0.5) - 5.0)
+    assert "unit (3, 2)" in worst.where
+
+
+@pytest.mark.parametrize("degrees", [-40.0, -1.0, 0.0, 90.0, 179.0, 181.0, 269.0, 271.0, 300.0])
+def test_void_angles_unwrap_from_minus_45_to_315_degrees(degrees: float) -> None:
+    turn = np.deg2rad(degrees)
+    sides = jnp.array([[0, 0], [1, 0], [3, 1], [3 + np.cos(turn), 1 + np.sin(turn)]])
+    assert np.rad2deg(float(void_angle(sides))) == pytest.approx(degrees)
+    slope = jax.grad(void_angle)(sides)
+    assert np.isfinite(slope).all()
+
+
+def test_block_and_void_angles_close_the_circle_for_any_design(
+    lattice: Lattice, space: DesignSpace, constraints: ConstraintVector
+) -> None:
+    vertices = constraints.vertices(random_design(space, 2.0))
+    around = void_angles(lattice, vertices).sum(axis=1)
+    blocks = block_angles(lattice, vertices)[lattice.ligaments].sum(axis=1)
+    np.testing.assert_allclose(around + blocks, 2 * np.pi, atol=1e-12)
+
+
+@pytest.mark.parametrize("gap", [None, 0.2])
+def test_only_the_gap_keeps_diagonal_neighbours_apart(gap: float | None) -> None:
+    """Two units pushed at one another across a void, all angles and lengths being respected."""
+    lattice = quads(4, 4, 15.0, 2.25, np.deg2rad(20))
+    space = design_space(lattice, np.array([5, 6, 9, 10]))
+    limits = Limits(edge_length=3.0, block_angle=np.pi / 6, convex=True, void_angle=0.0, gap=gap)
+    constraints = ConstraintVector(space, limits)
+    rings = np.stack([np.arange(20, 24), np.arange(40, 44)])
+    distance = jax.jit(jax.value_and_grad(lambda x: separation(space.vertices(x)[rings])))
+
+    def push(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        value, slope = distance(x)
+        return float(value), np.asarray(slope), np.zeros(0)
+
+    options = SqpOptions(evaluations=40, retreats=0, target=-0.5)
+    found = minimise("sqp", push, constraints, np.zeros(space.n_variables), options=options)
+    vertices = constraints.vertices(found.x)
+    assert found.violation == 0.0
+    assert min(margin.value for margin in margins(lattice, vertices, limits).values()) >= 0
+    overlapping = overlapping_pairs(lattice, vertices).tolist()
+    if gap is None:
+        assert [5, 10] in overlapping
+        assert margins(lattice, vertices, LIMITS)["gap"].value < -0.2
+    else:
+        assert overlapping == []
+        assert smallest_gap(lattice, vertices).distance == pytest.approx(gap, abs=1e-2)
+
+
+def convex_ring(seed: int, centre: tuple[float, float]) -> np.ndarray:
+    """Four vertices on an ellipse: a convex quadrilateral, counter-clockwise."""
+    random = np.random.default_rng(seed)
+    angle = np.cumsum(random.uniform(0.3, 1.5, 4))
+    axes = random.uniform(1.0, 4.0, 2)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) * axes + centre
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.floats(-12, 12), st.floats(-12, 12))
+def test_separation_is_the_distance_of_convex_polygons(seed: int, x: float, y: float) -> None:
+    one, other = convex_ring(seed, (0.0, 0.0)), convex_ring(seed + 1, (x, y))
+    found = float(separation(jnp.asarray(np.stack([one, other]))))
+    first, second = shapely.Polygon(one), shapely.Polygon(other)
+    if shapely.area(shapely.intersection(first, second)) > 1e-9:
+        assert found < 0
+    else:
+        assert found == pytest.approx(shapely.distance(first, second), abs=1e-9)
+
+
+def test_separation_of_non_convex_units_is_on_the_safe_side() -> None:
+    dart = np.array([[0.0, 0.0], [4.0, 0.0], [1.0, 1.0], [0.0, 4.0]])
+    square = np.array([[2.0, 2.0], [3.0, 2.0], [3.0, 3.0], [2.0, 3.0]])
+    true = shapely.distance(shapely.Polygon(dart), shapely.Polygon(square))
+    assert float(separation(jnp.asarray(np.stack([dart, square])))) <= true
+
+
+def test_separation_ignores_padding() -> None:
+    one, other = convex_ring(3, (0.0, 0.0)), convex_ring(4, (9.0, 1.0))
+    padded = np.stack([np.concatenate([ring, ring[-1:]]) for ring in (one, other)])
+    plain = np.stack([one, other])
+    assert separation(jnp.asarray(padded)) == pytest.approx(separation(jnp.asarray(plain)))
+    assert np.isfinite(jax.grad(separation)(jnp.asarray(padded))).all()
+
+
+def test_constraint_vertices_are_those_of_the_design_space(
+    space: DesignSpace, constraints: ConstraintVector
+) -> None:
+    design = random_design(space, 1.0)
+    np.testing.assert_allclose(
+        constraints.vertices(design), space.vertices(jnp.asarray(design)), atol=1e-13
+    )
+
+
+def test_no_requirement_means_no_constraint(space: DesignSpace) -> None:
+    values, jacobian = ConstraintVector(space, Limits())(np.zeros(space.n_variables))
+    assert values.shape == (0,)
+    assert jacobian.shape == (0, space.n_variables)
+
+
+def test_edge_length_is_in_mm() -> None:
+    assert float(edge_length(jnp.array([[0.0, 0.0], [3.0, 4.0]]))) == pytest.approx(5.0)
+
+
+def test_polygons_are_those_of_the_vertices(lattice: Lattice) -> None:
+    areas = shapely.area(polygons(lattice, lattice.vertices))
+    np.testing.assert_allclose(areas, 2 * (6.375**2 * (1 + np.tan(np.deg2rad(20)) ** 2)))

@@ -1,0 +1,49 @@
+"""Loops are compiled once, by whichever process wants them first."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import ROOT
+
+LOOPS = """
+from sim.core.compiling import compiled
+
+@compiled
+def inner(n):
+    total = 0.0
+    for k in range(n):
+        total += k % 7
+    return total
+
+@compiled
+def outer(n):
+    return inner(n) + inner(n + 1)
+"""
+WANT = """
+import loops
+loops.outer(3)
+print(sum(loops.outer.stats.cache_misses.values()), loops.outer(3))
+"""
+
+
+@pytest.mark.parametrize("writable", [True, False])
+def test_processes_that_want_a_loop_at_once_compile_it_once(tmp_path: Path, writable: bool) -> None:
+    (tmp_path / "loops.py").write_text(LOOPS)
+    cache = tmp_path / "cache" if writable else tmp_path / "loops.py" / "none"
+    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(cache)}
+    want = [sys.executable, "-c", WANT]
+    asking = [
+        subprocess.Popen(want, env=os.environ | places, text=True, stdout=subprocess.PIPE)
+        for _ in range(3)
+    ]
+    told = [each.communicate(timeout=120)[0].split() for each in asking]
+    assert [each.returncode for each in asking] == [0, 0, 0]
+    assert {value for _, value in told} == {"9.0"}
+    compiled = sum(int(misses) for misses, _ in told)
+    assert compiled == 1 or (not writable and compiled <= 3)  # Numba has other places for its cache

@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from sim.core import Floats
+from sim.energy import (
+    ContactLaw,
+    LigamentLaw,
+    contact_energy,
+    ligament_energy,
+    ligament_kernels,
+    topology,
+    void_contact_kernels,
+)
+from sim.energy.network_arrays import NetworkArrays
+from sim.scene import concrete_parameters
+from sim.structure import ConcreteParameters, Lattice, parameters, shape
+from tests.sim.reference_scenes import compressed, reference
+from tests.sim.structures import mixed_polygons, rotating_squares, some_ligaments
+
+LAW = ContactLaw(1.5, BARRIER, CUTOFF)
+
+
+def network(lattice: Lattice) -> tuple[NetworkArrays, Floats]:
+    """Kernel arrays of a lattice at rest, and its centroids."""
+    made = shape(lattice, lattice.vertices)
+    top = topology(lattice, np.array([], dtype=np.int64), BARRIER, CUTOFF)
+    values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+    return top.network(values), np.asarray(made.centroid)
+
+
+SQUARES, MIXED = network(rotating_squares()), network(mixed_polygons())
+
+
+def energy(motion: Floats, net: NetworkArrays) -> tuple[float, float]:
+    turn, force = np.empty((len(motion) // 3, 4)), np.empty(len(motion))
+    strain = ligament_kernels.gradient(motion, net, turn, force)
+    return strain, void_contact_kernels.add_gradient(motion, net, force)
+
+
+def typical_energy(net: NetworkArrays, n_units: int) -> float:
+    motion = np.random.default_rng(0).normal(size=(n_units, 3)) * [1.0, 1.0, 0.1]
+    return energy(motion.ravel(), net)[0]
+
+
+@pytest.mark.parametrize("structure", [SQUARES, MIXED], ids=["squares", "mixed"])
+@given(
+    angle=st.floats(-40.0, 40.0),
+    shift=st.tuples(st.floats(-100.0, 100.0), st.floats(-100.0, 100.0)),
+)
+def test_rigid_motions_cost_no_energy(
+    structure: tuple[NetworkArrays, Floats], angle: float, shift: tuple[float, float]
+) -> None:
+    """Turned by any angle, several times around too, and moved by any distance, as a whole."""
+    net, centroid = structure
+    c, s = np.cos(angle), np.sin(angle)
+    moved = centroid @ np.array([[c, s], [-s, c]]) - centroid + shift
+    motion = np.column_stack([moved, np.full(len(moved), angle)])
+    strain, contact = energy(motion.ravel(), net)
+    assert strain <= 1e-12 * typical_energy(net, len(centroid))
+    assert contact == 0.0
+
+
+def test_rigid_motions_cost_no_energy_in_the_definition_either() -> None:
+    arm_a, arm_b, vector = jnp.array([6.0, -2.0]), jnp.array([-6.0, 2.5]), jnp.array([2.25, 0.0])
+    span = arm_a + vector - arm_b
+    for angle in np.linspace(-20.0, 20.0, 41):
+        c, s = np.cos(angle), np.sin(angle)
+        moved = jnp.array([[c, -s], [s, c]]) @ span - span
+        a, b = jnp.array([0.0, 0.0, angle]), jnp.array([*moved, angle])
+        found = ligament_energy(a, b, arm_a, arm_b, vector, LigamentLaw(120.0, 1.19, 1.5))
+        assert found < 1e-25
+
+
+def test_ligament_strains_are_the_papers() -> None:
+    """Pure stretch, shear and bending of one ligament against their closed forms."""
+    still, vector = jnp.zeros(3), jnp.array([2.0, 0.0])
+    law = LigamentLaw(100.0, 3.0, 7.0)
+
+    def of(motion: list[float]) -> float:
+        zero = jnp.zeros(2)
+        return float(ligament_energy(still, jnp.array(motion), zero, zero, vector, law))
+
+    assert of([0.5, 0.0, 0.0]) == pytest.approx(0.5 * 100 * 0.5**2)
+    sheared = np.arctan2(1.0, 2.0)
+    stretched = np.hypot(1.0, 2.0) - 2.0
+    assert of([0.0, 1.0, 0.0]) == pytest.approx(
+        0.5 * 100 * stretched**2 + 0.5 * 3 * (2.0 * sheared) ** 2
+    )
+    assert of([0.0, 0.0, 0.4]) == pytest.approx(0.5 * 3 * (2.0 * 0.2) ** 2 + 0.5 * 7 * 0.4**2)
+
+
+@given(angle_deg=st.floats(-14.999, -10.0))
+def test_contact_is_the_authors_formula(angle_deg: float) -> None:
+    angle = np.deg2rad(angle_deg)
+    x = (angle - CUTOFF) / (CUTOFF - BARRIER)
+    wanted = 1.5 / 4 * (CUTOFF - BARRIER) ** 2 * (1 / (x + 1) - 1 / (x - 1) - 2)
+    assert float(contact_energy(angle, LAW)) == pytest.approx(wanted, rel=1e-9, abs=1e-14)
+
+
+def test_contact_begins_without_a_jump_in_force_and_ends_at_the_barrier() -> None:
+    slope = jax.grad(lambda angle: contact_energy(angle, LAW))
+    assert float(contact_energy(CUTOFF, LAW)) == 0.0
+    assert float(slope(CUTOFF + 1e-9)) == 0.0
+    assert abs(float(slope(CUTOFF - 1e-9))) < 1e-8
+    assert float(contact_energy(BARRIER + 1e-9, LAW)) > 1e3
+    assert np.isinf(contact_energy(BARRIER, LAW))
+    assert np.isinf(contact_energy(BARRIER - 1.0, LAW))
+
+
+@pytest.mark.parametrize("opening_deg", [100.0, 179.9, 180.1, 250.0, 340.0, 700.0])
+def test_a_void_opened_beyond_half_a_turn_is_no_contact(opening_deg: float) -> None:
+    """Through an atan2 such a void reads as closed, in the authors' code."""
+    net, centroid = SQUARES
+    motion = np.zeros((len(centroid), 3))
+    a, b = net.unit[0]
+    motion[a, 2], motion[b, 2] = np.deg2rad(opening_deg) / 2, -np.deg2rad(opening_deg) / 2
+    only = net._replace(touching=np.array([0]), void=np.full_like(net.void, np.deg2rad(720.0)))
+    assert energy(motion.ravel(), only)[1] == 0.0
+
+
+def test_energies_along_the_reference_path() -> None:
+    """Strain and contact energy of the states that the paper's code went through."""
+    scene, stored = compressed("B"), reference("B")
+    net = scene.topology.network(concrete_parameters(scene, scene.lattice.vertices))
+    found = [energy(state.ravel(), net) for state in stored["static_path_u"]]
+    np.testing.assert_allclose(np.sum(found, axis=1), stored["static_path_energy_Nmm"], rtol=1e-12)
+    assert found[-1] == pytest.approx((112.8736, 0.0342), abs=1e-4)
+    region = some_ligaments(net, np.flatnonzero(stored["roi_bond_mask"]))
+    in_region = energy(stored["static_path_u"][-1].ravel(), region)[0]
+    assert in_region == pytest.approx(stored["static_path_roi_energy_Nmm"][-1], rel=1e-12)

@@ -1,0 +1,91 @@
+"""Both ways to store the tangent solve the same systems and notice what is not positive."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.core import Floats, Ints
+from sim.linalg import Matrix, add, clear, factorise, matrix, number_free_dofs, solve
+from sim.linalg.symmetric import seconds
+from tests.sim.structures import dense, mixed_polygons, rotating_squares
+
+HELD = np.array([0, 1, 2, 9, 13])
+
+
+def networks() -> dict[str, tuple[Floats, Ints]]:
+    """Sites and coupled pairs: of ligaments alone, with diagonal pairs, of polygons, in pieces."""
+    squares, mixed = rotating_squares(9), mixed_polygons()
+    bonded = squares.ligament_units
+    corner = np.array([k for k in range(72) if k % 9 < 8])
+    diagonal = np.stack([corner, corner + 10], axis=1)
+    apart = bonded[(bonded != 40).all(axis=1) & (bonded // 9 != 6).all(axis=1)]
+    return {
+        "squares": (squares.site, bonded),
+        "diagonals": (squares.site, np.concatenate([bonded, diagonal])),
+        "polygons": (mixed.site, mixed.ligament_units),
+        "pieces": (squares.site, apart),
+    }
+
+
+def filled(name: str, by_fronts: bool, diagonal: float = 30.0) -> Matrix:
+    """A random symmetric matrix on a network's pattern."""
+    site, pairs = networks()[name]
+    free, pattern = number_free_dofs(site, pairs, HELD, by_fronts)
+    made, rng = matrix(pattern), np.random.default_rng(0)
+    clear(made)
+    for a, b in pairs:
+        for i in 3 * a + np.arange(3):
+            for j in 3 * b + np.arange(3):
+                add(made, free[i], free[j], rng.normal())
+    for i in free[free >= 0]:
+        add(made, i, i, diagonal)
+    return made
+
+
+@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+@pytest.mark.parametrize("name", list(networks()))
+def test_solution(name: str, by_fronts: bool) -> None:
+    made = filled(name, by_fronts)
+    full, right = dense(made), np.random.default_rng(1).normal(size=made.pattern.n_dofs)
+    solution = right.copy()
+    assert factorise(made)
+    solve(made, solution)
+    np.testing.assert_allclose(full @ solution, right, atol=1e-12)
+
+
+@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+def test_an_indefinite_matrix_is_noticed(by_fronts: bool) -> None:
+    made = filled("squares", by_fronts, diagonal=4.0)
+    assert np.linalg.eigvalsh(dense(made)).min() < 0
+    assert not factorise(made)
+
+
+@pytest.mark.parametrize("place", [0, 100, -1])
+@pytest.mark.parametrize("by_fronts", [False, True], ids=["band", "fronts"])
+def test_nan_is_not_positive_definite(by_fronts: bool, place: int) -> None:
+    made = filled("squares", by_fronts)
+    n = made.pattern.n_dofs
+    add(made, place % n, place % n, np.nan)
+    assert not factorise(made)
+
+
+def test_every_dof_is_numbered_once() -> None:
+    for site, pairs in networks().values():
+        free, pattern = number_free_dofs(site, pairs, HELD, by_fronts=True)
+        assert (free[HELD] == -1).all()
+        np.testing.assert_array_equal(np.sort(free[free >= 0]), np.arange(pattern.n_dofs))
+
+
+def test_fronts_are_chosen_where_they_are_faster() -> None:
+    kinds = []
+    for side in (6, 40):
+        lattice = rotating_squares(side)
+        options = [
+            number_free_dofs(lattice.site, lattice.ligament_units, HELD, by_fronts)[1]
+            for by_fronts in (False, True)
+        ]
+        chosen = number_free_dofs(lattice.site, lattice.ligament_units, HELD)[1]
+        assert seconds(chosen) == min(map(seconds, options))
+        kinds.append(chosen.by_fronts)
+    assert kinds == [False, True]

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sim.energy.ligament_kernels import gradient
+from sim.scene import DisplacementMimicking, StrainEnergyMimicking, strain_energies
+from sim.scene.objectives import RelativeMimicking, extent
+from sim.solvers import Harmonic
+from sim.time_integration import simpson_weights
+from tests.sim.structures import Rig, rotating_squares, some_ligaments
+
+RIG = Rig(rotating_squares(), np.array([0, 4]), np.array([12]), Harmonic(1.0, 2.0))
+MOTION = np.random.default_rng(2).normal(size=(2, 5, 25, 3)) * [1.0, 1.0, 0.1]
+WEIGHTS = simpson_weights(5, 1.0)
+
+
+def test_displacement_mimicking_is_the_papers_sum() -> None:
+    units = np.array([3, 7, 20])
+    losses = DisplacementMimicking(units, 15.0, WEIGHTS)(jnp.asarray(MOTION), RIG.values)
+    for case in range(2):
+        wanted = 0.0
+        for time in range(5):
+            ux, uy, theta = MOTION[case, time, units].T
+            wanted += WEIGHTS[time] * np.sum((ux / 15) ** 2 + (uy / 15) ** 2 + theta**2)
+        assert float(losses[case]) == pytest.approx(wanted, rel=1e-13)
+
+
+def test_a_target_that_is_met_costs_nothing() -> None:
+    units = np.array([3, 7, 20])
+    size = np.ones(2)
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, MOTION[:, :, units], size)
+    np.testing.assert_array_equal(measure(jnp.asarray(MOTION), RIG.values), 0.0)
+
+
+def test_a_missed_target_is_relative_to_its_size() -> None:
+    units = np.array([3, 7, 20])
+    target = MOTION[:, :, units]
+    size = extent(target, 15.0)[:, -1]
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, target, size)
+    losses = measure(jnp.zeros_like(MOTION), RIG.values)
+    every = DisplacementMimicking(units, 15.0, WEIGHTS)(jnp.asarray(MOTION), RIG.values)
+    np.testing.assert_allclose(losses, np.sqrt(every) / size, rtol=1e-13)
+
+
+def test_strain_energies_are_the_kernels() -> None:
+    ligaments = np.array([0, 7, 31])
+    units, values = RIG.lattice.ligament_units[ligaments], RIG.values
+    found = strain_energies(jnp.asarray(MOTION), values, ligaments, units)
+    net = RIG.topology.network(values)
+    force, turn = np.empty(75), np.empty((25, 4))
+    for case, time, k in np.ndindex(2, 5, 3):
+        alone = some_ligaments(net, ligaments[k : k + 1])
+        energy = gradient(MOTION[case, time].ravel(), alone, turn, force)
+        assert found[case, time, k] == pytest.approx(energy, rel=1e-12)
+    losses = StrainEnergyMimicking(ligaments, units, WEIGHTS)(jnp.asarray(MOTION), values)
+    np.testing.assert_allclose(losses, np.asarray(found).sum(axis=2) @ WEIGHTS, rtol=1e-13)

@@ -1,0 +1,220 @@
+"""What a plan decides, and that what it skips changes nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from sim.core import Floats
+from sim.energy import topology
+from sim.quasistatics import StaticSolver
+from sim.scene import Scene, concrete_parameters, evaluator, make_plan
+from sim.scene.evaluation import losses
+from sim.solvers import Harmonic, LinearRamp, TimeSeries, held_dofs, solve_case
+from sim.structure import quads
+from sim.time_integration import ExplicitSolver, ImplicitSolver
+from tests.sim.structures import NONE
+
+ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
+NEGLIGIBLE = 1e-12
+
+
+def scene(**changes: Any) -> Scene:  # noqa: ANN401
+    """7 x 7 squares, corners clamped, the middle driven; the ring next to it may change."""
+    lattice = quads(7, 7, 15.0, 2.25, np.deg2rad(20.0))
+    distance = np.abs(lattice.index - 3).max(axis=1)
+    made = Scene(
+        lattice=lattice,
+        material=MATERIAL,
+        barrier=BARRIER,
+        cutoff=CUTOFF,
+        clamped=held_dofs(np.array([0, 6, 42, 48]), NONE),
+        driven=np.array([24]),
+        motions=tuple(Harmonic(3.0, 5.0, angle) for angle in ANGLES),
+        weights=np.full(4, 0.25),
+        duration=0.2,
+        frequency=5.0,
+        static=False,
+        cloak=np.flatnonzero(distance == 1),
+        region=np.flatnonzero(distance == 3),
+        samples=41,
+    )
+    return replace(made, **changes)
+
+
+def design_of(scene: Scene, size: float = 0.4) -> Floats:
+    return size * np.random.default_rng(4).uniform(-1, 1, scene.space.n_variables)
+
+
+def relative(one: Floats, other: Floats) -> float:
+    return float(np.abs(one - other).max() / np.abs(other).max())
+
+
+def test_skipped_contact_changes_nothing() -> None:
+    posed = scene()
+    values = concrete_parameters(posed, np.asarray(posed.space.vertices(design_of(posed))))
+    solver = make_plan(posed).solver
+    assert isinstance(solver, ImplicitSolver)
+    assert len(solver.touching(values)) < posed.lattice.n_ligaments
+    complete = replace(solver, turn_allowance=np.inf)
+    for drive in posed.drives:
+        skipping, full = (solve_case(s, values, drive)[0] for s in (solver, complete))
+        assert relative(skipping, full) < NEGLIGIBLE
+
+
+def test_a_void_that_closes_after_all_is_not_skipped() -> None:
+    """Allowed hardly any rotation, ligaments come to the cutoff that had been left out."""
+    posed = scene(
+        lattice=quads(7, 7, 15.0, 2.25, np.deg2rad(46.0)), motions=(Harmonic(4.0, 5.0, 0.3),)
+    )
+    values = concrete_parameters(posed, posed.lattice.vertices)
+    solver = make_plan(posed).solver
+    assert isinstance(solver, ImplicitSolver)
+    careless = replace(solver, turn_allowance=0.01)
+    assert len(careless.touching(values)) < posed.lattice.n_ligaments
+    motion = solve_case(careless, values, posed.drives[0])[0]
+    complete = solve_case(replace(solver, turn_allowance=np.inf), values, posed.drives[0])[0]
+    states = complete.reshape(len(complete), -1, 3)
+    assert posed.topology.smallest_void_angle(values.void, states).min() < CUTOFF
+    assert relative(motion, complete) < NEGLIGIBLE
+
+
+def test_turned_copies_of_a_case_have_its_loss_and_gradient() -> None:
+    posed = scene(symmetry="C4")
+    plan = make_plan(posed)
+    np.testing.assert_array_equal(plan.case_of, [0, 1, 0, 1])
+    every = replace(plan, case_of=np.arange(4))
+    design = design_of(posed)
+    loss, gradient, each = evaluator(posed, plan)(design)
+    all_loss, all_gradient, all_each = evaluator(posed, every)(design)
+    assert loss == pytest.approx(all_loss, rel=NEGLIGIBLE)
+    assert relative(each, all_each) < NEGLIGIBLE
+    assert relative(gradient, all_gradient) < NEGLIGIBLE
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {
+            "motions": tuple(
+                Harmonic(3.0, f, a) for f, a in zip([5, 5, 6, 6.0], ANGLES, strict=True)
+            )
+        },
+        {"motions": tuple(Harmonic(d, 5.0, 0.0) for d in (1.0, 2.0, 3.0, 4.0))},
+        {"clamped": held_dofs(np.array([0, 6, 42]), NONE)},
+        {"clamped": np.array([0, 18, 126, 144])},
+        {"region": np.array([1, 2])},
+        {"symmetry": "none"},
+    ],
+    ids=["frequencies", "amplitudes", "a free corner", "half-clamped", "region", "design"],
+)
+def test_cases_are_no_copies_without_the_whole_symmetry(changes: dict[str, Any]) -> None:
+    plan = make_plan(scene(**{"symmetry": "C4", **changes}))
+    np.testing.assert_array_equal(plan.case_of, np.arange(4))
+
+
+def test_a_given_structure_is_judged_by_its_own_symmetry() -> None:
+    posed = scene()
+    symmetric = make_plan(posed, vertices=posed.lattice.vertices)
+    np.testing.assert_array_equal(symmetric.simulated, [0, 1])
+    uneven = np.asarray(posed.space.vertices(design_of(posed)))
+    np.testing.assert_array_equal(make_plan(posed, vertices=uneven).simulated, np.arange(4))
+
+
+@pytest.mark.parametrize("integrator", ["implicit", "explicit"])
+def test_skipped_derivatives_change_nothing(integrator: str) -> None:
+    posed = scene(
+        motions=(Harmonic(3.0, 5.0, 0.6),), weights=np.ones(1), duration=0.05, integrator=integrator
+    )
+    plan = make_plan(posed)
+    assert len(posed.topology.designed) < posed.lattice.n_ligaments
+    complete = topology(posed.lattice, posed.held, BARRIER, CUTOFF)
+    solver = plan.solver
+    assert isinstance(solver, ImplicitSolver | ExplicitSolver)
+    design = design_of(posed)
+    _, gradient, _ = evaluator(posed, plan)(design)
+    _, full, _ = evaluator(posed, replace(plan, solver=replace(solver, topology=complete)))(design)
+    assert relative(gradient, full) < NEGLIGIBLE
+
+
+def test_skipped_derivatives_of_equilibria_change_nothing() -> None:
+    posed = scene(
+        motions=(LinearRamp(3.0, 1.0, 0.6),), weights=np.ones(1), duration=1.0, static=True,
+        frequency=None, samples=5, objective="strain_energy",
+    )  # fmt: skip
+    plan = make_plan(posed)
+    assert len(posed.topology.designed) < posed.lattice.n_ligaments
+    solver = plan.solver
+    assert isinstance(solver, StaticSolver)
+    complete = replace(solver, topology=topology(posed.lattice, posed.held, BARRIER, CUTOFF))
+    design = design_of(posed)
+    _, gradient, _ = evaluator(posed, plan)(design)
+    _, full, _ = evaluator(posed, replace(plan, solver=complete))(design)
+    assert relative(gradient, full) < NEGLIGIBLE
+
+
+def test_the_evaluator_is_the_derivative_of_the_losses() -> None:
+    posed = scene(
+        motions=(Harmonic(3.0, 5.0, 0.6), Harmonic(3.0, 5.0, 1.6)), weights=np.array([0.3, 0.7])
+    )
+    plan, design = make_plan(posed), design_of(posed)
+    loss, gradient, each = evaluator(posed, plan)(design)
+    of_cases = losses(posed, plan)
+    np.testing.assert_allclose(each, of_cases(jnp.asarray(design)), rtol=1e-13)
+    assert loss == pytest.approx(0.3 * each[0] + 0.7 * each[1], rel=1e-13)
+    by_jax = jax.grad(lambda x: jnp.asarray(posed.weights) @ of_cases(x))(jnp.asarray(design))
+    assert relative(gradient, np.asarray(by_jax)) < NEGLIGIBLE
+
+
+@pytest.mark.parametrize(
+    ("changes", "integrator"),
+    [
+        ({}, "implicit"),
+        ({"frequency": 400.0}, "explicit"),
+        ({"accuracy": "tight"}, "explicit"),
+        ({"frequency": 400.0, "integrator": "implicit", "duration": 0.01}, "implicit"),
+        ({"integrator": "explicit"}, "explicit"),
+        ({"static": True, "frequency": None}, "static"),
+    ],
+)
+def test_the_integrator_fits_the_scene_and_can_be_chosen(
+    changes: dict[str, Any], integrator: str
+) -> None:
+    plan = make_plan(scene(**changes))
+    assert plan.integrator == integrator
+    assert plan.describe().startswith(f"integrator: {integrator}")
+
+
+def test_a_recorded_drive_gets_an_adapted_grid() -> None:
+    knots = np.linspace(0.0, 0.2, 9)
+    push = np.outer(np.sin(np.pi * knots / 0.2) ** 2, [2.0, 0.5, 0.02])
+    posed = scene(motions=(TimeSeries(knots, push),), weights=np.ones(1), frequency=None)
+    plan = make_plan(posed)
+    assert isinstance(plan.solver, ImplicitSolver)
+    assert any("adapted" in line for line in plan.decisions)
+    assert np.diff(plan.solver.times).max() / np.diff(plan.solver.times).min() > 2
+    assert evaluator(posed, plan)(np.zeros(posed.space.n_variables))[0] > 0
+
+
+def test_a_plan_tells_what_it_skips_and_can_be_stored() -> None:
+    plan = make_plan(scene(symmetry="C4"))
+    told = plan.describe()
+    for part in ("unloaded reference", "2 of 4 load cases", "parameter derivatives", "contact of"):
+        assert any(part in line for line in told.splitlines() if line.startswith("skipped: "))
+    assert json.loads(json.dumps(plan.record())) == plan.record()
+
+
+def test_the_grid_does_not_depend_on_the_design() -> None:
+    posed = scene()
+    one = make_plan(posed).solver
+    other = make_plan(posed, vertices=np.asarray(posed.space.vertices(design_of(posed)))).solver
+    assert isinstance(one, ImplicitSolver)
+    assert isinstance(other, ImplicitSolver)
+    np.testing.assert_array_equal(one.times, other.times)

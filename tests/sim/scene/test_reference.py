@@ -1,0 +1,178 @@
+"""Agreement with the paper's own code on its scenes, at the accuracy that is promised."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax import Array
+
+from sim.core import Floats
+from sim.scene import (
+    Accuracy,
+    DisplacementMimicking,
+    Scene,
+    StrainEnergyMimicking,
+    concrete_parameters,
+    make_plan,
+    structure,
+)
+from sim.solvers import simulate, solve_case
+from sim.structure import shape
+from tests.sim.reference_scenes import (
+    SAMPLES,
+    compressed,
+    group_gradient,
+    paper_lattice,
+    reference,
+    scene_a,
+)
+
+
+def test_lattice_is_the_references() -> None:
+    lattice, stored = paper_lattice(), reference("A")
+    made = shape(lattice, lattice.vertices)
+    offset = stored["block_centroids_mm"][0]
+    np.testing.assert_allclose(made.centroid, stored["block_centroids_mm"] - offset, atol=1e-10)
+    np.testing.assert_allclose(
+        made.arm, stored["centroid_node_vectors_mm"].reshape(-1, 2), atol=1e-10
+    )
+    np.testing.assert_array_equal(lattice.ligaments, stored["bond_connectivity"])
+    np.testing.assert_allclose(
+        lattice.ligament_vectors, stored["reference_bond_vectors_mm"], atol=1e-10
+    )
+
+
+def test_inertia_and_damping_are_the_references() -> None:
+    scene, stored = scene_a(), reference("A")
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    np.testing.assert_allclose(
+        values.mass, stored["inertia_tonne_tonne_tonnemm2"], rtol=1e-11, atol=0
+    )
+    damping = stored["damping_per_dof_tonne_per_s_or_tonne_mm2_per_s"]
+    np.testing.assert_allclose(values.damping, np.tile(damping, (225, 1)), rtol=1e-7)
+
+
+def test_regions_are_the_references() -> None:
+    stored = reference("A")
+    np.testing.assert_array_equal(scene_a().region, stored["roi_blocks"])
+    designed = sum(int(stored[f"mask_{kind}_design"].sum()) for kind in ("horizontal", "vertical"))
+    assert scene_a().space.n_variables == 2 * designed == 304
+
+
+class Outcome(NamedTuple):
+    integrator: str
+    motion: Floats
+    loss: float
+    gradient: Floats
+
+
+def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
+    scene = scene_a(accuracy=accuracy)
+    plan = make_plan(scene, asked=SAMPLES)
+    measure = DisplacementMimicking(scene.region, scene.lattice.spacing, np.ones(len(SAMPLES)))
+    of_design = structure(scene)
+
+    def loss(design: Array) -> tuple[Array, Array]:
+        values = of_design(design)
+        response = simulate(plan.solver, values, scene.drives)
+        return measure(response.displacement, values)[0], response.displacement
+
+    design = jnp.zeros(scene.space.n_variables)
+    (value, motion), gradient = jax.value_and_grad(loss, has_aux=True)(design)
+    return Outcome(
+        plan.integrator, np.asarray(motion)[0][:, scene.region], float(value), np.asarray(gradient)
+    )
+
+
+@pytest.fixture(scope="module")
+def default_a() -> Outcome:
+    return outcome_of_scene_a("default")
+
+
+@pytest.fixture(scope="module")
+def tight_a() -> Outcome:
+    return outcome_of_scene_a("tight")
+
+
+def relative(found: Floats, wanted: Floats) -> float:
+    return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+
+
+def assert_agrees_with_scene_a(found: Outcome, motion: float, loss: float, gradient: float) -> None:
+    stored, scale = reference("A"), np.array([15.0, 15.0, 1.0])
+    wanted = stored["roi_displacement_tight_mm_mm_rad"]
+    by_shifts = group_gradient(scene_a(), "A", "grad_{}_shifts_rk4_discrete")
+    assert relative(found.motion / scale, wanted / scale) <= motion
+    assert abs(found.loss / stored["loss_tight"] - 1) <= loss
+    assert relative(found.gradient, by_shifts) <= gradient
+
+
+def test_scene_a_at_default_accuracy(default_a: Outcome) -> None:
+    assert default_a.integrator == "implicit"
+    assert_agrees_with_scene_a(default_a, motion=3e-3, loss=2e-4, gradient=3e-4)
+
+
+def test_scene_a_at_tight_accuracy(tight_a: Outcome) -> None:
+    assert_agrees_with_scene_a(tight_a, motion=1e-4, loss=1e-6, gradient=5e-5)
+
+
+def test_error_estimate_by_halving_the_steps() -> None:
+    """Each step cut in two: what changes is the true error within a factor of 3."""
+    scene, stored = scene_a(), reference("A")
+    solver = make_plan(scene, asked=SAMPLES).solver
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    scale = np.array([15.0, 15.0, 1.0])
+
+    def in_region(motion: Floats) -> Floats:
+        return motion.reshape(len(SAMPLES), -1, 3)[:, scene.region] / scale
+
+    coarse, _, record = solve_case(solver, values, scene.drives[0])
+    fine = solve_case(solver.refined(record), values, scene.drives[0])[0]
+    found, finer = in_region(coarse), in_region(fine)
+    exact = stored["roi_displacement_tight_mm_mm_rad"] / scale
+    assert 1 / 3 < relative(found, finer) / relative(found, exact) < 3
+    losses = [float(np.sum(motion**2)) for motion in (found, finer, exact)]
+    assert 1 / 3 < (losses[0] - losses[1]) / (losses[0] - losses[2]) < 3
+
+
+def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicking:
+    ligaments = np.flatnonzero(reference(name)["roi_bond_mask"])
+    return StrainEnergyMimicking(
+        ligaments, scene.lattice.ligament_units[ligaments], np.ones(n_loads)
+    )
+
+
+@pytest.mark.parametrize("name", ["B", "C"])
+def test_final_equilibrium(name: str) -> None:
+    scene, stored = compressed(name), reference(name)
+    end = np.array([scene.duration])
+    plan = make_plan(scene, asked=end)
+    measure, of_design = static_measure(scene, name, 1), structure(scene)
+
+    def loss(design: Array) -> tuple[Array, Array]:
+        values = of_design(design)
+        response = simulate(plan.solver, values, scene.drives)
+        return measure(response.displacement, values)[0], response.displacement
+
+    design = jnp.zeros(scene.space.n_variables)
+    (energy, motion), gradient = jax.value_and_grad(loss, has_aux=True)(design)
+    np.testing.assert_allclose(motion[0, 0], stored["static_u_eq_final"], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(energy, stored["static_final_loss_Nmm"], rtol=1e-9)
+    wanted = group_gradient(scene, name, "static_final_grad_{}_shifts")
+    assert relative(np.asarray(gradient), wanted) <= 1e-7
+
+
+def test_path_of_scene_b() -> None:
+    scene, stored = compressed("B"), reference("B")
+    amplitudes = stored["static_path_amps_mm"]
+    plan = make_plan(scene, asked=amplitudes)
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    motion = simulate(plan.solver, values, scene.drives).displacement[0]
+    np.testing.assert_allclose(motion, stored["static_path_u"], rtol=0, atol=1e-6)
+    measure = static_measure(scene, "B", 1)
+    each = [measure(state[None, None], values)[0] for state in motion]
+    np.testing.assert_allclose(each, stored["static_path_roi_energy_Nmm"], rtol=1e-8)

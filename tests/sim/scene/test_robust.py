@@ -1,0 +1,79 @@
+"""Losses that are combined over loads and averaged over imperfect copies."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sim.scene import Scene, combined, evaluator, make_plan
+from sim.solvers import Harmonic, Pulse
+from tests.sim.scene.test_plan import ANGLES, design_of, scene
+
+LOSSES, WEIGHTS = jnp.array([0.2, 1.0, 0.7]), jnp.array([0.5, 0.25, 0.25])
+
+
+def test_the_p_mean_goes_from_the_mean_to_the_largest() -> None:
+    assert combined(LOSSES, WEIGHTS, 1.0) == pytest.approx(0.525)
+    found = [float(combined(LOSSES, WEIGHTS, p)) for p in (1.0, 2.0, 8.0, 64.0)]
+    assert found == sorted(found)
+    assert 0.97 < found[-1] < 1.0
+    assert found[1] == pytest.approx(np.sqrt(0.5 * 0.04 + 0.25 * 1.0 + 0.25 * 0.49))
+
+
+def test_the_gradient_of_the_p_mean() -> None:
+    slope = jax.grad(lambda x: combined(x, WEIGHTS, 8.0))(LOSSES)
+    for k, step in enumerate(1e-6 * np.eye(3)):
+        ahead, behind = (float(combined(LOSSES + s, WEIGHTS, 8.0)) for s in (step, -step))
+        assert float(slope[k]) == pytest.approx((ahead - behind) / 2e-6, rel=1e-6, abs=1e-9)
+
+
+def robust() -> Scene:
+    """Two frequencies along four directions, and two imperfect copies."""
+    posed = scene()
+    copies = 0.3 * np.random.default_rng(7).uniform(-1, 1, (2, posed.lattice.n_groups, 2))
+    motions = tuple(Harmonic(a, f, angle) for a, f in ((3.0, 5.0), (2.0, 10.0)) for angle in ANGLES)
+    weights = np.repeat([0.15, 0.1], 4)
+    return scene(
+        motions=motions, weights=weights, frequency=10.0, sharpness=8.0, copies=copies, samples=21
+    )
+
+
+def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
+    posed = robust()
+    evaluate = evaluator(posed, make_plan(posed))
+    design = design_of(posed, 0.2)
+    value, gradient, each = evaluate(design)
+    assert each.shape == (8,)
+    assert posed.weights @ each < value < each.max()
+    steepest = float(np.linalg.norm(gradient))
+    way = gradient / steepest
+    ahead, behind = (evaluate(design + s * way)[0] for s in (1e-4, -1e-4))
+    assert steepest == pytest.approx((ahead - behind) / 2e-4, rel=1e-4)
+
+
+def test_the_loss_over_copies_is_the_mean_of_theirs() -> None:
+    posed = robust()
+    assert posed.copies is not None
+    design = design_of(posed, 0.2)
+    whole = evaluator(posed, make_plan(posed))(design)[0]
+    alone = []
+    for shifts in posed.copies:
+        one = replace(posed, copies=shifts[None])
+        alone.append(evaluator(one, make_plan(one))(design)[0])
+    assert whole == pytest.approx(np.mean(alone), rel=1e-12)
+    assert alone[0] != pytest.approx(alone[1], rel=1e-3)
+
+
+def test_turned_copies_of_cases_are_skipped_for_each_load() -> None:
+    plan = make_plan(replace(robust(), copies=None, symmetry="C4"))
+    np.testing.assert_array_equal(plan.case_of, [0, 1, 0, 1, 4, 5, 4, 5])
+
+
+def test_a_pulse_peaks_after_its_delay_and_is_gone() -> None:
+    motion = np.asarray(Pulse(2.0, 0.01, np.pi / 2, 0.04)(jnp.array([0.0, 0.04, 0.05, 0.2])))
+    np.testing.assert_allclose(motion[:, 1], [2 * np.exp(-16), 2.0, 2 / np.e, 0.0], atol=1e-12)
+    np.testing.assert_allclose(motion[:, [0, 2]], 0.0, atol=1e-12)

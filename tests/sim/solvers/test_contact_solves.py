@@ -1,0 +1,150 @@
+"""Solves with contact on the distance of units: nothing overlaps, and gradients stay exact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sim.core import Floats, SimulationError
+from sim.energy import observe
+from sim.quasistatics import StaticSolver
+from sim.solvers import Harmonic, LinearRamp, Solver, solve_case
+from sim.structure import clearance, close_pairs, displaced
+from sim.time_integration import ExplicitSolver, ImplicitSolver
+from tests.sim.solvers.test_gradients import Ray, assert_exact_in_contact
+from tests.sim.structures import Rig, hand_made, rotating_squares
+
+DISTANCE = 0.1875
+LEFT = 5 * np.arange(5)
+DURATION = 0.012
+ASKED = np.linspace(0.0, DURATION, 41)
+
+
+@cache
+def squeezed(side: int = 5, depth: float = 10.0, bias_deg: float = 20.0) -> Rig:
+    """Squares between plates, of which one moves in."""
+    left = side * np.arange(side)
+    squares = rotating_squares(side, bias_deg)
+    return Rig(squares, left, left + side - 1, LinearRamp(-depth, 1.0), DISTANCE)
+
+
+@cache
+def shaken() -> Rig:
+    """5 x 5 squares, nearly closed, the middle shaken."""
+    motion = Harmonic(2.0, 150.0, 0.6, rise=0.0015, delay=0.003)
+    squares = rotating_squares(5, 44.0)
+    return Rig(squares, np.array([0, 4, 20, 24]), np.array([12]), motion, DISTANCE)
+
+
+DYNAMIC: dict[str, Callable[[Rig], Solver]] = {
+    "implicit": lambda rig: ImplicitSolver(
+        rig.topology, np.linspace(0.0, DURATION, 61), ASKED, tolerance=1e-8
+    ),
+    "explicit": lambda rig: ExplicitSolver(rig.topology, DURATION, 200, ASKED),
+}
+
+
+def path(rig: Rig, solver: Solver) -> Floats:
+    """States (n_asked, n_units, 3) of a rig."""
+    found = solve_case(solver, rig.values, rig.drive)[0]
+    return found.reshape(len(found), -1, 3)
+
+
+def assert_clear_in_contact(rig: Rig, states: Floats) -> None:
+    """Units touch, and none overlap, by independent geometry."""
+    found = clearance(rig.lattice, rig.lattice.vertices, states)
+    assert found.overlaps.max() == 0
+    assert 0.0 < found.gap.min() < DISTANCE
+    seen = observe(rig.topology, rig.values, states)
+    assert seen.contact_energy.max() > 0.0
+    near = [
+        close_pairs(
+            rig.lattice, displaced(rig.lattice, rig.lattice.vertices, state[None])[0], DISTANCE
+        )
+        for state in states
+    ]
+    assert seen.contact_pairs.tolist() == [len(pairs) for pairs in near]
+
+
+def overlaps(rig: Rig, states: Floats) -> int:
+    return int(clearance(rig.lattice, rig.lattice.vertices, states).overlaps.max())
+
+
+def test_a_lattice_that_overlaps_with_contact_on_angles_does_not_on_distances() -> None:
+    """The paper's lattice, its right column driven by 15 mm."""
+    rig, loads = squeezed(15, 15.0), np.linspace(0.1, 1.0, 10)
+    angles = replace(rig, distance=None)
+    assert overlaps(angles, path(angles, StaticSolver(angles.topology, loads))) == 2
+    assert_clear_in_contact(rig, path(rig, StaticSolver(rig.topology, loads)))
+
+
+def test_one_large_step_ends_where_small_ones_do() -> None:
+    rig = squeezed()
+    at_once, in_steps = (
+        path(rig, StaticSolver(rig.topology, loads))[-1]
+        for loads in (np.ones(1), np.linspace(0.05, 1.0, 20))
+    )
+    np.testing.assert_allclose(at_once, in_steps, atol=1e-7)
+
+
+def test_a_structure_that_starts_all_but_touching() -> None:
+    """Squares turned until their corners all but meet, and pressed on with a large load."""
+    rig = squeezed(5, 4.0, 49.4)
+    start = clearance(rig.lattice, rig.lattice.vertices, np.zeros((1, 25, 3))).gap[0]
+    assert start < DISTANCE
+    assert_clear_in_contact(rig, path(rig, StaticSolver(rig.topology, np.ones(1))))
+
+
+def test_units_that_overlap_at_rest_are_named() -> None:
+    rig = squeezed(5, 1.0, 53.0)
+    with pytest.raises(SimulationError, match="overlap at rest"):
+        path(rig, StaticSolver(rig.topology, np.ones(1)))
+
+
+def square(x: float, y: float = 0.0) -> Floats:
+    return np.array([x, y]) + 4.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+
+
+def far_apart(depth: float) -> Rig:
+    """A square on a ligament, and far from both a driven one that is not joined to anything."""
+    squares = hand_made([square(0.0), square(10.0), square(50.0, 1.0)], np.array([[2, 7], [1, 4]]))
+    return Rig(squares, np.array([0]), np.array([2]), LinearRamp(-depth, 1.0), DISTANCE)
+
+
+def test_units_meet_that_were_far_apart_at_rest() -> None:
+    rig = far_apart(32.5)
+    assert [1, 2] not in rig.topology.meeting.pairs.tolist()  # type: ignore[union-attr]
+    states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
+    assert_clear_in_contact(rig, states)
+    assert states[-1, 1, 0] < -0.4
+
+
+def test_what_is_driven_through_a_held_unit_is_an_error() -> None:
+    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), LinearRamp(-10.0, 1.0), DISTANCE)
+    with pytest.raises(SimulationError, match="try "):
+        path(rig, StaticSolver(rig.topology, np.array([0.2, 1.0])))
+
+
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_motions_stay_clear(solver: str) -> None:
+    rig = shaken()
+    assert_clear_in_contact(rig, path(rig, DYNAMIC[solver](rig)))
+
+
+@pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
+def test_gradients_of_equilibria(quantity: str) -> None:
+    rig = squeezed()
+    solver = StaticSolver(rig.topology, np.array([0.6, 1.0]), relative=1e-13)
+    assert_clear_in_contact(rig, path(rig, solver))
+    assert_exact_in_contact(Ray(rig, solver, quantity))
+
+
+@pytest.mark.parametrize("quantity", ["design", "contact"])
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_gradients_of_motions(solver: str, quantity: str) -> None:
+    rig = shaken()
+    assert_exact_in_contact(Ray(rig, DYNAMIC[solver](rig), quantity))

@@ -1,0 +1,259 @@
+"""Gradients of the solvers are those of the discrete solutions that they return.
+
+Each quantity is varied along a random direction of its own: relative for constants, mm for the
+design. The Taylor test takes the steps of ``TAYLOR``; with contact those of ``TAYLOR_IN_CONTACT``,
+so small that no void of the compared states crosses the contact's cutoff (asserted): there the
+energy's third derivative jumps. Newton's iterations stop far below the compared differences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
+from typing import cast
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax import Array
+from jax.flatten_util import ravel_pytree
+from numba.core.dispatcher import Dispatcher
+from numpy.typing import NDArray
+
+from benchmarks.scenes import CUTOFF
+from sim.core import Floats
+from sim.quasistatics import StaticSolver, equilibrium_path
+from sim.quasistatics.equilibrium_path import follow
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Solver, TimeSeries, simulate
+from sim.solvers.base import backward, forward
+from sim.time_integration import (
+    BLANES_MOAN,
+    LEAPFROG,
+    ExplicitSolver,
+    ImplicitSolver,
+    esdirk_adjoint,
+    symplectic,
+)
+from sim.time_integration.esdirk import march
+from sim.time_integration.esdirk_stage import solve_stage
+from tests.sim.structures import Numbers, Rig, mixed_polygons, rotating_squares
+
+TAYLOR = {
+    "design": np.geomspace(1e-3, 1e-4, 4),
+    "stiffness": np.geomspace(1e-4, 1e-5, 4),
+    "contact": np.geomspace(1e-2, 1e-3, 4),
+    "density": np.geomspace(1e-2, 1e-3, 4),
+    "damping": np.geomspace(1e-2, 1e-3, 4),
+    "drive": np.geomspace(1e-3, 1e-4, 4),
+}
+TAYLOR_IN_CONTACT = TAYLOR | {
+    "design": np.geomspace(1e-4, 1e-5, 4),
+    "stiffness": np.geomspace(4e-5, 4e-6, 4),
+    "contact": np.geomspace(3e-3, 3e-4, 4),
+    "density": np.geomspace(3e-3, 3e-4, 4),
+    "damping": np.geomspace(3e-4, 3e-5, 4),
+    "drive": np.geomspace(1e-4, 1e-5, 4),
+}
+DIFFERENCE, DIFFERENCE_IN_CONTACT = 1e-4, 1e-5
+DURATION = 0.012
+ASKED = np.linspace(0.0, DURATION, 9)
+EVERYWHERE = np.linspace(0.0, DURATION, 301)
+
+SOLVERS: dict[str, Callable[[Rig], Solver]] = {
+    "static": lambda rig: StaticSolver(rig.topology, np.array([0.4, 1.0]), relative=1e-13),
+    "implicit": lambda rig: ImplicitSolver(
+        rig.topology, np.linspace(0.0, DURATION, 61), ASKED, tolerance=1e-8
+    ),
+    "leapfrog": lambda rig: ExplicitSolver(rig.topology, DURATION, 400, ASKED, splitting=LEAPFROG),
+    "blanes_moan": lambda rig: ExplicitSolver(
+        rig.topology, DURATION, 300, ASKED, splitting=BLANES_MOAN
+    ),
+}
+DYNAMIC = ("implicit", "leapfrog", "blanes_moan")
+QUANTITIES = ("design", "stiffness", "density", "damping", "drive")
+
+
+@cache
+def shaken(bias_deg: float = 20.0, recorded: bool = False, amplitude: float = 2.0) -> Rig:
+    """5 x 5 squares with clamped corners, the middle shaken for 1.8 periods of 150 Hz."""
+    motion = measured() if recorded else Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
+    return Rig(rotating_squares(5, bias_deg), np.array([0, 4, 20, 24]), np.array([12]), motion)
+
+
+@cache
+def squeezed(depth: float, side: int = 5) -> Rig:
+    """Squares between plates, of which one moves in."""
+    left = side * np.arange(side)
+    return Rig(rotating_squares(side), left, left + side - 1, LinearRamp(-depth, 1.0))
+
+
+@cache
+def pulled() -> Rig:
+    """Polygons of all kinds, two of them pulled, each along a recorded path of its own."""
+    driven = np.array([4, 7])
+    return Rig(mixed_polygons(), np.array([0]), driven, measured(len(driven)))
+
+
+def measured(n_units: int | None = None) -> TimeSeries:
+    """A recorded wave of 41 samples, of all driven units together or of each."""
+    times = np.linspace(0.0, DURATION, 41)
+    phase = np.arange(3 * (n_units or 1)).reshape(-1, 3)
+    wave = np.sin(2 * np.pi * 150.0 * times[:, None, None] + phase) - np.sin(phase)
+    motion = np.sin(np.pi * times / DURATION)[:, None, None] * wave * [1.0, 1.0, 0.05]
+    return TimeSeries(times, motion if n_units else motion[:, 0])
+
+
+@dataclass(frozen=True)
+class Ray:
+    """Loss of a solver along one direction, and its slope by the adjoint."""
+
+    rig: Rig
+    solver: Solver
+    quantity: str
+
+    @cached_property
+    def direction(self) -> Numbers:
+        """A random change of one quantity alone."""
+        rng = np.random.default_rng(7)
+        recorded = isinstance(self.rig.motion, TimeSeries)
+        size = 0.1 if self.quantity == "drive" and recorded else 1.0
+
+        def change(leaf: Array) -> Array:
+            return size * jnp.asarray(rng.normal(size=leaf.shape)) * (jnp.abs(leaf).max() or 1.0)
+
+        changed = jax.tree.map(change, getattr(self.rig.numbers, self.quantity))
+        if isinstance(changed, TimeSeries):
+            changed = changed._replace(times=jnp.zeros_like(changed.times))
+        still = jax.tree.map(jnp.zeros_like, self.rig.numbers)
+        return still._replace(**{self.quantity: changed})
+
+    def at(self, step: float) -> Numbers:
+        return jax.tree.map(lambda x, d: x + step * d, self.rig.numbers, self.direction)
+
+    def loss(self, step: float) -> float:
+        return float(self.rig.loss(self.solver, self.at(step)))
+
+    @cached_property
+    def slope(self) -> float:
+        gradient = jax.grad(partial(self.rig.loss, self.solver))(self.rig.numbers)
+        return float(ravel_pytree(gradient)[0] @ ravel_pytree(self.direction)[0])
+
+    def order_of_remainder(self, steps: Floats) -> float:
+        """Exponent with which the remainder of the linear model falls with the step."""
+        start = self.loss(0.0)
+        remainders = [abs(self.loss(h) - start - h * self.slope) for h in steps]
+        return float(np.polyfit(np.log(steps), np.log(remainders), 1)[0])
+
+    def difference(self, h: float) -> float:
+        """Central difference of order four."""
+        one = self.loss(h) - self.loss(-h)
+        two = self.loss(2 * h) - self.loss(-2 * h)
+        return (8 * one - two) / (12 * h)
+
+    def in_contact(self, step: float, times: Floats) -> NDArray[np.bool_]:
+        """Which ligaments are in contact when."""
+        watching = replace(self.solver, asked=times)  # type: ignore[type-var]
+        values = self.rig.parameters(self.at(step))
+        drive = PrescribedMotion(self.rig.driven, self.at(step).drive)
+        motion = np.asarray(simulate(watching, values, (drive,)).displacement[0])
+        return self.rig.topology.smallest_void_angles(np.asarray(values.void), motion) < CUTOFF
+
+
+def assert_exact(ray: Ray) -> None:
+    assert ray.slope == pytest.approx(ray.difference(DIFFERENCE), rel=1e-6)
+    assert ray.order_of_remainder(TAYLOR[ray.quantity]) == pytest.approx(2.0, abs=0.05)
+
+
+def assert_exact_in_contact(ray: Ray) -> None:
+    assert ray.slope == pytest.approx(ray.difference(DIFFERENCE_IN_CONTACT), rel=1e-5)
+    assert ray.order_of_remainder(TAYLOR_IN_CONTACT[ray.quantity]) == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
+def test_equilibria(quantity: str) -> None:
+    rig = squeezed(4.0)
+    assert_exact(Ray(rig, SOLVERS["static"](rig), quantity))
+
+
+def test_equilibria_by_fronts() -> None:
+    """30 x 30 squares, whose tangent is no longer stored as a band."""
+    rig = squeezed(20.0, side=30)
+    assert rig.topology.numbering[1].by_fronts
+    assert_exact(Ray(rig, SOLVERS["static"](rig), "design"))
+
+
+@pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
+def test_equilibria_in_contact(quantity: str) -> None:
+    rig = squeezed(9.0)
+    solver = SOLVERS["static"](rig)
+    ray = Ray(rig, solver, quantity)
+    pattern = ray.in_contact(0.0, solver.asked)
+    assert pattern.any()
+    for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
+        np.testing.assert_array_equal(ray.in_contact(step, solver.asked), pattern)
+    assert_exact_in_contact(ray)
+
+
+@pytest.mark.parametrize("quantity", ["density", "damping"])
+def test_equilibria_do_not_depend_on_inertia(quantity: str) -> None:
+    rig = squeezed(4.0)
+    assert Ray(rig, SOLVERS["static"](rig), quantity).slope == 0.0
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_motions(solver: str, quantity: str) -> None:
+    rig = shaken()
+    assert_exact(Ray(rig, SOLVERS[solver](rig), quantity))
+
+
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_motions_under_a_recorded_drive(solver: str) -> None:
+    rig = shaken(recorded=True)
+    assert_exact(Ray(rig, SOLVERS[solver](rig), "drive"))
+
+
+@pytest.mark.parametrize("quantity", [*QUANTITIES, "contact"])
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_motions_in_contact(solver: str, quantity: str) -> None:
+    rig = shaken(bias_deg=45.0)
+    ray = Ray(rig, SOLVERS[solver](rig), quantity)
+    pattern = ray.in_contact(0.0, EVERYWHERE)
+    assert pattern.any()
+    for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
+        np.testing.assert_array_equal(ray.in_contact(step, EVERYWHERE), pattern)
+    assert_exact_in_contact(ray)
+
+
+@pytest.mark.parametrize("quantity", ["design", "contact", "drive"])
+def test_motions_deep_in_contact(quantity: str) -> None:
+    """Voids that close to their barrier, followed by many finer steps."""
+    rig = shaken(bias_deg=45.0, amplitude=3.0)
+    ray = Ray(rig, SOLVERS["blanes_moan"](rig), quantity)
+    states = np.asarray(simulate(ray.solver, rig.values, (rig.drive,)).displacement[0])
+    assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
+    assert ray.slope == pytest.approx(ray.difference(1e-7), rel=1e-3)
+
+
+@pytest.mark.parametrize("quantity", ["design", "drive"])
+@pytest.mark.parametrize("solver", ["implicit", "blanes_moan"])
+def test_polygons_of_any_kind(solver: str, quantity: str) -> None:
+    rig = pulled()
+    assert_exact(Ray(rig, SOLVERS[solver](rig), quantity))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_loops_are_compiled_for_one_kind_of_arguments(solver: str) -> None:
+    """Derivatives come as arrays of JAX, which are read only, or of NumPy."""
+    rig = shaken() if solver in DYNAMIC else squeezed(4.0)
+    method = SOLVERS[solver](rig)
+    by_jax = Ray(rig, method, "design").slope
+    motion, velocity, records = forward(method, rig.values, (rig.drive,))
+    pulled = backward(method, records, np.ones_like(motion), np.zeros_like(velocity))
+    assert np.isfinite(by_jax)
+    assert np.isfinite(pulled.parameters.law).all()
+    loops = (follow, equilibrium_path.adjoint, march, solve_stage, esdirk_adjoint.adjoint)
+    for loop in (*loops, symplectic.run, symplectic._step, symplectic.sweep_back):
+        assert len(cast(Dispatcher, loop).signatures) <= 1, loop

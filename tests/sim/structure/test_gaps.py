@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+import shapely
+from shapely.affinity import rotate, translate
+
+from sim.structure import (
+    Lattice,
+    clearance,
+    close_pairs,
+    displaced,
+    overlapping_pairs,
+    quads,
+    smallest_gap,
+)
+
+
+@pytest.fixture(scope="module")
+def lattice() -> Lattice:
+    return quads(4, 3, 15.0, 2.25, np.deg2rad(20))
+
+
+def all_pairs(lattice: Lattice, vertices: np.ndarray) -> tuple[dict, list]:
+    """Distances and overlaps of all pairs, one by one."""
+    units = [shapely.Polygon(vertices[lattice.unit == unit]) for unit in range(lattice.n_units)]
+    pairs = [(a, b) for a in range(len(units)) for b in range(a + 1, len(units))]
+    distances = {(a, b): units[a].distance(units[b]) for a, b in pairs}
+    return distances, [[a, b] for a, b in pairs if units[a].intersection(units[b]).area > 1e-9]
+
+
+def test_initial_lattice_is_a_ligament_apart(lattice: Lattice) -> None:
+    assert smallest_gap(lattice, lattice.vertices).distance == pytest.approx(2.25)
+    assert len(overlapping_pairs(lattice, lattice.vertices)) == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gap_and_overlaps_agree_with_all_pairs(lattice: Lattice, seed: int) -> None:
+    motion = np.random.default_rng(seed).normal(size=(lattice.n_units, 3)) * [1.5, 1.5, 0.3]
+    vertices = displaced(lattice, lattice.vertices, motion)
+    distances, overlapping = all_pairs(lattice, vertices)
+    gap = smallest_gap(lattice, vertices)
+    assert gap.distance == pytest.approx(min(distances.values()), abs=1e-12)
+    assert distances[gap.units] == pytest.approx(gap.distance, abs=1e-12)
+    assert overlapping_pairs(lattice, vertices).tolist() == overlapping
+
+
+def test_a_history_is_the_sum_of_its_states(lattice: Lattice) -> None:
+    motion = np.random.default_rng(1).normal(size=(6, lattice.n_units, 3)) * [1.5, 1.5, 0.3]
+    motion[0] = 0
+    found = clearance(lattice, lattice.vertices, motion)
+    assert found.overlaps[0] == 0
+    assert found.overlaps.sum() > 0
+    for state in range(6):
+        vertices = displaced(lattice, lattice.vertices, motion[state])
+        gap = smallest_gap(lattice, vertices)
+        assert found.gap[state] == gap.distance
+        assert tuple(found.gap_units[state]) == gap.units
+        assert found.overlaps[state] == len(overlapping_pairs(lattice, vertices))
+
+
+def test_units_turn_about_their_centroids(lattice: Lattice) -> None:
+    vertices = lattice.vertices.copy()
+    vertices[20:24] += np.array([[2.0, 1.0], [0, 0], [-1.0, 0.5], [0, 0]])
+    motion = np.zeros((lattice.n_units, 3))
+    motion[5] = [0.3, -0.2, 0.4]
+    before = shapely.Polygon(vertices[20:24])
+    expected = translate(rotate(before, 0.4, before.centroid, use_radians=True), 0.3, -0.2)
+    moved = displaced(lattice, vertices, motion)
+    assert expected.equals_exact(shapely.Polygon(moved[20:24]), 1e-12)
+    others = np.delete(np.arange(lattice.n_vertices), range(20, 24))
+    np.testing.assert_allclose(moved[others], vertices[others])
+
+
+def test_touching_units_do_not_overlap() -> None:
+    lattice = quads(2, 1, 15.0, 2.25, 0.0)
+    motion = np.array([[[0.0, 0, 0], [-2.25, 0, 0]], [[0.0, 0, 0], [-2.5, 0, 0]]])
+    found = clearance(lattice, lattice.vertices, motion)
+    assert found.gap.tolist() == pytest.approx([0.0, 0.0], abs=1e-12)
+    assert found.overlaps.tolist() == [0, 1]
+
+
+def test_a_crossed_unit_does_not_break_the_count(lattice: Lattice) -> None:
+    vertices = lattice.vertices.copy()
+    vertices[[20, 21]] = vertices[[21, 20]]
+    vertices[24:28] -= [12.0, 0.0]
+    assert smallest_gap(lattice, vertices).distance == 0.0
+    assert [5, 6] in overlapping_pairs(lattice, vertices).tolist()
+
+
+def test_close_pairs_are_the_bonded_and_the_diagonal_neighbours(lattice: Lattice) -> None:
+    pairs = {tuple(pair) for pair in close_pairs(lattice, lattice.vertices, 15.0)}
+    steps = {tuple(lattice.index[b] - lattice.index[a]) for a, b in pairs}
+    assert steps == {(1, 0), (0, 1), (1, 1), (-1, 1)}
+    assert len(pairs) == 9 + 8 + 12
+
+
+def test_one_unit_alone_has_no_gap() -> None:
+    lattice = quads(1, 1, 15.0, 2.25, 0.0)
+    assert smallest_gap(lattice, lattice.vertices).distance == np.inf

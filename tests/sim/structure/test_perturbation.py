@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from sim.structure import (
+    Material,
+    PerturbedStructure,
+    assembled,
+    overlapping_pairs,
+    quads,
+    shifted,
+    stiffened,
+    void_angles,
+)
+from sim.structure.gaps import polygons
+from sim.structure.perturbation import clashing_units
+
+LATTICE = quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
+CUTOFF = np.deg2rad(-10.0)
+
+
+def draw(largest: float, seed: int = 0) -> np.ndarray:
+    copy = shifted(LATTICE, LATTICE.vertices, largest, CUTOFF, np.random.default_rng(seed))
+    assert copy.sound
+    return copy.vertices - LATTICE.vertices
+
+
+def test_shifts_are_evenly_spread_and_keep_the_ligaments() -> None:
+    shifts = np.stack([draw(0.45, seed) for seed in range(40)])
+    assert np.abs(shifts).max() <= 0.45
+    assert np.abs(shifts).max() > 0.449
+    assert abs(shifts.mean()) < 0.01
+    assert shifts.std() == pytest.approx(0.45 / np.sqrt(3), rel=0.02)
+    ends = shifts[:, LATTICE.ligaments]
+    np.testing.assert_allclose(ends[:, :, 0], ends[:, :, 1], atol=1e-12)
+
+
+def test_equal_seeds_give_equal_copies() -> None:
+    np.testing.assert_array_equal(draw(0.45, 7), draw(0.45, 7))
+    assert np.abs(draw(0.45, 7) - draw(0.45, 8)).max() > 0.1
+
+
+def test_what_clashes_is_drawn_again_and_counted() -> None:
+    found = [
+        shifted(LATTICE, LATTICE.vertices, 4.0, CUTOFF, np.random.default_rng(seed))
+        for seed in range(10)
+    ]
+    assert any(copy.clashes for copy in found)
+    for copy in found:
+        assert copy.sound
+        assert (copy.redrawn > 0) == (copy.clashes > 0)
+        assert len(overlapping_pairs(LATTICE, copy.vertices)) == 0
+        assert np.asarray(void_angles(LATTICE, copy.vertices)).min() > CUTOFF
+        rings = copy.vertices.reshape(-1, 4, 2)
+        assert all(shapely.Polygon(ring).is_valid for ring in rings)
+
+
+def test_a_place_without_room_gives_up() -> None:
+    squeezed = LATTICE.vertices.copy()
+    squeezed[:4] += [12.0, 0.0]  # the first unit lies on its neighbour
+    copy = shifted(LATTICE, squeezed, 1e-3, CUTOFF, np.random.default_rng(0))
+    assert not copy.sound
+    assert set(clashing_units(LATTICE, squeezed, CUTOFF)) >= {0, 1}
+
+
+def test_units_are_assembled_whole() -> None:
+    cut = PerturbedStructure(LATTICE.vertices, 0, 0, sound=True)
+    made = assembled(LATTICE, cut, (0.2, np.deg2rad(1.0)), CUTOFF, np.random.default_rng(3))
+    assert made.sound
+    before, after = (polygons(LATTICE, each.vertices) for each in (cut, made))
+    np.testing.assert_allclose(shapely.area(after), shapely.area(before), rtol=1e-12)
+    apart = shapely.distance(shapely.centroid(before), shapely.centroid(after))
+    assert 0.15 < apart.mean() < 0.35
+    for corners, moved in zip(before, after, strict=True):
+        shapes = [shapely.get_coordinates(each) for each in (corners, moved)]
+        was, now = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in shapes)
+        np.testing.assert_allclose(now, was, rtol=1e-12)
+
+
+def test_every_ligament_gets_stiffnesses_of_its_own() -> None:
+    plain = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)
+    made = stiffened(plain, 20000, 0.1, np.random.default_rng(0))
+    for name in ("axial", "shear", "bending"):
+        factor = np.asarray(getattr(made, name)) / getattr(plain, name)
+        assert factor.std() == pytest.approx(0.1, rel=0.03)
+        assert factor.mean() == pytest.approx(1.0, abs=0.003)
+        assert factor.min() >= 0.7 - 1e-12
+    assert np.corrcoef(np.asarray(made.axial), np.asarray(made.shear))[0, 1] < 0.02
+    assert (made.density, made.contact) == (1.0, 1.5)

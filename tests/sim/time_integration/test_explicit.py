@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.scenes import BARRIER, CUTOFF
+from sim.core import Floats, SimulationError
+from sim.energy import gradient, hessian_product, system_of, workspace
+from sim.solvers import Harmonic, PrescribedMotion, TimeSeries, solve_case
+from sim.time_integration import BLANES_MOAN, LEAPFROG, ExplicitSolver, ImplicitSolver, Splitting
+from sim.vibration import highest_frequency, lowest_frequency
+from tests.sim.structures import Rig, mixed_polygons, rotating_squares
+from tests.sim.time_integration.pulse import DURATION, exact_end, order, pulsed
+
+CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
+SPLITTINGS = pytest.mark.parametrize(
+    "splitting", [LEAPFROG, BLANES_MOAN], ids=["leapfrog", "Blanes-Moan"]
+)
+
+
+def shaken(amplitude: float, bias_deg: float = 20.0) -> Rig:
+    motion = Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
+    return Rig(rotating_squares(5, bias_deg), CORNERS, MIDDLE, motion)
+
+
+def solver_for(rig: Rig, n_steps: int, splitting: Splitting = BLANES_MOAN) -> ExplicitSolver:
+    asked = np.linspace(0.0, 0.012, n_steps + 1)
+    return ExplicitSolver(rig.topology, 0.012, n_steps, asked, splitting=splitting)
+
+
+@SPLITTINGS
+def test_coefficients_are_symmetric_and_consistent(splitting: Splitting) -> None:
+    assert splitting.drifts.sum() == pytest.approx(1.0)
+    assert splitting.kicks.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(splitting.drifts, splitting.drifts[::-1])
+    np.testing.assert_allclose(splitting.kicks, splitting.kicks[::-1])
+
+
+@pytest.mark.parametrize(
+    ("splitting", "steps"), [(LEAPFROG, (800, 1600)), (BLANES_MOAN, (100, 200))]
+)
+def test_order_of_convergence(splitting: Splitting, steps: tuple[int, int]) -> None:
+    rig = pulsed()
+
+    def end(n_steps: int) -> Floats:
+        asked = np.array([DURATION])
+        solver = ExplicitSolver(rig.topology, DURATION, n_steps, asked, splitting=splitting)
+        u, _, record = solver.forward(rig.values, rig.drive)
+        assert record.steps.n_steps == n_steps
+        return u[-1]
+
+    assert order(end, steps, exact_end(rig)) == pytest.approx(splitting.order, abs=0.1)
+
+
+def test_both_integrators_agree() -> None:
+    rig = shaken(1.0)
+    times = np.linspace(0.0, 0.012, 1201)
+    asked = times[::100]
+    implicit = ImplicitSolver(rig.topology, times, asked, tolerance=1e-6)
+    explicit = replace(solver_for(rig, 600), asked=asked)
+    one, other = (solve_case(s, rig.values, rig.drive) for s in (implicit, explicit))
+    np.testing.assert_allclose(one[0], other[0], atol=2e-3 * np.abs(other[0]).max())
+    np.testing.assert_allclose(one[1], other[1], atol=3e-2 * np.abs(other[1]).max())
+
+
+@SPLITTINGS
+def test_energy_is_kept_without_damping(splitting: Splitting) -> None:
+    """After the drive has come to rest, over hundreds of periods of the fastest waves."""
+    rest = np.zeros((3, 3))
+    rest[1:] = [1.0, 0.5, 0.05]
+    series = TimeSeries(np.array([0.0, 0.001, 0.02]), rest)
+    rig = Rig(rotating_squares(), CORNERS, MIDDLE, series)
+    values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
+    asked = np.linspace(0.0015, 0.02, 60)
+    u, v, _ = ExplicitSolver(rig.topology, 0.02, 2000, asked, splitting=splitting).forward(
+        values, rig.drive
+    )
+    v[:, rig.topology.held] = 0.0
+    system = system_of(rig.topology, values)
+    work = workspace(system)
+    potential = np.array([sum(gradient(state, system, work.turn, work.force)) for state in u])
+    kinetic = 0.5 * v**2 @ values.mass.ravel()
+    energy = potential + kinetic
+    assert kinetic.max() > 0.05 * energy[0]
+    np.testing.assert_allclose(energy, energy[0], rtol=5e-3)
+
+
+def test_a_step_beyond_the_stability_limit_is_cut() -> None:
+    rig = shaken(1.0)
+    limit = 0.012 * highest_frequency(rig.topology, rig.values) / BLANES_MOAN.stability
+    coarse = solver_for(rig, int(0.6 * limit))
+    u, _, record = coarse.forward(rig.values, rig.drive)
+    assert limit <= record.steps.n_steps < 2.0 * limit
+    fine = replace(solver_for(rig, 1000), asked=coarse.asked).forward(rig.values, rig.drive)[0]
+    np.testing.assert_allclose(u, fine, atol=2e-2 * np.abs(fine).max())
+
+
+@SPLITTINGS
+def test_every_state_stays_inside_the_barrier(splitting: Splitting) -> None:
+    rig = shaken(2.5, bias_deg=45.0)
+    u, _, record = solver_for(rig, 600, splitting).forward(rig.values, rig.drive)
+    states = u.reshape(len(u), -1, 3)
+    angles = rig.topology.smallest_void_angles(rig.values.void, states)
+    assert BARRIER < angles.min() < CUTOFF
+    checked = record.checkpoints[:, 0].reshape(-1, rig.lattice.n_units, 3)
+    assert rig.topology.smallest_void_angles(rig.values.void, checked).min() > BARRIER
+
+
+def test_deep_contact_takes_no_shorter_steps() -> None:
+    rig = shaken(3.0, bias_deg=45.0)
+    rough = solver_for(rig, 300)
+    u, _, record = rough.forward(rig.values, rig.drive)
+    assert record.steps.n_steps == rough.n_steps
+    angles = rig.topology.smallest_void_angles(rig.values.void, u.reshape(len(u), -1, 3))
+    assert BARRIER < angles.min() < np.deg2rad(-13.0)
+    fine = replace(solver_for(rig, 1280), asked=rough.asked).forward(rig.values, rig.drive)[0]
+    np.testing.assert_allclose(u, fine, atol=6e-2 * np.abs(fine).max())
+
+
+def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> None:
+    closing = TimeSeries(np.array([0.0, 0.012]), np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]]))
+    rig = Rig(rotating_squares(3), np.array([3]), np.array([4]), closing)
+    with pytest.raises(SimulationError, match="try ") as failure:
+        solver_for(rig, 200).forward(rig.values, rig.drive)
+    assert failure.value.step is not None
+
+
+def test_a_run_that_would_fill_the_memory_is_refused_before_it_begins() -> None:
+    rig = shaken(1.0)
+    stiff = rig.values._replace(law=rig.values.law * 1e14)
+    with pytest.raises(SimulationError, match=r"explicit run needs \d+ steps .* try softer"):
+        solver_for(rig, 200).forward(stiff, rig.drive)
+
+
+@pytest.mark.parametrize("broken", ["drive", "law", "void", "mass", "damping"])
+def test_nan_never_leaves(broken: str) -> None:
+    rig = shaken(1.0)
+    values, drive = rig.values, rig.drive
+    if broken == "drive":
+        knots = np.array([0.0, 0.006, 0.012])
+        drive = PrescribedMotion(
+            rig.driven, TimeSeries(knots, np.array([[0.0] * 3, [np.nan] * 3, [0.0] * 3]))
+        )
+    else:
+        bad = np.array(getattr(values, broken))
+        bad.flat[20] = np.nan
+        values = values._replace(**{broken: bad})
+    with pytest.raises(SimulationError):
+        solve_case(solver_for(rig, 200), values, drive)
+
+
+def test_polygons_of_any_kind() -> None:
+    motion = Harmonic(0.5, 60.0, 1.0, rise=0.002, delay=0.005)
+    rig = Rig(mixed_polygons(), np.array([0]), np.array([7]), motion)
+    times = np.linspace(0.0, 0.02, 801)
+    implicit = ImplicitSolver(rig.topology, times, times[-1:], tolerance=1e-6)
+    explicit = ExplicitSolver(rig.topology, 0.02, 4000, times[-1:])
+    one, other = (solve_case(s, rig.values, rig.drive)[0] for s in (implicit, explicit))
+    np.testing.assert_allclose(one, other, atol=1e-2 * np.abs(other).max())
+
+
+def test_eigenfrequencies_are_those_of_the_dense_problem() -> None:
+    rig = Rig(mixed_polygons(), np.array([0]), np.array([7]), Harmonic(1.0, 1.0))
+    system = system_of(rig.topology, rig.values)
+    work, n = workspace(system), rig.topology.n_dofs
+    stiffness = np.empty((n, n))
+    for k in range(n):
+        column = np.zeros(n)
+        hessian_product(np.zeros(n), system, work.turn, np.eye(n)[k], column)
+        stiffness[:, k] = column
+    free = rig.topology.free_dofs
+    root = np.sqrt(system.mass[free])
+    squares = np.linalg.eigvalsh(stiffness[np.ix_(free, free)] / np.outer(root, root))
+    assert highest_frequency(rig.topology, rig.values) ** 2 == pytest.approx(squares[-1], rel=2e-2)
+    assert lowest_frequency(rig.topology, rig.values) ** 2 == pytest.approx(squares[0], rel=1e-2)

@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+
+from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from sim.core import Floats, SimulationError
+from sim.energy import topology
+from sim.structure import ConcreteParameters, Lattice, kagome, parameters, shape
+from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
+from tests.sim.structures import NONE, rotating_squares
+
+NO_LOOSE = np.zeros((2, 2))
+
+
+def made(lattice: Lattice, period: tuple[int, int]) -> UnitCell:
+    held = topology(lattice, NONE, BARRIER, CUTOFF)
+    values = jax.jit(lambda x: parameters(lattice, shape(lattice, x), MATERIAL))(lattice.vertices)
+    return cell_of(lattice, held, ConcreteParameters(*map(np.asarray, values)), period)
+
+
+LATTICES = [
+    (rotating_squares(8), (2, 2)),
+    (kagome(8, 8, 15.0, 1.5, 1.0), (4, 2)),
+]
+
+
+@pytest.mark.parametrize(("lattice", "period"), LATTICES, ids=["quads", "kagome"])
+def test_a_larger_cell_folds_the_bands_and_changes_none(
+    lattice: Lattice, period: tuple[int, int]
+) -> None:
+    small, large = made(lattice, period), made(lattice, (2 * period[0], 2 * period[1]))
+    one, other = np.pi * np.linalg.inv(small.period).T
+    folded = np.array([a * one + b * other for a in (0, 1) for b in (0, 1)])
+    expected = np.sort(bands(small, folded).ravel())
+    found = bands(large, np.zeros((1, 2)))[0]
+    assert found == pytest.approx(expected, rel=1e-8, abs=1e-8 * expected[-1])
+
+
+def test_two_branches_are_sound(cell: UnitCell) -> None:
+    """Two of the bands go to zero with the wave number, in proportion to it."""
+    along = np.array([1.0, 0.0])
+    near, half = bands(cell, np.array([1e-4 * along, 5e-5 * along]))
+    assert np.sqrt(near[:2] / half[:2]) == pytest.approx(2.0, rel=1e-3)
+    assert near[2] > 100 * near[1]
+
+
+@pytest.fixture(scope="module")
+def cell() -> UnitCell:
+    return made(rotating_squares(6), (2, 2))
+
+
+def test_strain_changes_the_bands_and_keeps_them_real(cell: UnitCell) -> None:
+    squeezed = np.diag([-0.03, 0.0])
+    relieved = np.diag([0.0, 1.0])
+    found = strained(cell, squeezed, relieved)
+    assert found.gradient[0, 0] == -0.03
+    assert found.gradient[1, 1] < -0.01  # rotating squares draw in
+    waves, _ = brillouin_path(cell, 4)
+    rest, under = bands(cell, waves), bands(cell, waves, found)
+    assert under.min() > -1e-6 * under.max()
+    assert np.abs(under[1:-1] / rest[1:-1] - 1).max() > 0.05
+
+
+def test_a_strain_beyond_the_contacts_is_refused(cell: UnitCell) -> None:
+    for beyond in (-0.3, -0.6):
+        with pytest.raises(SimulationError, match=r"no (stable )?equilibrium beyond"):
+            strained(cell, np.diag([beyond, beyond]), NO_LOOSE)
+    with pytest.raises(SimulationError, match="change its length"):
+        strained(cell, np.diag([0.3, 0.0]), np.diag([0.0, 1.0]))
+
+
+def test_a_lattice_that_does_not_repeat_has_no_cell() -> None:
+    uneven = rotating_squares(6)
+    corners: Floats = uneven.vertices.copy()
+    corners[5] += 0.1
+    with pytest.raises(ValueError, match="does not repeat"):
+        made(Lattice(**{**vars(uneven), "vertices": corners}), (2, 2))
+    with pytest.raises(ValueError, match="beyond one unit cell"):
+        made(rotating_squares(2), (2, 2))

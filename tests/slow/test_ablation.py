@@ -1,0 +1,24 @@
+"""What is skipped by compiling loops once, and by loops that keep old factors."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from benchmarks.harness import Worker
+from benchmarks.studies.ablation import SKIPS, Skip
+from tests.benchmarks.studies.test_ablation import COMPILED, refuse_change
+
+
+@pytest.mark.parametrize(
+    "skip", [skip for skip in SKIPS if skip.name in COMPILED], ids=lambda skip: skip.name
+)
+def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
+    """Each in a process of its own, which has not loaded the loops before."""
+    values = []
+    for made in (0.0, 1.0):
+        with Worker(partial(skip.prepare, "small_wave")) as worker:
+            worker.prepare(made, "loss")
+            values.append(worker.run().sample.values)
+    refuse_change(skip, *values)

@@ -1,0 +1,17 @@
+"""The continuous adjoint of the baseline works, and comes to the discrete one."""
+
+from __future__ import annotations
+
+from benchmarks.harness.records import errors
+from benchmarks.methods import selection
+
+
+def test_the_continuous_adjoint_of_diffrax_comes_to_that_of_its_steps() -> None:
+    every = {ladder.method: ladder for ladder in selection.ladders("small_wave")}
+    discrete, continuous = (
+        every[name].prepare(1e-6, "gradient")().values
+        for name in ("diffrax Tsit5", "diffrax Tsit5, backsolve")
+    )
+    found = errors(continuous, discrete)
+    assert found["displacement"] == 0.0
+    assert 0 < found["gradient"] < 1e-3
