@@ -13,7 +13,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from pipeline.runtime import cli
+from benchmarks.harness import CandidateError, MeasuringLimits, storage
+from benchmarks.studies import catalogue
+from pipeline import datasets
+from pipeline.datasets import provenance
+from pipeline.runtime import UserError, cli
 
 LOG = logging.getLogger("pipeline.benchmarks")
 VIDEOS = Path("tests/data/tracking")
@@ -21,8 +25,6 @@ VIDEOS = Path("tests/data/tracking")
 
 def parser() -> argparse.ArgumentParser:
     """The stage's command line."""
-    from benchmarks.harness import MeasuringLimits
-
     made = cli.parser("benchmarks.stage", str(__doc__), study=False)
     made.add_argument("suite", help="which: precision_fig2, growth, ablation, ...")
     made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
@@ -46,12 +48,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: there is no such suite, or its reference cannot be computed.
     """
-    from benchmarks.harness import CandidateError, MeasuringLimits, storage
-    from benchmarks.studies import catalogue
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.runtime import UserError
-
     suite = catalogue.named(args.suite, args.videos)
     rules = MeasuringLimits(args.repeats, args.limit)
     machine = storage.machine()

@@ -7,7 +7,6 @@ from .records import Benchmark as Benchmark
 from .records import BenchmarkReport as BenchmarkReport
 from .records import Candidate as Candidate
 from .records import CandidateResult as CandidateResult
-from .records import Floats as Floats
 from .records import Outcomes as Outcomes
 from .records import Run as Run
 from .records import Sample as Sample

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from benchmarks.harness.records import Floats
 from benchmarks.harness.text_table import error_columns
 from benchmarks.harness.work_precision import WorkPrecisionPoint
+from sim.core import Floats
 
 MEASURED = "measured"
 

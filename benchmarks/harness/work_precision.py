@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from benchmarks.harness.records import Candidate, CandidateResult, Floats, Run
+from benchmarks.harness.records import Candidate, CandidateResult, Run
 from benchmarks.harness.workers import AtWork, Tell, Worker
+from sim.core import Floats
 
 Task = Literal["loss", "gradient"]
 ENOUGH_S = 5.0

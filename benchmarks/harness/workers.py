@@ -16,15 +16,8 @@ from typing import Any, NamedTuple
 
 import psutil
 
-from benchmarks.harness.records import (
-    Benchmark,
-    Candidate,
-    CandidateResult,
-    Floats,
-    Run,
-    Sample,
-    errors,
-)
+from benchmarks.harness.records import Benchmark, Candidate, CandidateResult, Run, Sample, errors
+from sim.core import Floats
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 Tell = Callable[[str], None]

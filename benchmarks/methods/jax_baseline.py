@@ -17,16 +17,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from benchmarks.harness import Run, Sample
+from sim.core import Floats
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.scene import Objective, Scene, structure
 from sim.solvers import PrescribedMotion, held_values
 from sim.structure import Parameters
 
 Force = Callable[[Parameters, Array], Array]
-Floats = NDArray[np.float64]
 Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
 """Loss of a design vector, and the solver's counts."""
 

@@ -9,8 +9,9 @@ from functools import partial
 import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.harness import Floats, Run, Sample, SettingLadder, Task
+from benchmarks.harness import Run, Sample, SettingLadder, Task
 from benchmarks.scenes import LoadCase, case, counted
+from sim.core import Floats
 from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver

@@ -12,9 +12,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 
-from benchmarks.harness import Floats, Run, Sample, SettingLadder, Task
+from benchmarks.harness import Run, Sample, SettingLadder, Task
 from benchmarks.methods.own_solvers import gradient_of
 from benchmarks.scenes import LoadCase, case
+from sim.core import Floats
 from sim.energy import gradient, system_of
 from sim.scene import structure
 from sim.solvers import Harmonic

@@ -13,10 +13,10 @@ import scipy.sparse.linalg as spla
 from jax import Array
 from scipy.optimize import NoConvergence, newton_krylov
 
-from benchmarks.harness import Floats, Run, Sample, SettingLadder, Task
+from benchmarks.harness import Run, Sample, SettingLadder, Task
 from benchmarks.methods.jax_baseline import force
 from benchmarks.scenes import LoadCase, case
-from sim.core import Ints
+from sim.core import Floats, Ints
 from sim.energy import gradient, system_of
 from sim.scene import structure
 from sim.vibration import Linear, linearised

@@ -11,11 +11,11 @@ import jax
 import numpy as np
 from jax import Array
 
-from benchmarks.harness import Floats
 from benchmarks.scenes import paper_scenes
 from pipeline.posing import limits_of, scene_of
 from pipeline.problem.reading import load
 from sim.constraints import Limits
+from sim.core import Floats
 from sim.scene import Objective, Scene, concrete_parameters, objective, sample_times, target_motion
 from sim.solvers import Harmonic, LinearRamp, held_dofs
 from sim.structure import ConcreteParameters, Parameters, quads

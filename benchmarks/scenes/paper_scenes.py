@@ -8,17 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.posing import scene_of
 from pipeline.problem.reading import load
+from sim.core import Floats
 from sim.quasistatics import static_solver
 from sim.scene import Scene, StrainEnergyMimicking, concrete_parameters
 from sim.solvers import Harmonic, LinearRamp, Solver, TanhRamp, held_dofs, solve_case
 from sim.structure import Material, damping_of_ratio, quads
 from sim.time_integration import explicit, implicit
 
-Floats = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 PUSH = 14.999907837380967
 """Final displacement of the driven column, mm: the last value of the authors' ramp to 15 mm."""

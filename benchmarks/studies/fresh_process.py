@@ -11,6 +11,11 @@ from contextlib import contextmanager
 from tempfile import TemporaryDirectory
 
 from benchmarks.harness import Run, Sample, Task
+from benchmarks.scenes import scene
+from benchmarks.studies.scene_loss import loss_by_solver
+from sim.quasistatics import newton
+from sim.scene import make_plan
+from sim.time_integration import esdirk_stage
 
 
 def compilation(name: str, skipped: float, task: Task) -> Run:
@@ -32,9 +37,6 @@ def factors(name: str, skipped: float, task: Task) -> Run:
     if skipped:
         return _default(name)
     with _no_cache():
-        from sim.quasistatics import newton
-        from sim.time_integration import esdirk_stage
-
         esdirk_stage.REFACTOR_ABOVE = 0.0
         newton.KEEP_FACTOR = newton.RENEW_FACTOR = 0.0
         return _default(name)
@@ -50,8 +52,4 @@ def _no_cache() -> Iterator[None]:
 
 def _default(name: str) -> Run:
     """The loss by the scene's own plan."""
-    from benchmarks.scenes import scene
-    from benchmarks.studies.scene_loss import loss_by_solver
-    from sim.scene import make_plan
-
     return loss_by_solver(name, make_plan(scene(name)).solver)

@@ -14,10 +14,10 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import BFGS, NonlinearConstraint, minimize
 
-from benchmarks.harness import CandidateError, Floats, Run, Sample, Tell, Worker, padded
+from benchmarks.harness import CandidateError, Run, Sample, Tell, Worker, padded
 from benchmarks.scenes import load_cases
 from sim.constraints import ConstraintVector
-from sim.core import SimulationError
+from sim.core import Floats, SimulationError
 from sim.optimise import MmaOptions, SqpOptions, minimise, stationarity
 from sim.scene import evaluator, make_plan
 

@@ -17,6 +17,7 @@ from benchmarks.harness import (
 )
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
+from sim.core import Floats
 from sim.quasistatics import StaticSolver
 from sim.scene import structure, value_and_gradient
 from sim.structure import Parameters
@@ -57,7 +58,7 @@ def _ours() -> Run:
     return _equilibrium(np.ones(1), 1e-10)
 
 
-def _equilibrium(loads: paper_scenes.Floats, relative: float) -> Run:
+def _equilibrium(loads: Floats, relative: float) -> Run:
     scene = paper_scenes.fig4()
     solver = StaticSolver(scene.topology, loads, relative=relative)
     energy = paper_scenes.final_energy(scene)

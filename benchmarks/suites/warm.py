@@ -9,6 +9,7 @@ import numpy as np
 
 from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
 from benchmarks.scenes import paper_scenes
+from sim.core import Floats
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene import Scene, evaluator, make_plan
 
@@ -51,7 +52,7 @@ class WarmStart:
         """The last design's path."""
         return self._records if self.warm else None
 
-    def keep(self, design: paper_scenes.Floats, records: Sequence[StaticRecord]) -> None:
+    def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
         """Takes a path."""
         del design
         self._records = records

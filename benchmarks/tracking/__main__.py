@@ -11,10 +11,10 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from benchmarks.tracking import frame_rates, plain_opencv
-from pipeline.runtime import Floats, Mask, Reals
 from pipeline.tracking.frames import frames, import_video
 from pipeline.tracking.geometry import of_design
 from pipeline.tracking.motion import Track, follow
+from sim.core import Floats, Mask, Reals
 
 _GROSS = (0.3, 0.3, np.deg2rad(3))
 

@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from benchmarks.harness import Floats, Tell
+from benchmarks.harness import Tell
 from benchmarks.tracking import plain_opencv
-from pipeline.runtime import Image, Ints, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame, frames, import_video
 from pipeline.tracking.geometry import SpecimenOutlines, of_design
 from pipeline.tracking.motion import follow
+from sim.core import Floats, Image, Ints
 
 THINNINGS = (1, 2, 4)
 """Every so manyth frame is kept."""

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from pipeline.runtime import Floats, Image
 from pipeline.tracking.detect import sight
 from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion
+from sim.core import Floats, Image
 
 _HALF = 0.16
 """Half the side of what is matched, and how far it is looked for, pitches."""

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pipeline.runtime import Floats, UserError
+from pipeline.runtime import UserError
+from sim.core import Floats
 
 LEAST_FRAMES = 8
 LEAST_CORRELATION = 0.9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 
 def reduction(before: Floats, after: Floats) -> Floats:

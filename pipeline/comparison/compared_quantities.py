@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline.comparison.nominal_side import nominal
 from pipeline.problem import Problem
-from pipeline.runtime import Floats, Ints, Mask
+from sim.core import Floats, Ints, Mask
 
 FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_error")
 """Names in the dataset."""

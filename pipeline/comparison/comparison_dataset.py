@@ -15,7 +15,7 @@ from pipeline.comparison.metrics import METRICS, Pair, estimates
 from pipeline.comparison.nominal_side import ComparisonAxis, Nominal
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 SEED = 0
 

@@ -11,7 +11,7 @@ from pipeline.comparison import tolerance_band as bands
 from pipeline.comparison.compared_quantities import Quantity
 from pipeline.comparison.metrics import COPIES, LEVEL, limits
 from pipeline.comparison.redrive import filtered
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
 """Standard deviations at the ends of an interval."""

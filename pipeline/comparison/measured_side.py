@@ -12,9 +12,10 @@ from pipeline.comparison.alignment import LEAST_FRAMES, too_few
 from pipeline.comparison.registration import Registration, measured_places, register
 from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
-from pipeline.runtime import Floats, Ints, Mask, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.geometry import of_design
 from pipeline.tracking.output import is_driven, mean_seen
+from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
 COMPARED, HELD, PUSHED, ABSENT, LOST = range(5)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints
+from sim.core import Floats, Ints
 
 COPIES = 300
 LEVEL = 0.95

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from pipeline.comparison import alignment
 from pipeline.comparison.alignment import Lag, SampledMotion
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 
 class ComparisonAxis(NamedTuple):

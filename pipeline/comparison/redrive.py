@@ -15,19 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from jax import Array
-from numpy.typing import NDArray
 from scipy.interpolate import UnivariateSpline
 
 from pipeline.posing import PosedStructure
 from pipeline.runtime import UserError
-from sim.core import Numbers, SimulationError
+from sim.core import Floats, Ints, Mask, Numbers, SimulationError
 from sim.energy import observe
 from sim.scene import Scene, concrete_parameters, make_plan
 from sim.solvers import solve_case
-
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 FINER = 2
 """Instants that the filtered motion is kept at, for every frame."""
@@ -74,7 +69,7 @@ class Held(NamedTuple):
             follows the mean of the driven ones if it is driven.
     """
 
-    unit: Places
+    unit: Ints
     driven: Mask
     motion: HermiteMotion
     noise: Floats
@@ -141,7 +136,7 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     )
 
 
-def held_units(scene: Scene) -> tuple[Places, Mask]:
+def held_units(scene: Scene) -> tuple[Ints, Mask]:
     """Places of the driven units and of those clamped in all dofs, and which of them are driven."""
     clamped, count = np.unique(scene.clamped // 3, return_counts=True)
     unit = np.union1d(clamped[count == 3], scene.driven)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.runtime import Floats
 from pipeline.tracking.geometry import Camera
+from sim.core import Floats
 
 _LEAST = 3  # units
 

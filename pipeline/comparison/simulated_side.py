@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline.comparison import redrive, tolerance_band
 from pipeline.posing import PosedStructure, spread
 from pipeline.problem import Problem
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 LOG = logging.getLogger(__name__)
 

@@ -12,21 +12,18 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from pipeline.comparison.redrive import Held, under
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem import Problem
 from pipeline.runtime import cli
+from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
 from sim.scene import Scene, concrete_parameters, make_plan
 from sim.solvers import Case, Measure, Solved, Solver, run_batch
 from sim.structure import MOST_ROUNDS
-
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
 
 STREAM = 1
 """First word of the seeds of all draws here, so that no other specimen equals one of them."""
@@ -109,7 +106,7 @@ def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
     return replace(solver, start=record)
 
 
-def _measure(scene: Scene, driven: Places) -> Measure[tuple[Floats, Floats]]:
+def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
     def reduce(solved: Solved) -> tuple[Floats, Floats]:
         motion = solved.displacement
         reaction = observe(scene.topology, solved.case.values, motion).reaction

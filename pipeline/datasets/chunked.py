@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from pipeline import datasets
 from pipeline.datasets.tables import Kind
 from pipeline.runtime import UserError, cli
 
@@ -47,8 +48,6 @@ def join(paths: Sequence[Path], kind: Kind, dim: str, out: Path) -> None:
         UserError: a part belongs to another design.
     """
     import xarray as xr
-
-    from pipeline import datasets
 
     parts = [datasets.read(path, kind) for path in paths]
     for path, read in zip(paths, parts, strict=True):

@@ -17,9 +17,13 @@ if TYPE_CHECKING:
     from sim.scene import Scene
     from sim.solvers import Case, Measure, Solved
 
-from sim.core import Floats
-
-Places = NDArray[np.int64]
+from pipeline.posing.structure_variables import flat_vertices
+from sim.core import Floats, Ints
+from sim.energy import observe
+from sim.quasistatics import StaticRecord
+from sim.scene import objective, sample_times, scales, strain_energies
+from sim.solvers import solve_case
+from sim.structure import clearance
 
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
@@ -46,9 +50,9 @@ class Times(NamedTuple):
     """
 
     asked: Floats
-    shown: Places
-    integrated: Places
-    sampled: Places
+    shown: Ints
+    integrated: Ints
+    sampled: Ints
 
 
 class CaseResult(NamedTuple):
@@ -79,15 +83,10 @@ def measure(
         times: when its motion was asked for.
         intact: the cases of the structure to be mimicked, if one was simulated.
     """
-    from sim.energy import observe
-    from sim.scene import objective, scales
-    from sim.solvers import solve_case
-    from sim.structure import clearance
-
     scene, vertices = structure
     stride = 1 if scene.static else CLEARANCE_STRIDE
 
-    def loss_of(motion: Floats, case: Case, at: Places, weights: Floats | None) -> float:
+    def loss_of(motion: Floats, case: Case, at: Ints, weights: Floats | None) -> float:
         measure = objective(scene, _target(motion, scene, case.number, intact, at), weights)
         return float(measure(motion[None, at], case.values)[0])
 
@@ -132,7 +131,7 @@ def _target(
     scene: Scene,
     number: int,
     intact: list[CaseResult] | None,
-    at: Places,
+    at: Ints,
 ) -> Floats | None:
     """What the region (1, n_at, n_region, 3) should do: as the intact one did, which is its own."""
     if scene.reference is None:
@@ -142,7 +141,6 @@ def _target(
 
 
 def _roi_energy(scene: Scene, case: Case, motion: Floats) -> Floats:
-    from sim.scene import strain_energies
 
     chosen = scene.region_ligaments
     units = scene.lattice.ligament_units[chosen]
@@ -155,8 +153,7 @@ def _at_stride(values: NDArray[np.generic], stride: int, size: int) -> Floats:
     return out
 
 
-def _stability(solved: Solved, at: Places) -> NDArray[np.int8]:
-    from sim.quasistatics import StaticRecord
+def _stability(solved: Solved, at: Ints) -> NDArray[np.int8]:
 
     record = solved.record
     if isinstance(record, StaticRecord):
@@ -170,8 +167,6 @@ def _stability(solved: Solved, at: Places) -> NDArray[np.int8]:
 
 def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:
     """The structures to compare, by name; an intact one only where something is to be mimicked."""
-    from pipeline.posing.structure_variables import flat_vertices
-
     found = {
         "altered": PosedStructure(scene, scene.lattice.vertices),
         "cloaked": PosedStructure(scene, flat_vertices(scene.lattice, design["vertices"])),
@@ -184,8 +179,6 @@ def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]
 
 def times_of(asked: Problem, scene: Scene) -> Times:
     """Output times of a problem's response."""
-    from sim.scene import sample_times
-
     horizon = scene.duration
     end = (
         horizon

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.problem.sections import Tolerances
+from sim.core import Floats
 from sim.scene import Scene
 from sim.structure import (
     LARGEST_FACTOR,
@@ -18,8 +18,6 @@ from sim.structure import (
     shifted,
     stiffened,
 )
-
-Floats = NDArray[np.float64]
 
 
 def drawn(

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.core import SimulationError
+from sim.scene import by_distance, judge
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -71,8 +74,6 @@ def _part(judgement: LawComparison | None, field: str, n_cases: int) -> NDArray[
 
 
 def _judge(name: str, structure: PosedStructure, law: str, distance: float) -> LawComparison | None:
-    from sim.core import SimulationError
-    from sim.scene import by_distance, judge
 
     if not structure.scene.static:
         return None

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.problem.sections import Robustness
 from pipeline.runtime import cli
+from sim.core import Floats
 from sim.energy import observe
 from sim.scene import (
     Scene,
@@ -26,8 +26,6 @@ from sim.scene import (
 )
 from sim.solvers import Case, Measure, MotionLaw, Outcome, Solved, run_batch
 from sim.structure import MOST_ROUNDS, PerturbedStructure, shifted, stiffened
-
-Floats = NDArray[np.float64]
 
 GEOMETRY, STIFFNESS = "geometry", "stiffness"
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.posing.case_result import CaseResult, PosedStructure
 from pipeline.posing.law_comparison import LAWS, by_contact
@@ -18,8 +17,7 @@ from pipeline.posing.structure_variables import (
 )
 from pipeline.posing.to_scene import contact_distance, lattice_of
 from pipeline.problem import Problem
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
 _STEP, _CASE = _MOTION[:3], _MOTION[:2]

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from pipeline.posing.structure_variables import flat_vertices
@@ -18,11 +17,10 @@ from pipeline.problem import Problem, canonical_json, from_canonical
 from pipeline.problem.reading import findings, reason
 from pipeline.problem.sections import Setting, laid
 from pipeline.runtime import SweepResult, UserError
-from sim.core import SimulationError
+from sim.core import Floats, SimulationError
 from sim.scene import Scene, concrete_parameters, make_plan, objective, target_motion
 from sim.solvers import Case, Outcome, Solved, run_batch
 
-Floats = NDArray[np.float64]
 Result = Outcome[tuple[float, float]]
 
 

@@ -9,9 +9,21 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pipeline.posing import law_comparison
-from pipeline.posing.case_result import CLEARANCE_STRIDE, PosedStructure, Times
+from pipeline.posing.case_result import (
+    CLEARANCE_STRIDE,
+    PosedStructure,
+    Times,
+    structures_of,
+    times_of,
+)
+from pipeline.posing.to_scene import scene_of
 from pipeline.posing.verification import AS_RUN, Numbers
-from sim.core import Floats
+from sim.core import Floats, SimulationError
+from sim.energy import observe
+from sim.scene import concrete_parameters, make_plan, objective, scales
+from sim.solvers import solve_case
+from sim.structure import clearance
+from sim.time_integration import ExplicitRecord
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,8 +56,6 @@ class Run(NamedTuple):
     @property
     def time_step(self) -> float:
         """Length of equal steps in s; NaN of a graded grid."""
-        from sim.time_integration import ExplicitRecord
-
         return self.record.steps.h if isinstance(self.record, ExplicitRecord) else np.nan
 
     def repeated(self, values: ConcreteParameters, drive: PrescribedMotion) -> Run:
@@ -54,7 +64,6 @@ class Run(NamedTuple):
 
 
 def _run(solver: Solver, values: ConcreteParameters, drive: PrescribedMotion) -> Run:
-    from sim.solvers import solve_case
 
     motion, _, record = solve_case(solver, values, drive)
     return Run(solver, motion.reshape(len(solver.asked), -1, 3), record)
@@ -68,10 +77,6 @@ def trials(
     Raises:
         SimulationError: a structure cannot be simulated as it was run.
     """
-    from pipeline.posing.case_result import structures_of, times_of
-    from pipeline.posing.to_scene import scene_of
-    from sim.core import SimulationError
-
     structures = structures_of(scene_of(asked, folder), design)
     times = times_of(asked, structures["altered"].scene)
     runs = as_run = {name: _first(each, times) for name, each in structures.items()}
@@ -93,7 +98,6 @@ def trials(
 
 
 def _first(structure: PosedStructure, times: Times) -> list[Run]:
-    from sim.scene import concrete_parameters, make_plan
 
     scene, vertices = structure
     plan = make_plan(scene, vertices, times.asked, every_case=True)
@@ -102,7 +106,6 @@ def _first(structure: PosedStructure, times: Times) -> list[Run]:
 
 
 def _halved(structure: PosedStructure, runs: list[Run]) -> list[Run]:
-    from sim.scene import concrete_parameters
 
     scene, vertices = structure
     values = concrete_parameters(scene, vertices)
@@ -123,9 +126,6 @@ def _numbers(
 def _of_structure(
     structure: PosedStructure, runs: list[Run], as_run: list[Run], aims: list[Floats], times: Times
 ) -> Numbers:
-    from sim.energy import observe
-    from sim.scene import concrete_parameters, objective, scales
-    from sim.structure import clearance
 
     scene, vertices = structure
     values = concrete_parameters(scene, vertices)

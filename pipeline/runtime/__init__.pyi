@@ -1,15 +1,6 @@
 from . import case_log as case_log
 from . import cli as cli
 from . import streams as streams
-from .arrays import Floats as Floats
-from .arrays import Image as Image
-from .arrays import Ints as Ints
-from .arrays import Mask as Mask
-from .arrays import Picture as Picture
-from .arrays import Reals as Reals
-from .arrays import Singles as Singles
-from .arrays import compiled as compiled
-from .arrays import inlined as inlined
 from .atomic_write import write_atomically as write_atomically
 from .bounded_read import read_bounded as read_bounded
 from .case_log import Casebook as Casebook
@@ -20,4 +11,7 @@ from .errors import UserError as UserError
 from .errors import found_in as found_in
 from .errors import refusal as refusal
 from .locations import ROOT as ROOT
+from .pixel_loops import Picture as Picture
+from .pixel_loops import compiled as compiled
+from .pixel_loops import inlined as inlined
 from .source_closure import source_hash as source_hash

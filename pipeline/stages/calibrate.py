@@ -8,7 +8,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.runtime import UserError, cli
+from pipeline import datasets
+from pipeline.calibration import calibration_dataset, computed_sets, fitted, unsimulated
+from pipeline.calibration.inputs import Calibration
+from pipeline.datasets import provenance
+from pipeline.problem.reading import section
+from pipeline.runtime import UserError, cli, write_atomically
+from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
 
@@ -53,13 +59,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.calibration import calibration_dataset, fitted, unsimulated
-    from pipeline.calibration.inputs import Calibration
-    from pipeline.datasets import provenance
-    from pipeline.problem.reading import section
-    from pipeline.runtime import write_atomically
-    from sim.core import SimulationError
 
     asked = section(path, Calibration)
     fit = fitted(asked, path)
@@ -81,9 +80,6 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
 
 
 def _synthesise(path: Path, args: argparse.Namespace) -> None:
-    from pipeline.calibration import computed_sets
-    from pipeline.calibration.inputs import Calibration
-    from pipeline.problem.reading import section
 
     asked = section(path, Calibration)
     if asked.virtual is None:

@@ -12,8 +12,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.comparison import (
+    Compared,
+    along,
+    axis,
+    dataset,
+    measurement,
+    nominal,
+    pixel_size,
+    quantities,
+    simulation,
+    words,
+)
+from pipeline.datasets import provenance
+from pipeline.posing import read_design, scene_of, structures_of
 from pipeline.runtime import UserError, cli
+from pipeline.tracking.frames import recording as recordings
+from pipeline.tracking.geometry import as_built
+from pipeline.virtual_lab import of_structure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,11 +70,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: the recording and the study do not belong together, or cannot be aligned.
     """
-    from pipeline import datasets
-    from pipeline.comparison import dataset
-    from pipeline.datasets import provenance
-    from pipeline.tracking.frames import recording as recordings
-
     asked = problem.load(args.problem, args.preset)
     recording = recordings.load(args.recording)
     files = {name: getattr(args, name) for name in ("design", "response", "track")}
@@ -84,21 +96,6 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     Raises:
         UserError: they do not belong together, or cannot be aligned.
     """
-    from pipeline import datasets
-    from pipeline.comparison import (
-        Compared,
-        along,
-        axis,
-        measurement,
-        nominal,
-        pixel_size,
-        quantities,
-        simulation,
-    )
-    from pipeline.datasets import provenance
-    from pipeline.posing import read_design, scene_of, structures_of
-    from pipeline.tracking.geometry import as_built
-
     design = read_design(asked, args.design)
     whole = datasets.read(args.response, "response")
     provenance.check_parent(whole, args.response, "design", args.design)
@@ -132,8 +129,6 @@ def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
     Raises:
         UserError: the response has none such.
     """
-    from pipeline.virtual_lab import of_structure
-
     one = of_structure(response, recording.structure)
     if recording.case >= (cases := one.sizes["case"]):
         remedy = f"give a number from 0 to {cases - 1}"
@@ -155,8 +150,6 @@ def _plan(made: Compared) -> dict[str, object]:
 
 def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, str]:
     """The attributes that tell how both sides were brought together."""
-    from pipeline.comparison import words
-
     return {
         "title": recording.title or f"{recording.structure} structure",
         "structure": recording.structure,

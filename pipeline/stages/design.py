@@ -10,9 +10,34 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline import problem
-from pipeline.posing import failures
-from pipeline.runtime import UserError, cli
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import (
+    case_directions,
+    design_scene,
+    failures,
+    lattice_of,
+    limits_of,
+    loss_units,
+    network_variables,
+    spread,
+    start_of,
+    unit_coordinates,
+)
+from pipeline.runtime import UserError, cli, source_hash
+from sim.constraints import KIND_NAMES, ConstraintVector, margins
+from sim.core import SimulationError
+from sim.optimise import (
+    InfeasibleStartError,
+    Journal,
+    JournalInUseError,
+    MmaOptions,
+    SqpOptions,
+    minimise,
+)
+from sim.quasistatics import StaticSolver
+from sim.scene import Paths, evaluator, make_plan
+from sim.structure import overlapping_pairs, shape, smallest_gap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,11 +75,6 @@ def work(args: argparse.Namespace) -> None:
         UserError: a fault of the problem, no feasible start, or a start that cannot be simulated
             or is none of this problem's.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import design_scene, start_of
-    from sim.scene import make_plan
-
     asked = problem.load(args.problem, args.preset)
     if asked.designs is not None:
         raise UserError(
@@ -106,13 +126,6 @@ def optimise(
     """
     import numpy as np
 
-    from pipeline.posing import limits_of
-    from pipeline.runtime import source_hash
-    from sim.constraints import ConstraintVector
-    from sim.core import SimulationError
-    from sim.optimise import InfeasibleStartError, Journal, JournalInUseError, minimise
-    from sim.scene import Paths, evaluator
-
     budget = asked.optimiser.methods.chosen.get(method)
     if budget is None:
         raise UserError(
@@ -159,16 +172,12 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
 
     A path that starts from that of a similar design, or steps far, may pass where it should end.
     """
-    from sim.quasistatics import StaticSolver
-    from sim.scene import evaluator
-
     if not isinstance(plan.solver, StaticSolver):
         return None
     return evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
-    from sim.optimise import MmaOptions, SqpOptions
 
     wanted = asked.optimiser
     evaluations = wanted.methods.chosen[method].evaluations
@@ -187,18 +196,6 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     """The dataset ``design_method`` of an optimisation."""
     import numpy as np
     import xarray as xr
-
-    from pipeline.posing import (
-        case_directions,
-        lattice_of,
-        limits_of,
-        loss_units,
-        network_variables,
-        spread,
-        unit_coordinates,
-    )
-    from sim.constraints import KIND_NAMES, margins
-    from sim.structure import overlapping_pairs, shape, smallest_gap
 
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)

@@ -10,7 +10,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.fabrication import papers
+from pipeline.fabrication.checks import STEPS, check_package
+from pipeline.fabrication.files import package_folder
+from pipeline.fabrication.papers import bill_of_materials, manifest
+from pipeline.fabrication.parts import THIN_WALL, UnmadeError
+from pipeline.fabrication.readback import draw
+from pipeline.fabrication.units import network, specimen_units
 from pipeline.runtime import cli, refusal
 
 LOG = logging.getLogger(__name__)
@@ -31,14 +38,6 @@ def parser() -> argparse.ArgumentParser:
 
 def work(args: argparse.Namespace) -> None:
     """Makes the parts, writes the package aside, checks it, and puts it in its place."""
-    from pipeline import datasets
-    from pipeline.fabrication import papers
-    from pipeline.fabrication.checks import STEPS, check_package
-    from pipeline.fabrication.files import package_folder
-    from pipeline.fabrication.papers import bill_of_materials, manifest
-    from pipeline.fabrication.parts import THIN_WALL
-    from pipeline.fabrication.units import network, specimen_units
-
     asked = problem.load(args.problem, args.preset)
     design = datasets.read(args.design, "design")
     net = network(design, args.structure)
@@ -68,9 +67,6 @@ def work(args: argparse.Namespace) -> None:
 @contextmanager
 def _shown(pictures: Path) -> Iterator[None]:
     """Draws the unit that cannot be made into a folder, and tells of the picture."""
-    from pipeline.fabrication.parts import UnmadeError
-    from pipeline.fabrication.readback import draw
-
     try:
         yield
     except UnmadeError as error:

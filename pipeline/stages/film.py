@@ -10,8 +10,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.runtime import UserError, cli, found_in
+from pipeline import datasets
+from pipeline.datasets import provenance
+from pipeline.problem.sections import VirtualRecording
+from pipeline.runtime import UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import recording as recordings
+from pipeline.tracking.geometry import of_design
+from pipeline.virtual_lab import (
+    encode,
+    ground_truth,
+    noise_planning,
+    of_case,
+    of_structure,
+    prepared,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,13 +98,6 @@ def work(args: argparse.Namespace) -> None:
 def _plan(args: argparse.Namespace) -> None:
     import csv
 
-    from pipeline import datasets
-    from pipeline.problem.sections import VirtualRecording
-    from pipeline.runtime import write_atomically
-    from pipeline.tracking.frames import recording as recordings
-    from pipeline.tracking.geometry import of_design
-    from pipeline.virtual_lab import noise_planning, of_structure
-
     asked = recordings.Recording(virtual=VirtualRecording())
     if args.recording is not None:
         asked = recordings.load(args.recording)
@@ -127,11 +133,6 @@ def _plan(args: argparse.Namespace) -> None:
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.runtime import write_atomically
-    from pipeline.tracking.frames import recording as recordings
-    from pipeline.virtual_lab import encode, ground_truth, prepared
 
     asked, virtual = _virtual(path)
     if out.suffix not in virtual.codec.suffixes:
@@ -160,7 +161,6 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:
-    from pipeline.runtime import write_atomically
     from pipeline.virtual_lab import log
 
     asked, virtual = _virtual(path)
@@ -176,8 +176,6 @@ def _weigh(path: Path, response: Path, out: Path) -> None:
 
 def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     """A recording and how it is rendered."""
-    from pipeline.tracking.frames import recording as recordings
-
     asked = recordings.load(path)
     if asked.virtual is None:
         remedy = (
@@ -189,9 +187,6 @@ def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
 
 def _shown(asked: Recording, response: Path) -> xr.Dataset:
     """What a recording shows: its specimen, or the study's own response at structure and case."""
-    from pipeline import datasets
-    from pipeline.virtual_lab import of_case
-
     assert asked.virtual is not None
     if asked.virtual.specimen is not None:
         return datasets.read(response, "specimen")

@@ -9,8 +9,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline import problem
-from pipeline.datasets import chunked
+from pipeline import datasets, problem
+from pipeline.datasets import chunked, provenance
+from pipeline.posing import flat_vertices, perturbed, read_design, scene_of
 from pipeline.runtime import UserError, cli
 
 LOG = logging.getLogger(__name__)
@@ -27,9 +28,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import flat_vertices, perturbed, read_design, scene_of
 
     asked = problem.load(args.problem, args.preset)
     if asked.robustness is None:

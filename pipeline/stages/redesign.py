@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import problem
-from pipeline.posing import law_comparison
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import design_scene, law_comparison, read_design, shipped_vector
 from pipeline.problem.sections import Method, Methods
 from pipeline.runtime import cli
 from pipeline.stages.design import design_dataset, optimise
 from pipeline.stages.select import join
+from sim.scene import make_plan
 
 if TYPE_CHECKING:
     from pipeline.problem import Problem
@@ -48,11 +50,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: neither the design nor the initial lattice can be simulated with that contact.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import design_scene, read_design, shipped_vector
-    from sim.scene import make_plan
-
     asked = problem.load(args.problem, args.preset)
     design = read_design(asked, args.design)
     angle, distance = law_comparison.cloak_losses(datasets.read(args.response, "response"))

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
 from pipeline.runtime import UserError, cli
+from sim.solvers import base
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,9 +61,6 @@ def work(args: argparse.Namespace) -> None:
         UserError: no design of the study itself is given, or none of a preset, or a preset asks
             for nothing but the study's own drive.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-
     given = dict(_named(text) for text in args.designs)
     if PLAIN not in given or len(given) == 1:
         what = "a design of the study itself and one of a preset are compared"
@@ -83,8 +83,6 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
         UserError: a preset asks for nothing but the study's own drive.
     """
     import xarray as xr
-
-    from pipeline.posing import loss_units
 
     own = problem.load(path)
     presets = [name for name in designs if name != PLAIN]
@@ -135,8 +133,6 @@ def _held_out(asked: Problem) -> Problem:
 
 def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     """The loss of a design, or of the structure before any; over the copies, if there are any."""
-    from pipeline.posing import design_scene, flat_vertices, read_design
-
     scene = design_scene(asked, folder)
     vertices = scene.lattice.vertices
     if path is not None:
@@ -148,7 +144,6 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
     """The combined loss of one structure."""
     from sim.scene import combined, concrete_parameters, make_plan, objective
-    from sim.solvers import base
 
     plan = make_plan(scene, vertices)
     values = concrete_parameters(scene, vertices)

@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
 from pipeline.runtime import UserError, cli
 
 if TYPE_CHECKING:
@@ -32,9 +33,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a design of another problem.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-
     asked = problem.load(args.problem, args.preset)
     methods = {
         problem.section_hash(asked, "design", name): name for name in asked.optimiser.methods.chosen

@@ -10,19 +10,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
 from pipeline.posing import (
     CaseResult,
     PosedStructure,
     Times,
+    assemble_response,
     failures,
     law_comparison,
     measure,
+    read_design,
+    scene_of,
     structures_of,
     times_of,
 )
 from pipeline.runtime import cli
 from sim.core import Floats
+from sim.scene import concrete_parameters, make_plan
+from sim.solvers import Case, run_batch
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,10 +57,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a structure could not be followed to its end; what was computed is kept.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import read_design, scene_of
-
     asked = problem.load(args.problem, args.preset)
     asked = law_comparison.geometric(asked) if args.geometric else asked
     design = read_design(asked, args.design)
@@ -86,9 +88,6 @@ def _keep(
     args: argparse.Namespace,
 ) -> Path | None:
     """Writes the response of a static path as far as all structures can be followed, if at all."""
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-
     scene, step = structures[stopped.name].scene, stopped.error.step
     whole = scene.steps or 1
     reached = 0.0 if not step else stopped.asked[step - 1] / scene.duration
@@ -127,8 +126,6 @@ def response_dataset(
     Raises:
         StoppedError: a structure could not be followed to its end.
     """
-    from pipeline.posing import assemble_response
-
     times = times_of(asked, structures["altered"].scene)
     measured, plans = measured_cases(structures, times, threads)
     return assemble_response(asked, structures, times.asked[times.shown], measured), plans
@@ -142,9 +139,6 @@ def measured_cases(
     Raises:
         UserError: a structure cannot be simulated.
     """
-    from sim.scene import make_plan
-    from sim.solvers import run_batch
-
     measured: dict[str, list[CaseResult]] = {}
     plans: dict[str, object] = {}
     n_cases = len(structures["altered"].scene.motions)
@@ -166,8 +160,6 @@ def measured_cases(
 
 
 def _cases(structure: PosedStructure, plan: Plan) -> Iterator[Case]:
-    from sim.scene import concrete_parameters
-    from sim.solvers import Case
 
     values = concrete_parameters(structure.scene, structure.vertices)
     return (

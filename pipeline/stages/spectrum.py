@@ -9,10 +9,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import (
+    case_directions,
+    lattice_of,
+    network_variables,
+    read_design,
+    scene_of,
+    spread,
+    structures_of,
+    unit_coordinates,
+    waves,
+)
 from pipeline.runtime import UserError, cli
+from sim.core import Floats
+from sim.quasistatics import StaticSolver
+from sim.scene import concrete_parameters
+from sim.solvers import solve_case
+from sim.vibration import linearised, modes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +39,6 @@ if TYPE_CHECKING:
     from sim.structure import ConcreteParameters
     from sim.vibration import Linear
 
-Floats = NDArray[np.float64]
 
 STATES = ("at rest", "loaded")
 _MODE = ("structure", "state", "mode")
@@ -54,9 +69,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: the problem does not ask for one, or what it asks for cannot be computed.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-
     asked = problem.load(args.problem, args.preset)
     if asked.spectrum is None:
         raise UserError(
@@ -81,18 +93,6 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
         UserError: the lattice has fewer modes, or no unit cell, or it does not hold the strain.
     """
     import xarray as xr
-
-    from pipeline.posing import (
-        case_directions,
-        lattice_of,
-        network_variables,
-        read_design,
-        scene_of,
-        spread,
-        structures_of,
-        unit_coordinates,
-        waves,
-    )
 
     scene = scene_of(asked, folder)
     structures = structures_of(scene, read_design(asked, design))
@@ -134,10 +134,6 @@ def _vibrations(
     structure: PosedStructure, wanted: Spectrum, directions: Sequence[float], size: int
 ) -> Vibrations:
     """About rest, and about the equilibrium under the full load of a static study."""
-    from pipeline.posing import spread
-    from sim.scene import concrete_parameters
-    from sim.vibration import linearised
-
     scene, lattice = structure.scene, structure.scene.lattice
     values = concrete_parameters(scene, structure.vertices)
     found = []
@@ -151,8 +147,6 @@ def _vibrations(
 
 
 def _equilibria(structure: PosedStructure, values: ConcreteParameters) -> list[Floats]:
-    from sim.quasistatics import StaticSolver
-    from sim.solvers import solve_case
 
     scene = structure.scene
     found = [np.zeros((scene.lattice.n_units, 3))]
@@ -164,7 +158,6 @@ def _equilibria(structure: PosedStructure, values: ConcreteParameters) -> list[F
 
 
 def _modes(made: Linear, count: int) -> tuple[Floats, Floats]:
-    from sim.vibration import modes
 
     try:
         found = modes(made, count)

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import problem
-from pipeline.datasets import chunked
-from pipeline.problem.sections import sweep_cases
-from pipeline.runtime import UserError, cli
+from pipeline import datasets, problem
+from pipeline.datasets import chunked, provenance
+from pipeline.posing import loss_units, read_design, setting_losses
+from pipeline.problem.sections import sweep_cases, taken_apart
+from pipeline.runtime import SweepResult, UserError, case_log, cli, source_hash
+from sim.core import SimulationError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,10 +41,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import read_design
-    from pipeline.runtime import case_log, source_hash
 
     asked = problem.load(args.problem, args.preset)
     if asked.sweep is None:
@@ -94,9 +92,6 @@ def _simulate(
 def _results(
     args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: DirectionGroup
 ) -> list[SweepResult]:
-    from pipeline.posing import setting_losses
-    from pipeline.runtime import SweepResult
-    from sim.core import SimulationError
 
     setting = group.together
     try:
@@ -113,9 +108,6 @@ def dataset(
 ) -> xr.Dataset:
     """The dataset ``sweep`` of some cases."""
     import xarray as xr
-
-    from pipeline.posing import loss_units
-    from pipeline.problem.sections import taken_apart
 
     assert asked.sweep is not None
     keys = asked.sweep.keys

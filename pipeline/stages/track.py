@@ -15,7 +15,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.runtime import UserError, cli, found_in
+from pipeline import datasets
+from pipeline.datasets import provenance
+from pipeline.runtime import UserError, cli, found_in, write_atomically
+from pipeline.tracking.frames import (
+    WORD,
+    frames,
+    import_video,
+    length,
+    load_cell,
+    recording,
+    rendered,
+    uneven,
+)
+from pipeline.tracking.frames import recording as recordings
+from pipeline.tracking.geometry import as_built, of_design
+from pipeline.tracking.motion import follow
+from pipeline.tracking.output import assemble_track, dic_points, is_driven, track_table
+from pipeline.tracking.reference_frame import Setup, proposal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,10 +91,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _points(path: Path, args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.tracking.geometry import as_built
-    from pipeline.tracking.output import dic_points, track_table
 
     asked = dic_points.load(path)
     source = _design(asked.design, path, args.design)
@@ -93,11 +106,6 @@ def _points(path: Path, args: argparse.Namespace) -> None:
 
 def _init(video: Path, args: argparse.Namespace) -> None:
     import cv2
-
-    from pipeline import datasets
-    from pipeline.runtime import write_atomically
-    from pipeline.tracking.frames import WORD, frames, recording, rendered
-    from pipeline.tracking.reference_frame import proposal
 
     design = datasets.read(args.design, "design")
     first = next(frames(video, rate=1.0), None)
@@ -132,9 +140,6 @@ def _init(video: Path, args: argparse.Namespace) -> None:
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.tracking.frames import import_video
 
     described = import_video.description(path)
     shown = import_video.video_of(path) if args.video is None else args.video
@@ -153,12 +158,6 @@ def _import(path: Path, args: argparse.Namespace) -> None:
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.tracking.frames import import_video, load_cell, rendered
-    from pipeline.tracking.frames import recording as recordings
-    from pipeline.tracking.geometry import as_built
-    from pipeline.tracking.output import assemble_track, is_driven, track_table
 
     if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
         remedy = (
@@ -234,11 +233,6 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     Raises:
         UserError: naming the recording's file where the video does not show the design.
     """
-    from pipeline.tracking.frames import frames, length, uneven
-    from pipeline.tracking.geometry import of_design
-    from pipeline.tracking.motion import follow
-    from pipeline.tracking.reference_frame import Setup
-
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size

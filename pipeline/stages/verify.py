@@ -11,16 +11,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
 from pipeline.posing import (
     AS_RUN,
     UNSTABLE,
     CaseResult,
     Numbers,
     assemble_verification,
+    loss_units,
+    read_design,
+    scene_of,
+    structures_of,
     time_refinement,
+    times_of,
 )
 from pipeline.runtime import UserError, cli
+from pipeline.stages.simulate import measured_cases
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,10 +56,6 @@ def parser() -> argparse.ArgumentParser:
 
 def work(args: argparse.Namespace) -> None:
     """Simulates the structures of a design under every variant of the problem."""
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import read_design
-
     asked = problem.load(args.problem, args.preset)
     if asked.static and asked.horizon.steps is None:
         raise UserError(
@@ -87,8 +90,6 @@ def variants(asked: Problem) -> dict[str, Problem]:
 
 def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -> xr.Dataset:
     """The dataset ``verification``; a variant that cannot be simulated keeps its reason."""
-    from pipeline.posing import loss_units
-
     found, status = (
         _finer_loads(asked, folder, design, threads)
         if asked.static
@@ -103,9 +104,6 @@ def _finer_loads(
     asked: Problem, folder: Path, design: xr.Dataset, threads: int
 ) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
     """Numbers by check and structure of a path of equilibria, and why a check has none."""
-    from pipeline.posing import scene_of, structures_of, times_of
-    from pipeline.stages.simulate import measured_cases
-
     posed = variants(asked)
     tables: dict[str, Table] = {}
     status = dict.fromkeys(posed, "ok")

@@ -10,8 +10,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline import problem
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import (
+    case_directions,
+    lattice_of,
+    network_variables,
+    read_design,
+    scene_of,
+    spread,
+    structures_of,
+    times_of,
+    unit_coordinates,
+)
 from pipeline.runtime import UserError, cli, found_in
+from pipeline.tracking.frames import recording as recordings
+from pipeline.virtual_lab import specimen
+from sim.core import SimulationError
+from sim.energy import observe
+from sim.scene import concrete_parameters, make_plan
+from sim.solvers import solve_case
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,11 +58,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: the recording has no specimen, or it cannot be made or simulated.
     """
-    from pipeline import datasets
-    from pipeline.datasets import provenance
-    from pipeline.posing import read_design, scene_of, structures_of
-    from pipeline.tracking.frames import recording as recordings
-
     recording = recordings.load(args.recording)
     asked = problem.load(args.problem, args.preset)
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
@@ -66,8 +79,6 @@ def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recordin
     Raises:
         UserError: the recording has no specimen, or it cannot be made or simulated.
     """
-    from pipeline.virtual_lab import specimen
-
     virtual = recording.virtual
     if virtual is None or virtual.specimen is None:
         remedy = "describe the specimen there"
@@ -96,8 +107,6 @@ def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedSt
 
 def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
     """When the specimen is looked at: as the response, and as often again on the way back."""
-    from pipeline.posing import times_of
-
     wanted = times_of(asked, scene)
     times = wanted.asked[wanted.shown]
     if not unload:
@@ -112,14 +121,6 @@ def _described(
     asked: Problem, altered: Scene, made: PosedStructure, case: int, times: Floats
 ) -> xr.Dataset:
     import xarray as xr
-
-    from pipeline.posing import (
-        case_directions,
-        lattice_of,
-        network_variables,
-        spread,
-        unit_coordinates,
-    )
 
     scene, vertices = made
     intact, lattice = lattice_of(asked), scene.lattice
@@ -146,11 +147,6 @@ def _described(
 
 def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
     """Displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
-    from sim.core import SimulationError
-    from sim.energy import observe
-    from sim.scene import concrete_parameters, make_plan
-    from sim.solvers import solve_case
-
     scene, vertices = made
     values = concrete_parameters(scene, vertices)
     try:

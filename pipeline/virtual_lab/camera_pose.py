@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.problem.sections import Viewing
-from pipeline.runtime import Floats
 from pipeline.tracking.geometry import Camera
+from sim.core import Floats
 
 
 class Viewpoint(NamedTuple):

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, compiled, inlined
+from pipeline.runtime import compiled, inlined
+from sim.core import Floats, Ints
 
 
 class NestedPolygons(NamedTuple):

@@ -9,8 +9,8 @@ import shapely
 
 from pipeline.fabrication.units import tracking_dots
 from pipeline.problem.sections import Speckle, UnitAppearance
-from pipeline.runtime import Floats, Ints
 from pipeline.tracking.geometry import SpecimenOutlines
+from sim.core import Floats, Ints
 
 _GAP = 0.25  # least distance of two speckles, in diameters
 _TRIES = 12  # for each speckle that would fit

@@ -13,11 +13,11 @@ import numpy as np
 import shapely
 
 from pipeline.problem.sections import UnitAppearance
-from pipeline.runtime import Floats, Ints
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.virtual_lab.camera_pose import Viewpoint
 from pipeline.virtual_lab.coverage import NestedPolygons
 from pipeline.virtual_lab.face_marks import Marks
+from sim.core import Floats, Ints
 
 _PIECE = 2.0  # longest piece of an edge, mm: the lens bends edges
 _CORNERS = 32  # of a disc

@@ -9,7 +9,8 @@ import xarray as xr
 from scipy.interpolate import CubicSpline
 
 from pipeline.problem.sections import VirtualRecording
-from pipeline.runtime import Floats, Mask, UserError
+from pipeline.runtime import UserError
+from sim.core import Floats, Mask
 
 _FINEST = 0.3  # px between the instants of an exposure
 _MOST = 9

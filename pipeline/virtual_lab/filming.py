@@ -10,13 +10,14 @@ import xarray as xr
 
 from pipeline.posing import structure_variables
 from pipeline.problem.sections import VirtualRecording
-from pipeline.runtime import Image, Ints, Mask, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.geometry import of_design
 from pipeline.virtual_lab import sensor
 from pipeline.virtual_lab.camera_pose import viewpoint
 from pipeline.virtual_lab.face_marks import marks
 from pipeline.virtual_lab.film_scene import FilmScene
 from pipeline.virtual_lab.filmed_motion import FilmedMotion, motion
+from sim.core import Image, Ints, Mask
 
 
 class Filming(NamedTuple):

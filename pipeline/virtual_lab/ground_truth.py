@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.runtime import Mask
 from pipeline.virtual_lab.camera_pose import Viewpoint
 from pipeline.virtual_lab.filmed_motion import FilmedMotion
+from sim.core import Mask
 
 
 def assemble_truth(

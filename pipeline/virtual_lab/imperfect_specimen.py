@@ -8,7 +8,6 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem.sections import Making, Shaking
@@ -16,8 +15,6 @@ from pipeline.runtime import UserError
 from sim.core import Numbers
 from sim.scene import Scene
 from sim.solvers import MotionLaw
-
-Floats = NDArray[np.float64]
 
 STREAM = 2
 """First word of the seeds of all draws here, so that no predicted specimen equals one of them."""

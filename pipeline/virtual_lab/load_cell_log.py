@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem.sections import VirtualRecording, Weighing
-from pipeline.runtime import Floats
 from pipeline.virtual_lab.filmed_motion import clock
+from sim.core import Floats
 
 STREAM = 3
 """First word of the seed of the noise: no frame has it."""

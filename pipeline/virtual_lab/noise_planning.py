@@ -12,12 +12,13 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem.sections import Codec, VirtualRecording
-from pipeline.runtime import Floats, Reals, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import frames
 from pipeline.tracking.motion import follow
 from pipeline.tracking.reference_frame import Setup
 from pipeline.virtual_lab.filming import Filming, of_case, prepared
 from pipeline.virtual_lab.video_writer import encode
+from sim.core import Floats, Reals
 
 LEAST = 16
 RESTING = 6  # frames before the motion

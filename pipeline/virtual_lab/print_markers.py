@@ -9,7 +9,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.runtime import UserError, cli
+from pipeline import datasets
+from pipeline.fabrication.parts import labels
+from pipeline.problem.sections import Markers, Speckle, UnitAppearance
+from pipeline.runtime import UserError, cli, write_atomically
+from pipeline.tracking.geometry import as_built, of_design
+from pipeline.virtual_lab import stickers
+from pipeline.virtual_lab.face_marks import marks
 
 if TYPE_CHECKING:
     from pipeline.problem.sections import UnitAppearance
@@ -38,13 +44,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: sizes that make no sense, or a unit larger than a page.
     """
-    from pipeline import datasets
-    from pipeline.fabrication.parts import labels
-    from pipeline.runtime import write_atomically
-    from pipeline.tracking.geometry import as_built, of_design
-    from pipeline.virtual_lab import stickers
-    from pipeline.virtual_lab.face_marks import marks
-
     design = datasets.read(args.design, "design")
     specimen = of_design(as_built(design, args.structure))
     found = marks(specimen, args.kind, _look(args), 0)
@@ -58,7 +57,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _look(args: argparse.Namespace) -> UnitAppearance:
-    from pipeline.problem.sections import Markers, Speckle, UnitAppearance
 
     diameter = args.diameter or (2.0 if args.kind == "dots" else 1.2)
     if not (0.3 <= diameter <= 10.0 and 0.0 < args.spread < 100.0):

@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 
 from pipeline.problem.sections import Lighting, VirtualRecording
-from pipeline.runtime import Floats, Image
 from pipeline.virtual_lab import coverage
 from pipeline.virtual_lab.film_scene import FilmScene, seen
+from sim.core import Floats, Image
 
 FINER = 3
 """Pixels are divided so often on either side before the blur: it must not see the grid."""

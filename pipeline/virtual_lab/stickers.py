@@ -10,9 +10,10 @@ import numpy as np
 
 from pipeline.fabrication.papers import GREY, INK, POINT, Paper, PdfDocument
 from pipeline.fabrication.plates import Spot, TooLargeError, pack
-from pipeline.runtime import Floats, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.virtual_lab.face_marks import Marks
+from sim.core import Floats
 
 Ink = Literal["dark", "light"]
 

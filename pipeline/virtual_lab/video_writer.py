@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 
 from pipeline.problem.sections import Codec
-from pipeline.runtime import Image, write_atomically
+from pipeline.runtime import write_atomically
+from sim.core import Image
 
 _TICKS = 90000  # per second: a usual clock of containers
 

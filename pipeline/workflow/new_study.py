@@ -12,6 +12,8 @@ from pathlib import Path
 from string import Template
 from textwrap import indent
 
+from pipeline import problem
+from pipeline.problem.outlines import ImageError, read_outlines
 from pipeline.runtime import UserError, cli
 
 LOG = logging.getLogger(__name__)
@@ -62,8 +64,6 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: a bad name, a study of that name, or an image that shows no shape.
     """
-    from pipeline import problem
-
     folder = args.folder / args.name
     _check(args, folder)
     aside = args.folder / f".{args.name}.part"
@@ -112,7 +112,6 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
     if re.fullmatch(r"[\w.-]+", args.image.name) is None:
         remedy = "rename it: letters, digits, and . - _ between them"
         raise UserError("not a name for an image", file=args.image, remedy=remedy)
-    from pipeline.problem.outlines import ImageError, read_outlines
 
     try:
         read_outlines(args.image)

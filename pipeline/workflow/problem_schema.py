@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pipeline.problem import Problem
 from pipeline.runtime import cli
 
 DEFAULT = Path("experiments/problem.schema.json")
@@ -17,8 +18,6 @@ _OVERLAY = "Overlay"
 
 def schema() -> dict[str, Any]:
     """The schema of a problem file, presets included."""
-    from pipeline.problem import Problem
-
     whole = _without_working_units(Problem.model_json_schema(mode="validation"))
     sections = whole.pop("$defs")
     overlay = _overlaid({key: value for key, value in whole.items() if key != "title"})

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from pipeline.datasets import file_hash
 from pipeline.runtime import ROOT, UserError, cli
 
 LOG = logging.getLogger(__name__)
@@ -31,8 +32,6 @@ def differences(first: Path, second: Path) -> tuple[int, list[str]]:
 
 def _files(folder: Path) -> dict[str, str]:
     """Hash of every result below a folder, by name."""
-    from pipeline.datasets import file_hash
-
     names = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     return {
         name.as_posix(): file_hash(folder / name)

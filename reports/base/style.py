@@ -17,9 +17,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, ListedColormap, to_rgb
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 TWO_COLUMNS = 178.0
 """Width of a journal's two columns, mm."""
@@ -97,13 +96,13 @@ _TO_LAB = np.array(
 )
 
 
-def oklab(rgb: Array) -> Array:
+def oklab(rgb: Floats) -> Floats:
     """OKLab coordinates (..., 3) of sRGB colours (..., 3) in [0, 1]."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return np.cbrt(linear @ _TO_LMS.T) @ _TO_LAB.T
 
 
-def srgb(lab: Array) -> Array:
+def srgb(lab: Floats) -> Floats:
     """SRGB colours (..., 3), clipped to [0, 1], of OKLab coordinates (..., 3)."""
     linear = ((lab @ np.linalg.inv(_TO_LAB).T) ** 3) @ np.linalg.inv(_TO_LMS).T
     linear = np.clip(linear, 0.0, 1.0)
@@ -123,7 +122,7 @@ def two_sided(name: str, low: Sequence[str], high: Sequence[str]) -> Colormap:
     ).with_extremes(bad="white")
 
 
-def _even_path(anchors: Sequence[str], levels: int) -> Array:
+def _even_path(anchors: Sequence[str], levels: int) -> Floats:
     corners = oklab(np.array([to_rgb(anchor) for anchor in anchors]))
     lengths = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     way = np.concatenate([[0.0], np.cumsum(lengths)]) / lengths.sum()

@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import shapely
 import xarray as xr
-from numpy.typing import NDArray
 
 from reports.study import CLOAK, SOURCE, ReportScene, RigidUnits
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 LAST_SAMPLE = 1.0 + 1e-9
 """Slack on the end of a time window, so that rounding does not drop its last sample."""
 
 
-def magnitude(displacement: xr.DataArray, scale: Array) -> xr.DataArray:
+def magnitude(displacement: xr.DataArray, scale: Floats) -> xr.DataArray:
     """Magnitude |U| of the dimensionless displacement U = (ux/s, uy/s, theta), any dims but dof."""
     divisors = xr.DataArray(scale, dims="dof", coords={"dof": displacement["dof"]})
     squares: xr.DataArray = (displacement / divisors) ** 2
@@ -55,7 +53,7 @@ def peak_to_peak(series: xr.DataArray, until: float) -> xr.DataArray:
     return span
 
 
-def asymmetry(structure: RigidUnits, middle: tuple[float, float]) -> Array:
+def asymmetry(structure: RigidUnits, middle: tuple[float, float]) -> Floats:
     """Distance (n,) in mm of each cloak vertex from the design turned by 90 degrees about `middle`.
 
     Each unit is turned onto the unit whose lattice point it meets; its vertices are paired with
@@ -72,12 +70,12 @@ def asymmetry(structure: RigidUnits, middle: tuple[float, float]) -> Array:
     )
 
 
-def _quarter_turn(points: Array, centre: Array) -> Array:
+def _quarter_turn(points: Floats, centre: Floats) -> Floats:
     away = points - centre
     return centre + np.stack([-away[..., 1], away[..., 0]], axis=-1)
 
 
-def _best_fit(polygon: Array, other: Array) -> Array:
+def _best_fit(polygon: Floats, other: Floats) -> Floats:
     """Distances between the vertices of two polygons, over the start that makes them least."""
     first, second = (shape[~np.isnan(shape[:, 0])] for shape in (polygon, other))
     if len(first) != len(second):
@@ -104,7 +102,7 @@ def site_radius(structure: RigidUnits, middle: tuple[float, float], region: int)
     return float(np.linalg.norm(members - np.array(middle), axis=1).max()) if len(members) else 0.0
 
 
-def first_within(history: Array, best: float, share: float) -> int:
+def first_within(history: Floats, best: float, share: float) -> int:
     """First evaluation after which `share` of the way from the start to `best` is done."""
     target = history[0] - share * (history[0] - best)
     return int(np.argmax(np.fmin.accumulate(history) <= target))

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from reports.facts.fact_records import Fact, grouped, number, share, worded
-from reports.study import Array, RecordedMotion
+from reports.study import RecordedMotion
+from sim.core import Floats
 
 DOFS = {"ux": "u_x", "uy": "u_y", "theta": "θ"}
 
@@ -21,7 +22,7 @@ def recorded_facts(recordings: Sequence[RecordedMotion]) -> list[Fact]:
     ]
 
 
-def intervals(measured: Array, predicted: Array, unit: str = "") -> str:
+def intervals(measured: Floats, predicted: Floats, unit: str = "") -> str:
     """The ends (2,) of an interval, and of that which imperfect specimens span, in words."""
     words = f"95 %: {measured[0]:.3g} to {measured[1]:.3g}{unit}"
     if np.isfinite(predicted).all():

@@ -11,7 +11,9 @@ from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive
 from reports.base import Table
 from reports.facts import Fact
+from reports.figures.loading_path import content as path
 from reports.figures.shielding import MAPPED
+from reports.figures.shielding import content as about
 from reports.page import PageText, ReportPage, study_page
 from reports.panels import Animation, payload
 from reports.study import StudyResults
@@ -54,7 +56,6 @@ def kind_of(problem: Problem) -> ReportKind:
 
 
 def _shielding() -> ReportKind:
-    from reports.figures.shielding import content as about
     from reports.figures.shielding import facts, figure, tables
 
     return ReportKind(
@@ -80,7 +81,6 @@ def _along_a_path() -> ReportKind:
 
 
 def _of_a_wave() -> ReportKind:
-    from reports.figures.loading_path import content as path
     from reports.figures.wave import content as about
     from reports.figures.wave import facts, figure, tables
 

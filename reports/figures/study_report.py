@@ -12,6 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.runtime import cli
+from reports.facts import fact_records
+from reports.figures import kinds
+from reports.page import publishing
 
 if TYPE_CHECKING:
     from pipeline.problem import Output
@@ -33,10 +36,6 @@ def publish(study: StudyResults, folder: Path) -> list[Path]:
     Raises:
         UserError: the folder is full, read-only or not ours.
     """
-    from reports.facts import fact_records
-    from reports.figures import kinds
-    from reports.page import publishing
-
     kind = kinds.kind_of(study.problem)
     known = fact_records.quoted(kind.facts(study), study.problem.report.paper)
     tables = [fact_records.table(known), *kind.tables(study)]

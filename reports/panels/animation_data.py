@@ -40,8 +40,7 @@ from numpy.typing import NDArray
 
 from reports.base import style
 from reports.study import CLAMPED, DRIVEN, RigidUnits, deformed
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 MOST_STEPS = 200
 """Steps between frames that a page carries; more are thinned."""
@@ -58,7 +57,7 @@ class AnimationAxis:
 
     name: str
     unit: str
-    values: Array
+    values: Floats
     digits: int
     loops: bool
     speeds: Mapping[str, float]
@@ -74,9 +73,9 @@ class AnimationClip:
     name: str
     colour: str
     structure: RigidUnits
-    motion: Array
+    motion: Floats
     marker: int | None = None
-    residual: Array | None = None
+    residual: Floats | None = None
 
     @property
     def weight(self) -> int:
@@ -188,18 +187,18 @@ def quantisation_error(data: Mapping[str, Any]) -> tuple[float, float]:
     return 0.5 * float(steps[:, :2].max()), 0.5 * float(steps[:, 2].max())
 
 
-def _known(motion: Array) -> bool:
+def _known(motion: Floats) -> bool:
     return bool(np.isfinite(motion).any())
 
 
-def _cases(motion: Array | None, frames: NDArray[np.int64]) -> list[dict[str, Any] | None]:
+def _cases(motion: Floats | None, frames: NDArray[np.int64]) -> list[dict[str, Any] | None]:
     """Every case of a motion, None where nothing of it is known."""
     if motion is None:
         return []
     return [_quantised(case[frames]) if _known(case) else None for case in motion]
 
 
-def _quantised(motion: Array) -> dict[str, Any]:
+def _quantised(motion: Floats) -> dict[str, Any]:
     known = np.isfinite(motion)
     largest = np.abs(np.where(known, motion, 0.0)).max(axis=(0, 1))
     step = largest / LARGEST_LEVEL
@@ -241,7 +240,7 @@ def _field(field: ColourField, clips: Sequence[AnimationClip]) -> dict[str, Any]
     }
 
 
-def _limits(field: ColourField, residuals: Sequence[Array]) -> list[float]:
+def _limits(field: ColourField, residuals: Sequence[Floats]) -> list[float]:
     """Limits of colours that hold all but the largest hundredth of the residuals."""
     values = np.concatenate([scalar(field, motion).ravel() for motion in residuals])
     known = np.abs(values[np.isfinite(values)])
@@ -249,10 +248,10 @@ def _limits(field: ColourField, residuals: Sequence[Array]) -> list[float]:
     return [0.0 if field.limits[0] >= 0 else -most, most]
 
 
-def scalar(field: ColourField, motion: Array) -> Array:
+def scalar(field: ColourField, motion: Floats) -> Floats:
     """What a field shows of motions (..., 3) in mm, mm, rad."""
     if field.key == "norm":
-        size: Array = np.linalg.norm(motion / np.array(field.scale), axis=-1)
+        size: Floats = np.linalg.norm(motion / np.array(field.scale), axis=-1)
         return field.factor * size
     shown = field.factor * motion[..., {"ux": 0, "uy": 1, "theta": 2, "turn": 2}[field.key]]
     return np.abs(shown) if field.key == "turn" else shown

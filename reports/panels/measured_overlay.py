@@ -12,20 +12,18 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.panels.animation_data import AnimationClip
 from reports.study import LABEL, RecordedMotion, from_dataset
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 MARKERS = 22
 """Of a measured curve."""
 _DASHES = (0, (2.6, 1.4))
 
 
-def measured_curve(axes: Axes, along: Array, values: Array, colour: str) -> None:
+def measured_curve(axes: Axes, along: Floats, values: Floats, colour: str) -> None:
     """A measured curve, its markers evenly spread."""
     every = max(1, len(along) // MARKERS)
     axes.plot(
@@ -34,7 +32,7 @@ def measured_curve(axes: Axes, along: Array, values: Array, colour: str) -> None
     )  # fmt: skip
 
 
-def band(axes: Axes, along: Array, low: Array, high: Array, colour: str) -> None:
+def band(axes: Axes, along: Floats, low: Floats, high: Floats, colour: str) -> None:
     """A prediction band."""
     axes.fill_between(along, low, high, color=colour, alpha=0.22, lw=0, zorder=2)
 
@@ -54,7 +52,7 @@ def handles(recordings: Sequence[RecordedMotion]) -> list[Artist]:
 
 
 def clips(
-    recordings: Sequence[RecordedMotion], simulated: AnimationClip, wanted: Array, spacing: float
+    recordings: Sequence[RecordedMotion], simulated: AnimationClip, wanted: Floats, spacing: float
 ) -> list[AnimationClip]:
     """Recordings of one structure for a player, each under its own load case, with the residual.
 
@@ -74,7 +72,7 @@ def clips(
 
 
 def _clip(
-    trial: Mapping[int, RecordedMotion], simulated: AnimationClip, wanted: Array, spacing: float
+    trial: Mapping[int, RecordedMotion], simulated: AnimationClip, wanted: Floats, spacing: float
 ) -> AnimationClip:
     first = next(iter(trial.values()))
     shape = (len(simulated.motion), len(wanted), *simulated.motion.shape[2:])

@@ -13,16 +13,17 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from reports.base import GREY, INTACT, PALE
-from reports.study import CLAMPED, Array, RigidUnits, deformed
+from reports.study import CLAMPED, RigidUnits, deformed
+from sim.core import Floats
 
 
 def draw(
     axes: Axes,
     structure: RigidUnits,
-    displacement: Array | None = None,
+    displacement: Floats | None = None,
     *,
     colours: list[str] | None = None,
-    values: Array | None = None,
+    values: Floats | None = None,
     colour_map: Colormap | None = None,
     norm: Normalize | None = None,
     margin: float = 6.0,
@@ -75,7 +76,7 @@ def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
         )
 
 
-def outline(axes: Axes, centre: Array, radii: Iterable[float], colour: str) -> None:
+def outline(axes: Axes, centre: Floats, radii: Iterable[float], colour: str) -> None:
     """Dashed circles (mm) around a region."""
     for radius in radii:
         axes.add_patch(
@@ -92,7 +93,7 @@ def outline(axes: Axes, centre: Array, radii: Iterable[float], colour: str) -> N
 
 
 def drive_arrows(
-    axes: Axes, centre: Array, direction: float, reach: tuple[float, float], colour: str
+    axes: Axes, centre: Floats, direction: float, reach: tuple[float, float], colour: str
 ) -> None:
     """Arrows between two distances (mm) on both sides of `centre`, `direction` in degrees."""
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])

@@ -10,8 +10,6 @@ from .rigid_units import DRIVEN as DRIVEN
 from .rigid_units import INCLUSION as INCLUSION
 from .rigid_units import SOURCE as SOURCE
 from .rigid_units import SURROUNDINGS as SURROUNDINGS
-from .rigid_units import Array as Array
-from .rigid_units import Integers as Integers
 from .rigid_units import RigidUnits as RigidUnits
 from .rigid_units import deformed as deformed
 from .rigid_units import from_dataset as from_dataset

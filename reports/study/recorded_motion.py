@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pipeline.problem import Problem
-from reports.study.rigid_units import Array
+from sim.core import Floats
 
 LABEL = "SYNTHETIC"
 """Stands wherever a motion is shown that was rendered and not filmed."""
@@ -34,7 +34,7 @@ class RecordedMotion:
 
     name: str
     data: xr.Dataset
-    along: Array
+    along: Floats
     frames: NDArray[np.int64]
 
     @property
@@ -57,12 +57,12 @@ class RecordedMotion:
         """What a figure calls it."""
         return f"experiment ({LABEL})" if self.synthetic else "experiment"
 
-    def values(self, variable: xr.DataArray) -> Array:
+    def values(self, variable: xr.DataArray) -> Floats:
         """A variable (time, ...) of the dataset at its frames (n_frames, ...)."""
-        found: Array = variable.transpose("time", ...).values[self.frames]
+        found: Floats = variable.transpose("time", ...).values[self.frames]
         return found
 
-    def at(self, variable: xr.DataArray, wanted: Array) -> Array:
+    def at(self, variable: xr.DataArray, wanted: Floats) -> Floats:
         """A variable (time, ...) of the dataset, interpolated; NaN where nothing was recorded.
 
         Args:
@@ -78,7 +78,7 @@ class RecordedMotion:
         found = values[low] + part * (values[low + 1] - values[low])
         return np.where(within.reshape(part.shape), found, np.nan)
 
-    def motion(self, response: xr.Dataset, wanted: Array) -> xr.Dataset:
+    def motion(self, response: xr.Dataset, wanted: Floats) -> xr.Dataset:
         """The measured motion in the form of a response of one structure and one case.
 
         Args:

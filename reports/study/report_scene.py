@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive
 from pipeline.runtime import UserError
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class ReportScene:
         return 1.0 / self.frequency
 
     @property
-    def scale(self) -> Array:
+    def scale(self) -> Floats:
         """Divisors (3,) that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
         return np.array([self.spacing, self.spacing, 1.0])
 

@@ -12,8 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from sim.core import Floats, Ints
 
 SURROUNDINGS, CLOAK, SOURCE, VOID, INCLUSION = range(5)
 FREE, CLAMPED, DRIVEN = 0, 1, 2
@@ -28,15 +27,15 @@ class RigidUnits:
     lattice point; ligament_unit and ligament_vertex (n_ligaments, 2); region, support (n_units,).
     """
 
-    vertices: Array
-    site: Array
-    ligament_unit: Integers
-    ligament_vertex: Integers
-    region: Integers
-    support: Integers
+    vertices: Floats
+    site: Floats
+    ligament_unit: Ints
+    ligament_vertex: Ints
+    region: Ints
+    support: Ints
 
     @property
-    def centroid(self) -> Array:
+    def centroid(self) -> Floats:
         """Centroids (n_units, 2) in mm of the flat units."""
         return polygon_centroids(self.vertices)
 
@@ -67,7 +66,7 @@ def from_dataset(data: xr.Dataset, spacing: float, vertices: str = "vertices") -
     )
 
 
-def polygon_centroids(vertices: Array) -> Array:
+def polygon_centroids(vertices: Floats) -> Floats:
     """Centroids (n, 2) of polygons (n, m, 2) by the shoelace formula, NaN vertices left out."""
     missing = np.isnan(vertices[..., :1])
     # A repeated first vertex adds neither area nor moment.
@@ -76,11 +75,11 @@ def polygon_centroids(vertices: Array) -> Array:
     following = np.roll(local, -1, axis=1)
     cross = local[..., 0] * following[..., 1] - local[..., 1] * following[..., 0]
     moment = ((local + following) * cross[..., None]).sum(axis=1)
-    centroid: Array = ring[:, 0] + moment / (3.0 * cross.sum(axis=1))[:, None]
+    centroid: Floats = ring[:, 0] + moment / (3.0 * cross.sum(axis=1))[:, None]
     return centroid
 
 
-def deformed(structure: RigidUnits, displacement: Array | None = None) -> Array:
+def deformed(structure: RigidUnits, displacement: Floats | None = None) -> Floats:
     """Vertices (n_units, n_vertices, 2) mm after `displacement` (n_units, 3) in mm, mm, rad.
 
     Units whose displacement is NaN (not known) stay at rest.
@@ -95,11 +94,11 @@ def deformed(structure: RigidUnits, displacement: Array | None = None) -> Array:
         [cosine * arm[..., 0] - sine * arm[..., 1], sine * arm[..., 0] + cosine * arm[..., 1]],
         axis=-1,
     )
-    moved: Array = (centroid + displacement[:, :2])[:, None] + turned
+    moved: Floats = (centroid + displacement[:, :2])[:, None] + turned
     return moved
 
 
-def unit_at(structure: RigidUnits, point: Array) -> int:
+def unit_at(structure: RigidUnits, point: Floats) -> int:
     """Unit whose lattice point lies nearest to `point` (mm)."""
     return int(np.argmin(np.linalg.norm(structure.site - point, axis=1)))
 

@@ -1,7 +1,11 @@
 from . import compiling as compiling
 from .arrays import Floats as Floats
+from .arrays import Image as Image
 from .arrays import Ints as Ints
+from .arrays import Mask as Mask
 from .arrays import Numbers as Numbers
+from .arrays import Reals as Reals
+from .arrays import Singles as Singles
 from .compiling import compiled as compiled
 from .compiling import inlined as inlined
 from .errors import NewContactPairs as NewContactPairs

@@ -12,13 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Geometry, LineString, Point, Polygon
 
 from pipeline.fabrication.readback import Fault
 from pipeline.problem.sections import Fabrication
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 TOLERANCE = 5e-3
 """Lengths found on a closed outline are right to this, mm."""

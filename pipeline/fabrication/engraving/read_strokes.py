@@ -11,14 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.engraving.reading_order import in_order
 from pipeline.fabrication.engraving.stroke_font import text
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 LEAST = 2.0
 """Height of letters below which they cannot be read, mm."""

@@ -12,15 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import LineString, affinity
 from shapely.geometry.base import BaseGeometry
 
 from pipeline.fabrication.engraving.read_strokes import LEGIBLE, Reading, span
 from pipeline.fabrication.engraving.reading_order import in_order
 from pipeline.fabrication.engraving.stroke_font import text
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 _STEP = 0.1  # mm, of the raster
 _RIM = 0.25  # mm of a unit where letters may be cut

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 _AHEAD, _BELOW = 0.5, -0.9  # heights from letter to letter, at least
 

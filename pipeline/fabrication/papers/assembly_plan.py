@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from pipeline.fabrication.papers.page_tiles import OVERLAP, Tile
 from pipeline.fabrication.papers.pdf_paper import (
@@ -20,8 +19,7 @@ from pipeline.fabrication.papers.pdf_paper import (
     PdfDocument,
 )
 from pipeline.fabrication.parts import BuiltSpecimen, Shim, Unit, column_letters
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 BORDER = 9.0
 """Room around the specimen for the names of rows and columns, mm."""

@@ -7,12 +7,12 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sim.core import Floats
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """Left, bottom, width, height."""
 

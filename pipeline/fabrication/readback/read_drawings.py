@@ -13,16 +13,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Point, Polygon, STRtree
 
 from pipeline.fabrication.readback.faults import BUG
 from pipeline.runtime import UserError
+from sim.core import Floats
 
 if TYPE_CHECKING:
     from ezdxf.entities.dxfentity import DXFEntity
 
-Array = NDArray[np.float64]
 
 OUTER = "CUT_OUTER"
 APPLICATION = "METACLOAK"
@@ -52,7 +51,7 @@ class Curve:
     part: str
     layer: str
     kind: str
-    points: Array
+    points: Floats
     closed: bool
     own_colour: bool = False
 
@@ -163,7 +162,7 @@ def _named(entity: DXFEntity) -> str:
     return words[0] if words else ""
 
 
-def _flattened(entity: Any, kind: str) -> tuple[Array, bool]:  # noqa: ANN401  (any entity)
+def _flattened(entity: Any, kind: str) -> tuple[Floats, bool]:  # noqa: ANN401  (any entity)
     """Vertices and closedness; an entity without an outline has no vertices."""
     from ezdxf import path
 
@@ -176,7 +175,7 @@ def _flattened(entity: Any, kind: str) -> tuple[Array, bool]:  # noqa: ANN401  (
     return _without_return(points, closed), closed
 
 
-def _without_return(points: Array, closed: bool) -> Array:
+def _without_return(points: Floats, closed: bool) -> Floats:
     if closed and len(points) > 1 and np.allclose(points[0], points[-1], rtol=0, atol=1e-9):
         return points[:-1]
     return points
@@ -212,7 +211,7 @@ def _shape(shape: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]
         yield Curve(part, layer, kind, turned, closed), str(shape.stroke)
 
 
-def _polygon(stroke: Any) -> tuple[Array, bool]:  # noqa: ANN401
+def _polygon(stroke: Any) -> tuple[Floats, bool]:  # noqa: ANN401
     from svgelements import Arc, Close, CubicBezier, Move, QuadraticBezier
 
     points: list[tuple[float, float]] = []

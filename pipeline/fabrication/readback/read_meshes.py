@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
 from pipeline.fabrication.readback.faults import BUG, Fault
 from pipeline.runtime import UserError
+from sim.core import Floats, Ints
 
 if TYPE_CHECKING:
     from lxml.etree import _Element
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from shapely import Geometry
     from trimesh import Trimesh
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 TOLERANCE = 1e-3
 """Lengths of a mesh are right to this, mm (binary STL holds single precision)."""
@@ -40,7 +38,7 @@ class MeshBody:
     file: Path
     name: str
     vertices: Floats
-    triangles: Integers
+    triangles: Ints
 
     @cached_property
     def mesh(self) -> Trimesh:

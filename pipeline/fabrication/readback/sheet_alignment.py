@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 _PARALLEL = 1e-3  # rad
 _ROUNDS = (1.5, 0.5, 0.1, 0.02, 0.02)  # mm; edges farther apart are not the same edge

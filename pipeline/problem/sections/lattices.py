@@ -15,6 +15,8 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
+from pipeline.problem.outlines import NetworkError, read_network
+from sim.structure import kagome, listed, quads
 
 if TYPE_CHECKING:
     from sim.structure import Lattice as Network
@@ -121,8 +123,6 @@ class Quads(_Grid):
 
     def network(self) -> Network:
         """The lattice for sim/."""
-        from sim.structure import quads
-
         return quads(self.columns, self.rows, self.spacing, self.ligament_length, self.bias_angle)
 
 
@@ -161,8 +161,6 @@ class Kagome(_Grid):
 
     def network(self) -> Network:
         """The lattice for sim/."""
-        from sim.structure import kagome
-
         return kagome(
             self.columns,
             self.rows,
@@ -198,7 +196,6 @@ class ListedNetwork(Section):
         for name in ("polygons", "ligaments"):
             if getattr(self, name) is not None:
                 raise fault("unknown key", "leave it out: they are read from the file", name)
-        from pipeline.problem.outlines import NetworkError, read_network
 
         folder = (info.context or {}).get(FOLDER, ".")
         try:
@@ -286,8 +283,6 @@ class ListedNetwork(Section):
         Raises:
             ValueError: a polygon without area, or a ligament that does not join two units.
         """
-        from sim.structure import listed
-
         return listed(self.polygons or (), self.ligaments or (), self.spacing)
 
 

@@ -21,7 +21,17 @@ from pipeline.problem.fields import (
     exactly_one,
     fault,
 )
-from pipeline.problem.outlines import Outline, Point, box_middle, extents, formula, placed, turned
+from pipeline.problem.outlines import (
+    ImageError,
+    Outline,
+    Point,
+    box_middle,
+    extents,
+    formula,
+    placed,
+    read_outlines,
+    turned,
+)
 
 
 def _centre_tag(value: object) -> str:
@@ -223,7 +233,6 @@ class Image(Section):
             return self
         if self.read is not None:
             raise fault("unknown key", "leave it out: the file is read anew each time", "read")
-        from pipeline.problem.outlines import ImageError, read_outlines
 
         folder = (info.context or {}).get(FOLDER, ".")
         try:

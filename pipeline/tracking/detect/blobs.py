@@ -9,10 +9,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from pipeline.runtime import Floats, Image, Ints, Picture
+from pipeline.runtime import Picture
 from pipeline.tracking.detect import orientation
 from pipeline.tracking.geometry import Camera, SpecimenOutlines
 from pipeline.tracking.geometry import camera as cameras
+from sim.core import Floats, Image, Ints
 
 _ROUNDS = 8
 _AFFINE_ROUNDS = 4

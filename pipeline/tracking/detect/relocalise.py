@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Picture
+from pipeline.runtime import Picture
 from pipeline.tracking.detect.blobs import blobs, one_to_one
 from pipeline.tracking.geometry import Camera, SpecimenOutlines
+from sim.core import Floats
 
 _TURNS = np.deg2rad([0, 8, -8, 16, -16, 24, -24, 32, -32, 40, -40])
 _OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30, 45, -45])

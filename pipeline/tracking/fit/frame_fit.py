@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.runtime import Floats, Mask, Picture, Singles
+from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
 from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, room
 from pipeline.tracking.fit.patch_correlation import Fits, FitStart, Templates
 from pipeline.tracking.fit.template import plane_of
 from pipeline.tracking.geometry import Camera
+from sim.core import Floats, Mask, Singles
 
 FULL_STEPS = 8
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Singles, inlined
-from pipeline.tracking.fit.template_cells import Kinds
+from pipeline.runtime import inlined
+from sim.core import Floats, Image, Singles
 
 UNKNOWNS = 7  # ux, uy, theta; gain, offset, slope in x, slope in y
 SIZE = 8
@@ -43,7 +43,7 @@ class TemplateArrays(NamedTuple):
     """
 
     nodes: Singles
-    kind: Kinds
+    kind: Image
     half: float
     step: float
     x: float

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Mask, Singles, compiled, inlined
+from pipeline.runtime import compiled, inlined
 from pipeline.tracking.fit.normal_equations import (
     SIZE,
     UNKNOWNS,
@@ -24,6 +24,7 @@ from pipeline.tracking.fit.normal_equations import (
 )
 from pipeline.tracking.fit.small_cholesky import invert
 from pipeline.tracking.fit.template_cells import TemplateCells, unfold
+from sim.core import Floats, Mask, Singles
 
 POSE = 3
 WIDTH = UNKNOWNS + 23

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.runtime import Floats, Singles
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template import TemplateGrid, blurred, shown
 from pipeline.tracking.fit.template_cells import classify
 from pipeline.tracking.geometry import Depth, SpecimenOutlines
+from sim.core import Floats, Singles
 
 _MOVED = 0.04
 """How far a back may move against its face before its silhouette is drawn again, px."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pipeline.runtime import Floats, inlined
+from pipeline.runtime import inlined
+from sim.core import Floats
 
 
 @inlined

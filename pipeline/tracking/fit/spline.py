@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import spline_filter
 
-from pipeline.runtime import Floats, Singles, compiled, inlined
+from pipeline.runtime import compiled, inlined
+from sim.core import Floats, Singles
 
 TAPS = 4
 

@@ -11,12 +11,13 @@ from copy import copy
 import cv2
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, Picture, Singles
+from pipeline.runtime import Picture
 from pipeline.tracking.fit.normal_equations import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.spline import coefficients, sample
 from pipeline.tracking.fit.template_cells import cells_of
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines
+from sim.core import Floats, Ints, Singles
 
 NODES_PER_PIXEL = 1.2
 _REACH = 2.5

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.runtime import Floats, Singles, compiled, inlined
+from pipeline.runtime import compiled, inlined
+from sim.core import Floats, Image, Singles
 
 EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
 _STEEP = 0.04
 """Change from node to node in a cell that tells of the place, in contrasts of the unit."""
 
-Kinds = NDArray[np.uint8]
 Places = NDArray[np.int32]
 
 
@@ -29,7 +29,7 @@ class TemplateCells(NamedTuple):
             one's follower.
     """
 
-    kind: Kinds
+    kind: Image
     span: Places
 
 
@@ -45,7 +45,7 @@ def cells_of(brightness: Singles, weight: Singles, contrast: Floats) -> Template
 
 @compiled
 def classify(
-    brightness: Singles, weight: Singles, contrast: float, kind: Kinds, span: Places
+    brightness: Singles, weight: Singles, contrast: float, kind: Image, span: Places
 ) -> None:
     """Fills kind (rows, columns) and span (rows, 2) of one template; cells at the rim are empty.
 

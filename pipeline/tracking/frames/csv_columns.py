@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, UserError, read_bounded, refusal
+from pipeline.runtime import UserError, read_bounded, refusal
+from sim.core import Floats
 
 _LARGEST = 512 << 20
 

@@ -10,7 +10,8 @@ import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.problem.reading import told, yaml_file
-from pipeline.runtime import Floats, Ints, UserError
+from pipeline.runtime import UserError
+from sim.core import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
 

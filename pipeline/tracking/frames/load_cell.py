@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import csv_columns
 from pipeline.tracking.frames.recording import LoadCellLog
+from sim.core import Floats
 
 
 class Log(NamedTuple):

@@ -11,8 +11,9 @@ from typing import cast
 import av
 import numpy as np
 
-from pipeline.runtime import Floats, Picture, UserError
+from pipeline.runtime import Picture, UserError
 from pipeline.tracking.frames.image_folder import brightness, images, pictures
+from sim.core import Floats
 
 _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
 """Formats whose first plane is the brightness in 8 bit, as it is."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from pipeline.runtime import Floats
+from sim.core import Floats
 
 _INVERSE_STEPS = 8
 _CENTRE_PRIOR = 0.03

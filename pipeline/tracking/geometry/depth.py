@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from pipeline.runtime import Floats
 from pipeline.tracking.geometry.camera import Camera
+from sim.core import Floats
 
 _ROUNDS = 4
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.runtime import Floats, Reals
+from sim.core import Floats, Reals
 
 _ROUNDS = 8
 _TUKEY = 4.685

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import Floats, Ints, Mask
+from sim.core import Floats, Ints, Mask
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, Mask
+from sim.core import Floats, Ints, Mask
 
 STEADY, DUPLICATE, DROPPED = range(3)
 """Timing of a frame: as the file says; shows the instant before again; a frame is missing."""

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, Mask
+from sim.core import Floats, Ints, Mask
 
 _MOST = 30
 _SMOOTH = 0.75

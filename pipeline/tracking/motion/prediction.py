@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.runtime import Floats, Mask
 from pipeline.tracking.geometry import rigid_motion
+from sim.core import Floats, Mask
 
 _NEAREST = 6
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.runtime import Floats, Ints, Picture, Reals, Singles, UserError
+from pipeline.runtime import Picture, UserError
 from pipeline.tracking.detect import Recovery, Sighting, placed, shown_on
 from pipeline.tracking.fit import Fitter, Learner, Walls
 from pipeline.tracking.frames import BrokenOffError, Frame
@@ -26,6 +26,7 @@ from pipeline.tracking.reference_frame import (
     check,
     recognised,
 )
+from sim.core import Floats, Ints, Reals, Singles
 
 LOG = logging.getLogger(__name__)
 

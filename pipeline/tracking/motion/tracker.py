@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, Mask, Picture
+from pipeline.runtime import Picture
 from pipeline.tracking.detect import Recovery
 from pipeline.tracking.fit import Fits, Fitter, Walls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.prediction import Neighbourhood
+from sim.core import Floats, Ints, Mask
 
 GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
 """Quality of a unit in a frame, and the reason why it is missing."""

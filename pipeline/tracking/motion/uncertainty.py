@@ -15,8 +15,8 @@ import warnings
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.runtime import Floats, Ints, Mask, Reals
 from pipeline.tracking.motion import motion_modes
+from sim.core import Floats, Ints, Mask, Reals
 
 _PARAMETERS = 7
 _LEAST_FRAMES = 8

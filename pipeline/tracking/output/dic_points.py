@@ -13,10 +13,11 @@ from pydantic import Field
 from pipeline.datasets.tables import TABLES
 from pipeline.problem.fields import Angle, Coordinate, Section
 from pipeline.problem.reading import section
-from pipeline.runtime import Floats, Ints, UserError
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import csv_columns as columns
 from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
 from pipeline.tracking.output.track_dataset import absent, labelled, spread
+from sim.core import Floats, Ints
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
 _LEAST = 3  # points of a unit

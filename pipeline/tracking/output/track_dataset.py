@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import Floats, Mask
 from pipeline.tracking.motion import Track
+from sim.core import Floats, Mask
 
 _MOTION = ("time", "unit", "dof")
 

@@ -8,7 +8,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import Floats, write_atomically
+from pipeline.runtime import write_atomically
+from sim.core import Floats
 
 _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
 _LOADS = ("load_N", "drive_x_mm", "drive_y_mm")

@@ -7,11 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.runtime import Floats, Ints, Picture
+from pipeline.runtime import Picture
 from pipeline.tracking.detect import Sighting, refined
 from pipeline.tracking.fit import Fits, Fitter, TemplateGrid, Templates, outlines, plane_of
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, depth_of
 from pipeline.tracking.geometry import camera as cameras
+from sim.core import Floats, Ints
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
 """Standard deviations that are tried, px."""

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import xarray as xr
 
-from pipeline.runtime import Floats, Image, Picture, UserError
+from pipeline.runtime import Picture, UserError
 from pipeline.tracking.detect import Sighting, shown_on
 from pipeline.tracking.geometry import SpecimenOutlines, as_built, of_design
 from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, calibrate
@@ -21,6 +21,7 @@ from pipeline.tracking.reference_frame.recognition import (
     inside,
     recognised,
 )
+from sim.core import Floats, Image
 
 _CLEARLY = 0.03  # of the units, by which one structure must be better matched than another
 _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red

@@ -6,11 +6,12 @@ import logging
 
 import numpy as np
 
-from pipeline.runtime import Mask, Picture, UserError
+from pipeline.runtime import Picture, UserError
 from pipeline.tracking.detect import Sighting, lies, placed, sight, told
 from pipeline.tracking.fit import Fits
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, alike
+from sim.core import Mask
 
 LOG = logging.getLogger(__name__)
 

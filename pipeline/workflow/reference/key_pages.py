@@ -8,7 +8,12 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from pipeline.calibration.inputs import Calibration
+from pipeline.problem import Problem
 from pipeline.problem.fields import Section, units
+from pipeline.problem.reading import Joint
+from pipeline.tracking.frames import Recording
+from pipeline.tracking.output import Points
 from pipeline.workflow.reference.markdown import table
 
 Node = dict[str, Any]
@@ -50,12 +55,6 @@ class File(NamedTuple):
 
 def pages() -> dict[str, str]:
     """The pages, in Markdown, by the names of their files."""
-    from pipeline.calibration.inputs import Calibration
-    from pipeline.problem import Problem
-    from pipeline.problem.reading import Joint
-    from pipeline.tracking.frames import Recording
-    from pipeline.tracking.output import Points
-
     studies = (
         File("problem.yaml", Problem, "`experiments/STUDY/problem.yaml`", PRESETS),
         File("figure.yaml", Joint, "`experiments/FIGURE/figure.yaml`"),

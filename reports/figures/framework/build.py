@@ -9,6 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.runtime import cli
+from reports.base import style
+from reports.figures.framework import figure
+from reports.page import citation, publishing, study_page, templating
+from reports.panels import measured_overlay
 
 if TYPE_CHECKING:
     from reports.study import StudyResults
@@ -34,16 +38,10 @@ def publish(study: StudyResults, folder: Path) -> list[Path]:
     Raises:
         UserError: the folder is full, read-only or not ours.
     """
-    from reports.page import publishing
-
     return publishing.published(lambda aside: _written(study, aside), folder)
 
 
 def _written(study: StudyResults, folder: Path) -> list[Path]:
-    from reports.base import style
-    from reports.figures.framework import figure
-    from reports.page import citation, study_page, templating
-    from reports.panels import measured_overlay
 
     with style.styled():
         drawn = style.save(figure.draw_framework(study), folder / NAME)

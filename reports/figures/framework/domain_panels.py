@@ -8,13 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.patches import FancyArrowPatch, Rectangle
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.panels import draw, draw_clamps, drive_arrows, outline
 from reports.study import CLAMPED, DRIVEN, SURROUNDINGS, RigidUnits, deformed
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 INTEREST_TINT, CLOAK_TINT, CLAMP_TINT = "#b9d3ea", "#c9b3e0", "#4a4d52"
 
@@ -86,7 +84,7 @@ def inclusion(axes: Axes, structure: RigidUnits, spacing: float, radius: float) 
             )
 
 
-def cut(axes: Axes, structure: RigidUnits, window: tuple[Array, float]) -> None:
+def cut(axes: Axes, structure: RigidUnits, window: tuple[Floats, float]) -> None:
     """Outlines of units and the strips of foil that join them, as they are cut."""
     shapes = [shape[~np.isnan(shape[:, 0])] for shape in structure.vertices[structure.present]]
     axes.add_collection(PolyCollection(shapes, facecolors="#f4ede1", edgecolors="#1a1a1a", lw=0.6))
@@ -102,7 +100,7 @@ def cut(axes: Axes, structure: RigidUnits, window: tuple[Array, float]) -> None:
 
 
 def filmed(
-    axes: Axes, structure: RigidUnits, displacement: Array, window: tuple[Array, float]
+    axes: Axes, structure: RigidUnits, displacement: Floats, window: tuple[Floats, float]
 ) -> None:
     """Dark units on a bright board, the outlines that are found, and how far they moved."""
     corners = deformed(structure, displacement)[structure.present]
@@ -115,7 +113,7 @@ def filmed(
     _window(axes, window)
 
 
-def _window(axes: Axes, window: tuple[Array, float]) -> None:
+def _window(axes: Axes, window: tuple[Floats, float]) -> None:
     """Shows a square about a point, in a frame."""
     (x, y), half = window
     axes.set(xlim=(x - half, x + half), ylim=(y - half, y + half), aspect="equal")

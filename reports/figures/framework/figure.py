@@ -7,7 +7,6 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.ticker import LogLocator, NullFormatter
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.facts import measures
@@ -15,8 +14,6 @@ from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
 from reports.panels import measured_overlay
 from reports.study import CLOAK, RigidUnits, StudyResults, from_dataset, middle_of_top_edge
-
-Array = NDArray[np.float64]
 
 HEIGHT = 158.0
 SIDE = 43.0

@@ -6,12 +6,10 @@ import matplotlib.patheffects as effects
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Arc, FancyArrowPatch, Polygon
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.study import RigidUnits
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 TINT = "#dfe3e7"
 _HALO: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.2, foreground="white")]
@@ -34,7 +32,7 @@ def ligament_panel(axes: Axes, structure: RigidUnits, ligament: int) -> None:
     axes.set_axis_off()
 
 
-def _freedoms(axes: Axes, centre: Array) -> None:
+def _freedoms(axes: Axes, centre: Floats) -> None:
     """Arrows of u_x, u_y and theta at a unit's centroid."""
     for way, name in (((2.3, 0.0), "$u_x$"), ((0.0, 2.3), "$u_y$")):
         _arrow(axes, centre, centre + np.array(way))
@@ -51,7 +49,7 @@ def _freedoms(axes: Axes, centre: Array) -> None:
     )  # fmt: skip
 
 
-def _springs(axes: Axes, ends: Array) -> None:
+def _springs(axes: Axes, ends: Floats) -> None:
     """The ligament as a spring, and its three stiffnesses."""
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
@@ -71,7 +69,7 @@ def _springs(axes: Axes, ends: Array) -> None:
     text.set_path_effects(_HALO)
 
 
-def _contact(axes: Axes, shapes: list[Array], corners: Array, ends: Array) -> None:
+def _contact(axes: Axes, shapes: list[Floats], corners: Floats, ends: Floats) -> None:
     """The angle of the void above the ligament, at which units come to touch."""
     sides = []
     for shape, corner, end in zip(shapes, corners, ends, strict=True):
@@ -103,7 +101,7 @@ def _contact(axes: Axes, shapes: list[Array], corners: Array, ends: Array) -> No
     text.set_path_effects(_HALO)
 
 
-def _arrow(axes: Axes, start: Array, end: Array) -> None:
+def _arrow(axes: Axes, start: Floats, end: Floats) -> None:
     axes.add_patch(
         FancyArrowPatch(
             (float(start[0]), float(start[1])),

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.sections import Kagome, Lattice, Quads
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 ORDER = ("intact", "altered", "cloaked")
 SECOND = "Cloaked, no overlap"
@@ -30,7 +28,7 @@ class Abscissa:
     name: str
     symbol: str
     unit: str
-    values: Array
+    values: Floats
     static: bool
     strain: float | None
     shown: tuple[int, ...]
@@ -65,7 +63,7 @@ def course(problem: Problem, response: xr.Dataset) -> Abscissa:
     )
 
 
-def driven_displacement(response: xr.Dataset, case: int = 0) -> Array:
+def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
     """Displacement (n_times,) of the driven units along the drive's direction, mm."""
     motion = response["displacement"].isel(structure=0, case=case)
     driven = response["support"].values == 2
@@ -75,7 +73,7 @@ def driven_displacement(response: xr.Dataset, case: int = 0) -> Array:
     return np.asarray(along.values, dtype=float)
 
 
-def _samples(values: Array, wanted: tuple[float, ...]) -> tuple[int, ...]:
+def _samples(values: Floats, wanted: tuple[float, ...]) -> tuple[int, ...]:
     """Samples nearest to the wanted values; at thirds of the way where none are."""
     targets = wanted or tuple(np.linspace(values[0], values[-1], 4))
     found = (int(np.argmin(np.abs(values - target))) for target in targets)

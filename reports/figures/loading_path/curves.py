@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, MaxNLocator
-from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from reports.base import style
@@ -18,8 +17,6 @@ from reports.figures.loading_path.abscissa import SECOND, Abscissa, course, disp
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults
-
-Array = NDArray[np.float64]
 
 BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""

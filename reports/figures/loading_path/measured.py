@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterator
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from pipeline.comparison import reduction
 from reports.base import style
@@ -17,8 +16,8 @@ from reports.figures.loading_path.abscissa import Abscissa, display_name
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
 from reports.study import RecordedMotion, StudyResults
+from sim.core import Floats
 
-Array = NDArray[np.float64]
 Of = Callable[[xr.Dataset], xr.DataArray]
 
 _NAMES = {
@@ -43,13 +42,13 @@ def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> 
     return part.assign(displacement=motion)
 
 
-def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of) -> Array:
+def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of) -> Floats:
     """What `of` makes of a recording (n_times,), NaN where nothing was recorded."""
     made = response(study, path, recording)
     values = of(made).sel(structure=recording.structure).isel(case=0)
     motion = made["displacement"].sel(structure=recording.structure).isel(case=0)
     seen = motion.notnull().any(("unit", "dof"))
-    found: Array = values.where(seen).transpose("time").values
+    found: Floats = values.where(seen).transpose("time").values
     return found
 
 
@@ -77,7 +76,7 @@ def _followed(recording: RecordedMotion, key: str, source: str, estimate: str) -
     return np.degrees(values) if key == "rotation" else values  # type: ignore[return-value]
 
 
-def _at_the_end(recording: RecordedMotion, path: Abscissa, key: str, source: str) -> Array:
+def _at_the_end(recording: RecordedMotion, path: Abscissa, key: str, source: str) -> Floats:
     """Value, lower and upper end of its interval (3,) at the end of the path."""
     estimates = ("value", *_ENDS)
     found = [_followed(recording, key, source, estimate) for estimate in estimates]

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.comparison import middle_units
 from pipeline.problem import Problem
 from reports.study import DRIVEN
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from pipeline.problem.sections import Region
 from reports.base import style
 from reports.panels import ColourField, draw, draw_clamps, round_up, scalar
 from reports.study import CLAMPED, CLOAK, DRIVEN, INCLUSION, RigidUnits, from_dataset
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 CLOAK_TINT, UNIT_TINT, CLAMP_TINT, DRIVE_TINT = "#c9b3e0", "#d9dce0", "#4a4d52", "#f2c48d"
 INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
@@ -32,7 +31,7 @@ class UnitColouring:
     label: str
     colours: Colormap
 
-    def values(self, displacement: Array) -> Array:
+    def values(self, displacement: Floats) -> Floats:
         """The number (n_units,) that each unit shows."""
         return scalar(self.field, displacement)
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 from pipeline.runtime import cli
 from reports.base import joined
+from reports.figures.several_designs import content, designs
+from reports.page import publishing
 
 
 def _work(args: argparse.Namespace) -> None:
-    from reports.figures.several_designs import content, designs
-    from reports.page import publishing
 
     found = designs.load(args.problem, args.preset, args.results)
     publishing.publish(content.parts(found), args.out_dir)

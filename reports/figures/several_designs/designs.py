@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline import problem
 from pipeline.problem import Problem
@@ -17,8 +16,7 @@ from pipeline.runtime import UserError
 from reports.facts import measures
 from reports.study import CLOAK, ReportScene, StudyResults
 from reports.study import study_results as study
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 RADIUS = "cloak.disc.radius"
 
@@ -80,7 +78,7 @@ class DesignSeries:
     designs: list[SeriesDesign]
 
     @property
-    def axis(self) -> tuple[Array, str]:
+    def axis(self) -> tuple[Floats, str]:
         """Values of the parameter and what they are, for an axis; a radius in spacings."""
         found = [taken_apart(design.word) for design in self.designs]
         values = np.array([number for number, _ in filter(None, found)])

@@ -7,14 +7,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from pipeline.problem.reading import joint_figure
 from pipeline.runtime import cli
 from reports.base import joined
+from reports.figures.several_studies import content, studies
+from reports.page import publishing
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline.problem.reading import joint_figure
-    from reports.figures.several_studies import content, studies
-    from reports.page import publishing
 
     asked = joint_figure.load(args.figure)
     shown = studies.load(args.figure, asked, args.preset, args.results)

@@ -9,7 +9,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, MaxNLocator
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.facts import measures, percent
@@ -17,8 +16,7 @@ from reports.figures.shielding.facts import monitored, paper_loss
 from reports.figures.shielding.structure_panels import SnapshotRow
 from reports.panels import loss_history, measured_overlay
 from reports.study import RecordedMotion, ReportScene, from_dataset, middle_of_top_edge
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 
 def loss_panel(axes: Axes, design: xr.Dataset, quoted: bool) -> None:
@@ -109,7 +107,7 @@ def _measured(axes: Axes, recording: RecordedMotion, unit: int) -> None:
     measured_overlay.measured_curve(axes, recording.along, curve, colour)
 
 
-def _span_arrow(axes: Axes, at: float, curve: Array, colour: str, span: float) -> None:
+def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) -> None:
     """Bar from the lowest to the highest value of a curve, with its length."""
     low, high = float(curve.min()), float(curve.max())
     caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}

@@ -29,7 +29,6 @@ from reports.facts import (
 from reports.figures.shielding.sweep_map import frequency_map
 from reports.study import (
     CLOAK,
-    Array,
     RecordedMotion,
     ReportScene,
     StudyResults,
@@ -37,6 +36,7 @@ from reports.study import (
     from_dataset,
     middle_of_top_edge,
 )
+from sim.core import Floats
 
 MONITORED = 45.0
 """Direction in degrees of the load at which the paper shows the motion of one unit."""
@@ -217,7 +217,7 @@ def monitored_recordings(study: StudyResults) -> list[RecordedMotion]:
 def recorded_facts(study: StudyResults) -> Iterator[Fact]:
     """Peak-to-peak u_y of the same unit as it was measured."""
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
-    spans: dict[str, list[Array]] = {}
+    spans: dict[str, list[Floats]] = {}
     for each in monitored_recordings(study):
         found = each.data["peak_to_peak"].isel(unit=unit).sel(dof="uy")
         sides = spans[each.structure] = [

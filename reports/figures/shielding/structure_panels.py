@@ -13,7 +13,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
-from numpy.typing import NDArray
 
 from reports.base import style
 from reports.facts import measures
@@ -30,8 +29,7 @@ from reports.study import (
     from_dataset,
     middle_of_top_edge,
 )
-
-Array = NDArray[np.float64]
+from sim.core import Floats
 
 PHASES = (0.05, 0.3, 0.55, 0.8)
 """Parts of the last drive cycle that the snapshots show: near both peaks, and after both zeros."""
@@ -49,8 +47,8 @@ class SnapshotRow:
     name: str
     source: str
     structure: RigidUnits
-    time: Array
-    displacement: Array
+    time: Floats
+    displacement: Floats
 
 
 def problem_panel(
@@ -99,11 +97,11 @@ def _colours(structure: RigidUnits, name: str) -> Iterator[str]:
             yield UNIT_TINT
 
 
-def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Array:
+def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Floats:
     """When the snapshots are, over the last whole drive cycle, s."""
     end = response["time"].values[-1]
     start = (np.floor(end * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
-    wanted: Array = start + np.array(PHASES) * scene.period
+    wanted: Floats = start + np.array(PHASES) * scene.period
     return wanted
 
 
@@ -186,7 +184,7 @@ def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:
 
 
 def _snapshot(
-    axes: Axes, scene: ReportScene, row: SnapshotRow, frame: Array, norm: Normalize
+    axes: Axes, scene: ReportScene, row: SnapshotRow, frame: Floats, norm: Normalize
 ) -> None:
     structure = row.structure
     size = np.linalg.norm(frame / scene.scale, axis=1)

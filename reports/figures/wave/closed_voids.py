@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from pipeline.problem import Problem
-from reports.study import Integers, RigidUnits, from_dataset
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from reports.study import RigidUnits, from_dataset
+from sim.core import Floats, Ints, Mask
 
 
-def smaller_angles(problem: Problem, part: xr.Dataset) -> Array:
+def smaller_angles(problem: Problem, part: xr.Dataset) -> Floats:
     """The smaller void angle beside each ligament of a structure under one load case, rad.
 
     Returns:
@@ -32,7 +29,7 @@ def closed(problem: Problem, part: xr.Dataset) -> Mask:
     return np.asarray(smaller_angles(problem, part) < problem.contact.cutoff_angle)
 
 
-def rest_angles(structure: RigidUnits) -> Array:
+def rest_angles(structure: RigidUnits) -> Floats:
     """The two void angles (n_ligaments, 2) beside every ligament at rest, rad."""
     (a, b), (p, q) = structure.ligament_unit.T, structure.ligament_vertex.T
     one = _angle(_edge(structure, b, q, -1), _edge(structure, a, p, 1))
@@ -40,7 +37,7 @@ def rest_angles(structure: RigidUnits) -> Array:
     return np.stack([one, other], axis=1)
 
 
-def _edge(structure: RigidUnits, unit: Integers, vertex: Integers, way: int) -> Array:
+def _edge(structure: RigidUnits, unit: Ints, vertex: Ints, way: int) -> Floats:
     """Vectors (n, 2) from vertices to their neighbours, counter-clockwise if ``way`` is 1."""
     corners = structure.vertices[unit]
     sides = np.isfinite(corners[..., 0]).sum(axis=1)
@@ -48,7 +45,7 @@ def _edge(structure: RigidUnits, unit: Integers, vertex: Integers, way: int) -> 
     return np.asarray(corners[each, (vertex + way) % sides] - corners[each, vertex])
 
 
-def _angle(start: Array, end: Array) -> Array:
+def _angle(start: Floats, end: Floats) -> Floats:
     """Angle from one vector to another, between -90 and 270 degrees."""
     cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
     angle = np.arctan2(cross, (start * end).sum(axis=1))
@@ -62,7 +59,7 @@ def on_edges(structure: RigidUnits) -> Mask:
     return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
 
 
-def middles(structure: RigidUnits, vertices: Array) -> Array:
+def middles(structure: RigidUnits, vertices: Floats) -> Floats:
     """Middles (n_ligaments, 2) of the ligaments between vertices (n_units, n_vertices, 2), mm."""
     ends = vertices[structure.ligament_unit, structure.ligament_vertex]
     return np.asarray(ends.mean(axis=1))

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.runtime import cli
+from reports.page import publishing
+from reports.products.benchmark import content
 
 
 def _work(args: argparse.Namespace) -> None:
-    from reports.page import publishing
-    from reports.products.benchmark import content
 
     publishing.published(lambda aside: content.write(args.datasets, aside), args.out_dir)
 

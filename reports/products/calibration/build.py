@@ -7,13 +7,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from pipeline import datasets
 from pipeline.runtime import cli
+from reports.page import publishing
+from reports.products.calibration.figure import draw_calibration
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline import datasets
-    from reports.page import publishing
-    from reports.products.calibration.figure import draw_calibration
 
     made = datasets.read(args.calibration, "calibration")
     publishing.draw(lambda: draw_calibration(made), "fit", args.out_dir)

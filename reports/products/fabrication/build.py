@@ -14,6 +14,8 @@ from pathlib import Path
 from pipeline import problem
 from pipeline.problem import Problem
 from pipeline.runtime import cli, refusal
+from reports.page import templating
+from reports.products.fabrication import content, pictures
 
 
 def render(asked: Problem, folders: Sequence[Path], done: cli.progress | None = None) -> str:
@@ -24,9 +26,6 @@ def render(asked: Problem, folders: Sequence[Path], done: cli.progress | None = 
         folders: the packages, one a structure.
         done: the progress to tell of each package.
     """
-    from reports.page import templating
-    from reports.products.fabrication import content, pictures
-
     made = []
     for folder in folders:
         made.append(content.package(folder, asked))

@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
+from sim.core import Image
+
 Floats = NDArray[np.floating]
 Integers = NDArray[np.integer]
-Image = NDArray[np.uint8]
 
 AZIMUTH, ELEVATION = -76.0, 50.0
 """Direction of view in degrees: from the front, somewhat from the right, and from above."""

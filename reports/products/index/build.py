@@ -7,12 +7,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.runtime import cli
+from pipeline.runtime import cli, write_atomically
+from reports.products.index import content
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline.runtime import write_atomically
-    from reports.products.index import content
 
     with write_atomically(args.results / "index.html") as aside:
         aside.write_text(content.page(args.results), encoding="utf-8", newline="\n")

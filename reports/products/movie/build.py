@@ -11,17 +11,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipeline.problem.sections import Codec
 from pipeline.runtime import cli
+from pipeline.virtual_lab import encode
+from reports.figures import kinds
+from reports.products.movie.frames import RATE, images
+from reports.study import LABEL
+from sim.core import Image
 
 if TYPE_CHECKING:
-    from pipeline.runtime import Image
     from reports.study import StudyResults
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline.problem.sections import Codec
-    from pipeline.virtual_lab import encode
-    from reports.products.movie.frames import RATE
     from reports.study import study_results as study
 
     studies = []
@@ -37,8 +39,6 @@ def _work(args: argparse.Namespace) -> None:
 
 
 def _frames(name: str, studies: Sequence[StudyResults], bar: cli.progress) -> Iterator[Image]:
-    from reports.figures import kinds
-    from reports.products.movie.frames import images
 
     for study in studies:
         reel = kinds.kind_of(study.problem).animation(study)
@@ -48,7 +48,6 @@ def _frames(name: str, studies: Sequence[StudyResults], bar: cli.progress) -> It
 
 
 def _note(studies: Sequence[StudyResults]) -> str:
-    from reports.study import LABEL
 
     if any(each.synthetic for study in studies for each in study.recordings):
         return f"{LABEL}: what is called experiment was rendered and tracked, not filmed."

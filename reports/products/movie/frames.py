@@ -10,7 +10,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pipeline.runtime import Image
 from reports.base import style
 from reports.panels import COLOUR_MAPS, Animation, ColourField, scalar
 from reports.products.movie.layout import (
@@ -24,8 +23,7 @@ from reports.products.movie.layout import (
     rendered,
 )
 from reports.study import CLAMPED, RigidUnits, deformed
-
-Array = NDArray[np.float64]
+from sim.core import Floats, Image
 
 RATE = 25.0
 """Frames per second."""
@@ -60,7 +58,7 @@ def images(reel: Animation, title: str, note: str) -> Iterator[Image]:
         yield image
 
 
-def instants(reel: Animation) -> Array:
+def instants(reel: Animation) -> Floats:
     """Where along the axis the frames are."""
     first, last = float(reel.axis.values[0]), float(reel.axis.values[-1])
     seconds = (last - first) / next(iter(reel.axis.speeds.values()))
@@ -80,7 +78,7 @@ def _draw(image: Image, reel: Animation, placed: MovieLayout, cell: MovieCell, a
     structure, motion = cell.clip.structure, _motion(cell, reel.axis.values, at)
     origin = placed.origin(cell)
 
-    def pixels(points: Array) -> NDArray[np.int32]:
+    def pixels(points: Floats) -> NDArray[np.int32]:
         flipped = (points - placed.corner) * [1.0, -1.0] * placed.scale + origin
         return np.rint(flipped * (_FINER << _SHIFT)).astype(np.int32)
 
@@ -106,16 +104,16 @@ def _units(
         cv2.polylines(image, [polygon], True, _INK, 1, cv2.LINE_AA, _SHIFT)
 
 
-def _motion(cell: MovieCell, samples: Array, at: float) -> Array:
+def _motion(cell: MovieCell, samples: Floats, at: float) -> Floats:
     """Displacement (n_units, 3) between two samples; NaN where it is not known."""
     motion = cell.clip.motion[cell.case]
     place = float(np.interp(at, samples, np.arange(len(samples))))
     low = min(int(place), len(samples) - 2)
-    between: Array = motion[low] + (place - low) * (motion[low + 1] - motion[low])
+    between: Floats = motion[low] + (place - low) * (motion[low + 1] - motion[low])
     return between
 
 
-def _colours(field: ColourField, motion: Array) -> NDArray[np.uint8]:
+def _colours(field: ColourField, motion: Floats) -> NDArray[np.uint8]:
     """Colours (n_units, 3); white where nothing is known."""
     low, high = field.limits
     values = scalar(field, motion)

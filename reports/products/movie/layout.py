@@ -13,9 +13,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pipeline.runtime import Image
 from reports.base import style
 from reports.panels import COLOUR_MAPS, Animation, AnimationClip, ColourField
+from sim.core import Image
 
 WIDTH, HEIGHT = 1280, 720
 """Of a frame, pixels."""

@@ -10,8 +10,11 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from pipeline import datasets, problem
 from pipeline.runtime import cli
-from reports.base import drawn
+from reports.base import Table, drawn
+from reports.page import PageTable, figure_page
+from reports.products.robust_gains import figure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,10 +34,6 @@ _COLUMNS = (
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline import datasets, problem
-    from reports.base import Table
-    from reports.page import figure_page
-    from reports.products.robust_gains import figure
 
     asked = problem.load(args.problem)
     data = datasets.read(args.gains, "gains")
@@ -56,7 +55,6 @@ def _work(args: argparse.Namespace) -> None:
 
 
 def _shown(data: xr.Dataset) -> PageTable:
-    from reports.page import PageTable
 
     return PageTable(_COLUMNS, [_row(data.sel(preset=name)) for name in data["preset"].values])
 

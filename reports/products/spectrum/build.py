@@ -10,8 +10,12 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from pipeline import datasets, problem
 from pipeline.runtime import cli
-from reports.base import drawn
+from reports.base import Table, drawn
+from reports.page import figure_page
+from reports.products.spectrum import figure
+from reports.study import study_results
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,10 +32,6 @@ _CAPTION = (
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline import datasets, problem
-    from reports.page import figure_page
-    from reports.products.spectrum import figure
-    from reports.study import study_results
 
     asked = problem.load(args.problem, args.preset)
     data = datasets.read(args.spectrum, "spectrum")
@@ -65,7 +65,6 @@ def _bands(data: xr.Dataset) -> Table:
 
 
 def _table(name: str, text: str, values: xr.DataArray) -> Table:
-    from reports.base import Table
 
     frame = values.rename("value").to_dataframe().reset_index()
     kept = [*values.dims, "value"]

@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.runtime import UserError, cli
+from reports.base import Table
+from reports.page import publishing, templating
 
 COLUMNS = ("tried", "solved", "refused", "wrong", "in_range", "in_range_solved")
 
 
 def _work(args: argparse.Namespace) -> None:
-    from reports.page import publishing
 
     families = _families(args.counts)
     publishing.published(lambda aside: _write(families, aside), args.out_dir)
@@ -43,8 +44,6 @@ def _families(path: Path) -> list[dict[str, Any]]:
 
 
 def _write(families: Sequence[dict[str, Any]], folder: Path) -> list[Path]:
-    from reports.base import Table
-    from reports.page import templating
 
     columns = {key: [each[key] for each in families] for key in ("name", *COLUMNS)}
     table = Table("stress.csv", "Counts of every family", columns)

@@ -9,8 +9,12 @@ import argparse
 import sys
 from collections.abc import Sequence
 
+from pipeline import datasets, problem
 from pipeline.runtime import UserError, cli
 from reports.base import drawn
+from reports.page import figure_page
+from reports.products.sweep import cases, content, figure
+from reports.study import draft, study_results
 
 _MAPS = (
     "(a) Loss of the cloaked structure, (b) over that of the altered one, (c) smallest void angle"
@@ -25,10 +29,6 @@ _POINTS = (
 
 
 def _work(args: argparse.Namespace) -> None:
-    from pipeline import datasets, problem
-    from reports.page import figure_page
-    from reports.products.sweep import cases, content, figure
-    from reports.study import draft, study_results
 
     whole = problem.load(args.problem)
     asked = problem.load(args.problem, args.preset) if args.preset else whole

@@ -9,8 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from pipeline.problem.sections import Sweep
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,8 @@ from matplotlib.lines import Line2D
 from pipeline.problem.sections import Sweep
 from reports.base import style
 from reports.products.sweep import cases
-from reports.products.sweep.cases import Floats, SweepAxis
+from reports.products.sweep.cases import SweepAxis
+from sim.core import Floats
 
 _LEFT, _PITCH, _WIDTH, _HEIGHT = 13.0, 59.0, 44.0, 38.0
 _TOP, _ROW = 9.0, 50.0

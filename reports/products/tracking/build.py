@@ -14,10 +14,11 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import Codec
-from pipeline.runtime import Image, UserError, cli, write_atomically
+from pipeline.runtime import UserError, cli, write_atomically
 from pipeline.tracking.frames import Frame, Recording, frames
 from pipeline.virtual_lab import encode
-from reports.products.tracking import overlay, track_quality
+from reports.products.tracking import overlay, page, track_quality
+from sim.core import Image
 
 
 def _work(args: argparse.Namespace) -> None:
@@ -41,7 +42,6 @@ def _work(args: argparse.Namespace) -> None:
         codec = Codec(crf=20)
         encode(args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels)
     found = track_quality.measured(track, kept, track_quality.stream_of(args.video))
-    from reports.products.tracking import page
 
     with write_atomically(args.out_dir / "index.html") as aside:
         aside.write_text(page.render(track, asked, found), encoding="utf-8", newline="\n")

@@ -11,10 +11,10 @@ import xarray as xr
 from matplotlib.colors import Colormap, to_rgb
 from numpy.typing import NDArray
 
-from pipeline.runtime import Floats, Image
 from pipeline.tracking.frames import Frame
 from pipeline.tracking.geometry import Camera, SpecimenOutlines, of_design
 from reports.base import style
+from sim.core import Floats, Image
 
 SHOWN = ("displacement", "rotation")
 

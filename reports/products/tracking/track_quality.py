@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
-from pipeline.runtime import Floats, Image
 from reports.products.tracking.overlay import of_track
+from sim.core import Floats, Image
 
 QUALITY = TABLES["track"]["quality"].flags
 TIMING = TABLES["track"]["timing"].flags

@@ -6,10 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from benchmarks.harness import Floats, Run, SettingLadder
+from benchmarks.harness import Run, SettingLadder
 from benchmarks.harness.records import errors
 from benchmarks.methods import own_solvers, scipy_statics, selection
 from benchmarks.scenes.load_cases import TITLES
+from sim.core import Floats
 
 Found = dict[str, Floats]
 

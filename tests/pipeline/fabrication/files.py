@@ -9,12 +9,9 @@ from typing import Any
 
 import numpy as np
 from ezdxf.filemanagement import new
-from numpy.typing import NDArray
 
 from pipeline.fabrication.readback import Curve
-
-Floats = NDArray[np.float64]
-Triangles = NDArray[np.int64]
+from sim.core import Floats, Ints
 
 COLOURS = {"CUT_INNER": 5, "CUT_OUTER": 1, "ENGRAVE": 2, "SCORE": 3, "REFERENCE": 8}
 PENS = {1: "#ff0000", 2: "#ffff00", 3: "#00ff00", 5: "#0000ff", 8: "#808080", 7: "#000000"}
@@ -101,7 +98,7 @@ def write_svg(
     return path
 
 
-def write_stl(path: Path, vertices: Floats, triangles: Triangles) -> Path:
+def write_stl(path: Path, vertices: Floats, triangles: Ints) -> Path:
     """A binary STL."""
     record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
     rows = np.zeros(len(triangles), dtype=record)
@@ -112,7 +109,7 @@ def write_stl(path: Path, vertices: Floats, triangles: Triangles) -> Path:
 
 def write_3mf(
     path: Path,
-    bodies: Mapping[str, tuple[Floats, Triangles]],
+    bodies: Mapping[str, tuple[Floats, Ints]],
     places: Mapping[str, tuple[float, float]],
     unit: str = "millimeter",
 ) -> Path:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from pipeline.fabrication.parts import BuiltSpecimen, Circle, Ligament, Shim, Slot, Unit, labels
 from pipeline.problem.sections import Fabrication
-
-Floats = NDArray[np.float64]
+from sim.core import Floats
 
 ASKED = Fabrication()
 SPACING, HALF, BIAS = 15.0, 6.375, np.radians(20.0)

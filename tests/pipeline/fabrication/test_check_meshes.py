@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from pipeline.fabrication.checks import plate_checks
@@ -18,13 +17,12 @@ from pipeline.fabrication.parts import Unit
 from pipeline.fabrication.readback import read_meshes
 from pipeline.problem.sections import Print
 from pipeline.runtime import UserError
+from sim.core import Floats, Ints
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.files import write_3mf, write_stl
 from tests.pipeline.fabrication.handmade import ASKED
 
-Floats = NDArray[np.float64]
-Triangles = NDArray[np.int64]
-Mesh = tuple[Floats, Triangles]
+Mesh = tuple[Floats, Ints]
 PRINT = Print()
 
 

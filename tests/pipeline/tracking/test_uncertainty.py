@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.runtime import Floats
 from pipeline.tracking.motion import uncertainty
+from sim.core import Floats
 
 SIDE = 15
 PLACES = [(10.0 * i, 10.0 * j) for j in range(SIDE) for i in range(SIDE)]

@@ -1,21 +1,12 @@
-"""Types of arrays, and how loops over pixels are compiled."""
+"""Compiles loops over pixels, and names the type of a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from sim.core import Image, Singles, compiling
 
-from sim.core import compiling
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
-Reals = NDArray[np.floating[Any]]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-Image = NDArray[np.uint8]
 Picture = Image | Singles
 """Brightness from 0 to 255, in steps of one or finer."""
 
