@@ -54,7 +54,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         frequency_map(study.sweep),
     )
     return [
-        *grouped("ReportScene", scene_facts(scene, design)),
+        *grouped("Scene", scene_facts(scene, design)),
         *grouped("Shielding", loss_facts(scene, response)),
         *grouped("Optimisation", history_facts(design)),
         *grouped("Shape", shape_facts(scene, design)),
