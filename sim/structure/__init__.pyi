@@ -17,6 +17,7 @@ from .lattice import listed as listed
 from .lattice import quads as quads
 from .material import Material as Material
 from .material import damping_of_ratio as damping_of_ratio
+from .material import unrotated_inertia as unrotated_inertia
 from .parametrisation import ConcreteParameters as ConcreteParameters
 from .parametrisation import Parameters as Parameters
 from .parametrisation import parameters as parameters
