@@ -21,12 +21,10 @@ from .material import unrotated_inertia as unrotated_inertia
 from .parametrisation import ConcreteParameters as ConcreteParameters
 from .parametrisation import Parameters as Parameters
 from .parametrisation import parameters as parameters
-from .perturbation import LARGEST_FACTOR as LARGEST_FACTOR
 from .perturbation import MOST_ROUNDS as MOST_ROUNDS
+from .perturbation import Perturbation as Perturbation
 from .perturbation import PerturbedStructure as PerturbedStructure
-from .perturbation import assembled as assembled
-from .perturbation import shifted as shifted
-from .perturbation import stiffened as stiffened
+from .perturbation import perturbed as perturbed
 from .symmetry import QUARTER_TURN as QUARTER_TURN
 from .symmetry import equal_directions as equal_directions
 from .symmetry import is_invariant as is_invariant
