@@ -106,6 +106,6 @@ def test_every_ligament_gets_stiffnesses_of_its_own() -> None:
     ],
 )
 def test_other_constants_vary_together_or_by_unit(kind: str, name: str, count: int) -> None:
-    made = drawn(0, **{kind: 0.1}).material
+    made = drawn(0, **{kind: 0.1}).material  # type: ignore[arg-type]
     assert len(np.unique(getattr(made, name))) == count
     assert (getattr(made, name) != getattr(PLAIN, name)).all()
