@@ -69,18 +69,18 @@ wheels:
 	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 # what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings
 $(PRODUCTS): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 reproduce: setup
-	@$(BIN)/python -m pipeline.workflow.reproduce $(STUDY)
+	@$(BIN)/python -m pipeline reproduce $(STUDY)
 
 test: setup
 	$(BIN)/python -m pytest $(PYTEST)

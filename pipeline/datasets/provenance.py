@@ -15,19 +15,18 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.problem import Problem, Stage, canonical_json, section_hash
-from pipeline.runtime import UserError
+from pipeline.problem import Problem, canonical_json, section_hash
+from pipeline.runtime import ROOT, UserError
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
-_ROOT = Path(__file__).resolve().parents[2]
 
 
 def attributes(
     problem: Problem,
-    stage: Stage,
+    stage: str,
     *,
     method: str | None = None,
     parents: Mapping[str, Path] | None = None,
@@ -37,7 +36,7 @@ def attributes(
 
     Args:
         problem: the problem; as much of it as the stage depends on is stored in full.
-        stage: the stage.
+        stage: the stage, by its name in the table.
         method: the optimisation method, where the stage runs only one.
         parents: files that the stage read, by role.
         plan: what was decided and skipped; anything that JSON can hold.
@@ -123,7 +122,7 @@ def package_versions() -> Mapping[str, str]:
 @lru_cache(maxsize=1)
 def git_commit() -> str:
     """The commit of the sources, or "unknown" outside a git checkout."""
-    command = ["git", "-C", str(_ROOT), "rev-parse", "--verify", "HEAD"]
+    command = ["git", "-C", str(ROOT), "rev-parse", "--verify", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
     except (OSError, subprocess.SubprocessError):

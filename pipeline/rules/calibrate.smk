@@ -18,7 +18,7 @@ rule calibrate_synthesise:
     message:
         "Computing measurements for {wildcards.calibration} (synthetic)"
     shell:
-        "python -m pipeline.stages.calibrate synthesise {input.description} --out-dir {output} --log {log}"
+        "python -m pipeline calibrate synthesise {input.description} --out-dir {output} --log {log}"
 
 
 rule calibrate_fit:
@@ -36,7 +36,7 @@ rule calibrate_fit:
     message:
         "Finding the constants of {wildcards.calibration}"
     shell:
-        "python -m pipeline.stages.calibrate {params.description} --out {output.dataset} --log {log}"
+        "python -m pipeline calibrate {params.description} --out {output.dataset} --log {log}"
 
 
 rule calibration_figure:

@@ -18,6 +18,6 @@ rule compare:
     message:
         "Comparing {wildcards.recording} of {wildcards.name}{wildcards.preset} with its simulation"
     shell:
-        "python -m pipeline.stages.compare {params.study} --design {input.design}"
+        "python -m pipeline compare {params.study} --design {input.design}"
         " --response {input.response} --recording {input.recording} --track {input.track}"
         " --out {output} --log {log}"

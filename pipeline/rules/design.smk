@@ -19,7 +19,7 @@ rule design:
     message:
         "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
     shell:
-        "python -m pipeline.stages.design {params.study} --method {wildcards.method} {params.start}"
+        "python -m pipeline design {params.study} --method {wildcards.method} {params.start}"
         " --out {output} --log {log}"
 
 
@@ -35,12 +35,12 @@ rule select:
     threads: 1
     params:
         study=options,
-        problem=section("design"),
+        problem=section("select"),
         source=source_hash("pipeline.stages.select"),
     message:
         "Choosing the better design of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.select {params.study} --designs {input.designs}"
+        "python -m pipeline select {params.study} --designs {input.designs}"
         " --out {output} --log {log}"
 
 
@@ -60,10 +60,10 @@ rule redesign:
         runtime=240,
     params:
         study=options,
-        problem=section("geometric"),
+        problem=section("redesign"),
         source=source_hash("pipeline.stages.redesign"),
     message:
         "Reconsidering {wildcards.name}{wildcards.preset} with contact on distance"
     shell:
-        "python -m pipeline.stages.redesign {params.study} --design {input.design}"
+        "python -m pipeline redesign {params.study} --design {input.design}"
         " --response {input.response} --out {output} --log {log}"

@@ -16,7 +16,7 @@ rule fabricate:
     message:
         "Drawing what is made of the {wildcards.structure} structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.fabricate {params.study} --design {input.design}"
+        "python -m pipeline fabricate {params.study} --design {input.design}"
         " --structure {wildcards.structure} --out-dir {params.folder} --log {log}"
 
 

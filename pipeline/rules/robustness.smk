@@ -17,12 +17,12 @@ rule monte_carlo:
     params:
         study=options,
         chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
-        problem=section("scatter"),
+        problem=section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Simulating imperfect copies of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.stages.monte_carlo run {params.study} --design {input.design}"
+        "python -m pipeline monte_carlo run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
@@ -36,12 +36,12 @@ rule monte_carlo_gather:
     localrule: True
     threads: 1
     params:
-        problem=section("scatter"),
+        problem=section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.monte_carlo gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline monte_carlo gather --parts {input} --out {output} --log {log}"
 
 
 # Not what the design depends on: finer steps of load or time, the other contact law.
@@ -61,5 +61,5 @@ rule verify:
     message:
         "Checking steps and contact of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.verify {params.study} --design {input.design}"
+        "python -m pipeline verify {params.study} --design {input.design}"
         " --out {output} --log {log}"

@@ -18,5 +18,5 @@ rule simulate:
     message:
         "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.simulate {params.study} {params.law} --design {input.design}"
+        "python -m pipeline simulate {params.study} {params.law} --design {input.design}"
         " --out {output} --log {log}"

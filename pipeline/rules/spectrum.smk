@@ -14,7 +14,7 @@ rule spectrum:
     message:
         "Analysing small vibrations of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.spectrum {params.study} --design {input.design}"
+        "python -m pipeline spectrum {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 

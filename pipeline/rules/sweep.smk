@@ -22,7 +22,7 @@ rule sweep:
     message:
         "Sweeping parameters of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.stages.sweep run {params.study} --design {input.design}"
+        "python -m pipeline sweep run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
@@ -41,7 +41,7 @@ rule sweep_gather:
     message:
         "Joining the parts of the sweep of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.sweep gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline sweep gather --parts {input} --out {output} --log {log}"
 
 
 rule sweep_page:

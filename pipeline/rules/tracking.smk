@@ -12,12 +12,12 @@ rule virtual_specimen:
     threads: 1
     params:
         study=options,
-        problem=section("simulate"),
+        problem=section("virtual_specimen"),
         source=source_hash("pipeline.stages.virtual_specimen"),
     message:
         "Simulating the specimen of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.virtual_specimen {input.recording} {params.study} --design {input.design}"
+        "python -m pipeline virtual_specimen {input.recording} {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 
@@ -35,7 +35,7 @@ rule film_weigh:
     message:
         "Weighing {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.stages.film weigh {input.recording} --response {input.response}"
+        "python -m pipeline film weigh {input.recording} --response {input.response}"
         " --out {output} --log {log}"
 
 
@@ -56,7 +56,7 @@ rule film_render:
     message:
         "Rendering {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.stages.film render {input.recording} --design {input.design}"
+        "python -m pipeline film render {input.recording} --design {input.design}"
         " --response {input.response} --out {output.video} --log {log}"
 
 
@@ -74,7 +74,7 @@ rule track:
     message:
         "Tracking {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.track {input.recording} --design {input.design}"
+        "python -m pipeline track {input.recording} --design {input.design}"
         " --out {output.track} --no-report --log {log}"
 
 

@@ -11,7 +11,10 @@ from .errors import UserError as UserError
 from .errors import found_in as found_in
 from .errors import refusal as refusal
 from .locations import ROOT as ROOT
+from .old_commands import keep_old_commands as keep_old_commands
 from .pixel_loops import Picture as Picture
 from .pixel_loops import compiled as compiled
 from .pixel_loops import inlined as inlined
 from .source_closure import source_hash as source_hash
+from .stage_table import REPORTED as REPORTED
+from .stage_table import STAGES as STAGES

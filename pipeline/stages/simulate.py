@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -39,16 +38,6 @@ if TYPE_CHECKING:
     from sim.solvers import Case
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.simulate", "Simulate the structures of a design.")
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    made.add_argument("--geometric", action="store_true", help="with contact on distance")
-    made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -166,12 +155,3 @@ def _cases(structure: PosedStructure, plan: Plan) -> Iterator[Case]:
         Case(values, drive, plan.solver, number)
         for number, drive in enumerate(structure.scene.drives)
     )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,7 +16,7 @@ from tempfile import NamedTemporaryFile
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.problem import Problem, Stage, outputs, section_hash
+from pipeline.problem import Problem, outputs, section_hash
 from pipeline.problem.sections import group_count
 from pipeline.runtime import ROOT, RUN_MARK, UserError
 from pipeline.workflow.recordings import shown_recordings
@@ -175,7 +175,7 @@ def shown_options(wildcards: Wildcards) -> str:
     return " ".join(f"--{name.replace('_', '-')} {file}" for name, file in files)
 
 
-def section(stage: Stage) -> Callable[[Wildcards], str]:
+def section(stage: str) -> Callable[[Wildcards], str]:
     """A function from wildcards to the hash of what `stage` depends on in the problem file.
 
     A job with a wildcard `method` depends on that method's settings and not on the others'.

@@ -13,6 +13,7 @@ import shutil
 import signal
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import psutil
 
@@ -24,7 +25,7 @@ _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
-def main(arguments: list[str]) -> None:
+def work(arguments: list[str]) -> NoReturn:
     """Checks the problem files of the targets, clears what a killed run left, runs snakemake."""
     streams.complete()
     os.chdir(ROOT)
@@ -90,7 +91,3 @@ def _end_with_parent() -> None:
     """Asks Linux to kill this process with its parent: a killed `make` leaves no snakemake."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.runtime import ROOT
-from pipeline.workflow import new_study
 from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
 from tests.e2e.checkout import Checkout
 
@@ -26,7 +26,7 @@ COMMANDS = list(commands())
 
 
 def is_run(command: Command) -> bool:
-    return command.words[:3] == [".venv/bin/python", "-m", "pipeline.workflow.run"]
+    return command.words[:4] == [".venv/bin/python", "-m", "pipeline", "run"]
 
 
 def is_stage(command: Command) -> bool:
@@ -42,7 +42,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """The repository with the study that the tutorials make."""
     made = Checkout.made(tmp_path_factory.mktemp("docs") / "checkout")
     shutil.rmtree(made.root / "experiments/logo", ignore_errors=True)
-    assert new_study.main(["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
+    assert run_stage("new", ["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
     (made.root / "experiments/logo/recordings").mkdir()
     return made
 
