@@ -7,9 +7,9 @@ import importlib
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
-from importlib.metadata import version
+from functools import partial
 
-from pipeline.runtime import STAGES, cli
+from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, version
 
 _HELP = ("-h", "--help")
 
@@ -21,7 +21,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(overview())  # noqa: T201
         return 0
     if words[0] == "--version":
-        print(f"metacloak {version('metacloak')}")  # noqa: T201
+        print(f"metacloak {version()}")  # noqa: T201
         return 0
     if words[0] not in STAGES:
         alike = difflib.get_close_matches(words[0], STAGES, n=1)
@@ -32,15 +32,32 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def run_stage(name: str, words: Sequence[str]) -> int:
-    """Runs one stage of the table, whose module is imported for it; returns the exit code."""
+    """Runs one stage of the table; returns the exit code."""
     stage = STAGES[name]
-    if stage.passes_on and not set(words[:1]) & set(_HELP):
-        return int(importlib.import_module(stage.module).work(list(words)))
+    if not stage.passes_on or set(words) & set(_HELP):
+        return cli.run(partial(_work, stage), cli.command_line(stage), words)
+    try:
+        _work(stage, list(words))
+    except UserError as error:
+        print(f"error: {error}", file=sys.stderr)  # noqa: T201
+        return 2
+    return 0
 
-    def work(args: Namespace) -> None:
-        importlib.import_module(stage.module).work(args)
 
-    return cli.run(work, cli.command_line(stage), words)
+def _work(stage: Stage, given: Namespace | list[str]) -> None:
+    """Imports the module of a stage, and does its work.
+
+    Raises:
+        UserError: a package is missing, which an extra installs; or a fault of the stage.
+    """
+    try:
+        importlib.import_module(PREFIX + stage.module).work(given)
+    except ModuleNotFoundError as error:
+        if (missing := str(error.name).partition(".")[0]) in ("sim", "pipeline", "metacloak"):
+            raise
+        what = f"the stage {stage.name} needs {missing}, which is not installed"
+        remedy = f'pip install "metacloak[{stage.extra}]"'
+        raise UserError(what, remedy=remedy) from error
 
 
 def overview() -> str:

@@ -11,12 +11,12 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.problem import Problem, canonical_json, section_hash
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import INSTALLED, ROOT, UserError, version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,8 +68,9 @@ def recorded(
 
 
 def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
+    written_by = f"version {version()}" if INSTALLED else f"commit {git_commit()}"
     return {
-        "history": f"written by metacloak, commit {git_commit()}",
+        "history": f"written by metacloak, {written_by}",
         "parents": _json({name: file_hash(path) for name, path in parents.items()}),
         "packages": _json(dict(package_versions())),
         "git_commit": git_commit(),
@@ -113,8 +114,8 @@ def package_versions() -> Mapping[str, str]:
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
-        except PackageNotFoundError:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
             found[name] = "absent"
     return found
 
@@ -122,6 +123,8 @@ def package_versions() -> Mapping[str, str]:
 @lru_cache(maxsize=1)
 def git_commit() -> str:
     """The commit of the sources, or "unknown" outside a git checkout."""
+    if INSTALLED:
+        return "unknown"  # a folder above site-packages may be a checkout of something else
     command = ["git", "-C", str(ROOT), "rev-parse", "--verify", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)

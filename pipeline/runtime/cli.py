@@ -12,7 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 from pipeline.runtime import streams
-from pipeline.runtime.errors import UserError, missing_package, refusal
+from pipeline.runtime.errors import UserError, refusal
 from pipeline.runtime.progress import Progress as progress  # noqa: N813  (reads as a verb at its callers)
 from pipeline.runtime.stage_table import PROBLEM, Option, Stage, option
 
@@ -23,6 +23,7 @@ Work = Callable[[argparse.Namespace], None]
 LOG = logging.getLogger(__name__)
 _ROOMS = ("sim", "pipeline", "reports", "metacloak", "__main__")
 
+_PROGRAM = "python -m pipeline"
 _COMMON = (
     option("--log", type=Path, metavar="FILE", help="also write messages to this file"),
     option("--quiet", action="store_true", help="print nothing but errors"),
@@ -37,8 +38,12 @@ def parser(command: str, description: str, *, study: bool = True) -> argparse.Ar
         description: what it reads, does and writes.
         study: whether it wants --problem and --preset.
     """
+    return _framed(f"python -m {command}", description, study=study)
+
+
+def _framed(program: str, description: str, *, study: bool) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
-        prog=f"python -m {command}",
+        prog=program,
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -51,7 +56,7 @@ def command_line(stage: Stage) -> argparse.ArgumentParser:
     """Makes the command line of a stage from its row of the table."""
     does = f"{stage.does[0].upper()}{stage.does[1:]}."
     study = stage.unused is not None and not stage.parts
-    made = parser(f"pipeline {stage.name}", f"{does}\n\n{stage.about}".strip(), study=study)
+    made = _framed(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), study=study)
     for name in stage.inputs:
         made.add_argument(f"--{name}", type=Path, required=True, metavar="NC", help="to read")
     _add(made, stage.options)
@@ -105,8 +110,6 @@ def _guarded(work: Work, args: argparse.Namespace) -> int:
 
 def _told(error: Exception, log: Path | None) -> int:
     """Tells of an error in words, and returns the exit code."""
-    if isinstance(error, ModuleNotFoundError):
-        error = missing_package(error) or error
     if isinstance(error, UserError):
         LOG.error("error: %s", error)
         return 2

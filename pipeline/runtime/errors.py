@@ -18,19 +18,6 @@ _REFUSALS = {
     errno.EPERM: ("no permission", f"check who may use it, or {_CHOOSE}"),
 }
 
-_EXTRAS = {
-    "tracking": ("av", "cv2"),
-    "fabrication": (
-        *("ezdxf", "lxml", "manifold3d", "mapbox_earcut", "networkx", "reportlab"),
-        *("svgelements", "trimesh"),
-    ),
-    "workflow": (
-        *("jinja2", "matplotlib", "netCDF4", "pandas", "pint", "pydantic"),
-        *("snakemake", "tqdm", "xarray", "yaml"),
-    ),
-}
-"""Extras of the package, with the modules that they install beside the bare one."""
-
 
 class UserError(Exception):
     """A mistake in the input or a refusal by the machine, told on one screen without a traceback.
@@ -85,16 +72,6 @@ def refusal(path: str | PathLike[str], error: OSError) -> UserError:
     otherwise = (error.strerror or str(error), "check the path, then run the same command again")
     what, remedy = _REFUSALS.get(error.errno or 0, otherwise)
     return UserError(what, file=path, remedy=remedy)
-
-
-def missing_package(error: ModuleNotFoundError) -> UserError | None:
-    """Names the extra of metacloak that installs a missing module; None of a module of none."""
-    name = (error.name or "").partition(".")[0]
-    extra = next((extra for extra, modules in _EXTRAS.items() if name in modules), None)
-    if extra is None:
-        return None
-    remedy = f'pip install "metacloak[{extra}]"'
-    return UserError(f"{extra} needs the package {name}, which is not installed", remedy=remedy)
 
 
 @contextmanager

@@ -8,6 +8,8 @@ from importlib.abc import InspectLoader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import CodeType, ModuleType
 
+from pipeline.runtime.locations import INSTALLED
+
 _CODE = """
 import sys
 from {package}.__main__ import main
@@ -48,4 +50,5 @@ def keep_old_commands(package: str, commands: Mapping[str, str]) -> None:
         package: the package, whose `__main__` has a `main` that takes words.
         commands: the commands by names of former modules, without the package.
     """
-    sys.meta_path.append(_OldCommands(package, commands))
+    if not INSTALLED:  # as a package it had none
+        sys.meta_path.append(_OldCommands(package, commands))

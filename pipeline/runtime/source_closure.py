@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from pipeline.runtime.locations import ROOT
+from pipeline.runtime.locations import PREFIX, ROOT
 
 PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
 RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".yaml"}
@@ -120,11 +120,11 @@ def _names(path: Path, package: str) -> Iterator[tuple[str, str]]:
     """Walks over the import statements of a file: what is imported from, and the name if any."""
     for node in ast.walk(ast.parse(path.read_bytes(), filename=str(path))):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names)
+            yield from ((alias.name.removeprefix(PREFIX), "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             parts = package.split(".")
             above = parts[: len(parts) + 1 - node.level] if node.level else []
-            base = ".".join([*above, *filter(None, [node.module])])
+            base = ".".join([*above, *filter(None, [node.module])]).removeprefix(PREFIX)
             yield from ((base, alias.name) for alias in node.names)
 
 

@@ -46,6 +46,8 @@ class Stage(NamedTuple):
     """More of help."""
     passes_on: bool = False
     """Hands its words to another program as they are."""
+    extra: str = "workflow"
+    """Extra of the package that installs what it needs."""
 
     @property
     def module(self) -> str:
@@ -184,6 +186,7 @@ _ROWS = (
     Stage(
         "fabricate",
         "write drawings, meshes and papers of a structure",
+        extra="fabrication",
         inputs=("design",),
         unused=(
             *("doc", "report", "solver", "prediction", "spectrum"),
@@ -197,6 +200,7 @@ _ROWS = (
     Stage(
         "virtual_specimen",
         "simulate the specimen of a virtual recording",
+        extra="tracking",
         kind="specimen",
         inputs=("design",),
         unused=(*_APART, "sweep", "robustness", "fabrication"),
@@ -205,6 +209,7 @@ _ROWS = (
     Stage(
         "film",
         "film a simulated response",
+        extra="tracking",
         kind="truth",
         parts={
             "render": (
@@ -242,6 +247,7 @@ expect. Choices that are given several values are tried in every combination."""
     Stage(
         "track",
         "turn the video of a specimen into motions of its units",
+        extra="tracking",
         kind="track",
         options=(
             option("words", nargs="+", metavar="[COMMAND] FILE", help="what to read"),
@@ -267,6 +273,7 @@ test video, which the first then tracks.""",
     Stage(
         "compare",
         "compare a recording with the simulation of what it shows",
+        extra="tracking",
         kind="comparison",
         inputs=("design", "response", "track"),
         unused=(*_WORDS, "spectrum", "response", "sweep", "fabrication"),
@@ -298,6 +305,7 @@ labelled SYNTHETIC.""",
     Stage(
         "markers",
         "write sheets of marks for the tracking, to print and stick on the units",
+        extra="tracking",
         home="pipeline.virtual_lab",
         module_name="print_markers",
         inputs=("design",),

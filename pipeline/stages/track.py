@@ -16,7 +16,7 @@ import numpy as np
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.runtime import UserError, cli, found_in, write_atomically
+from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
     WORD,
     frames,
@@ -170,7 +170,7 @@ def _report(track: Path, video: Path) -> None:
     """Runs the stage that draws overlay and quality."""
     folder = track.with_name(f"{track.stem}_report")
     words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
-    command = [sys.executable, "-m", "reports.products.tracking.build", *words]
+    command = [sys.executable, "-m", f"{PREFIX}reports.products.tracking.build", *words]
     if subprocess.run(command, check=False).returncode:
         remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
         raise UserError("the report could not be made", file=folder, remedy=remedy)

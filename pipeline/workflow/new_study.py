@@ -12,7 +12,7 @@ from textwrap import indent
 
 from pipeline import problem
 from pipeline.problem.outlines import ImageError, read_outlines
-from pipeline.runtime import UserError
+from pipeline.runtime import BUILD, UserError
 
 LOG = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ def work(args: argparse.Namespace) -> None:
         aside.rename(folder)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-    LOG.info("made %s; a draft: make %s@quick", folder / "problem.yaml", args.name)
+    LOG.info("made %s; a draft: %s %s@quick", folder / "problem.yaml", BUILD, args.name)
 
 
 def text(name: str, kind: str, image: Path | None) -> str:
@@ -63,6 +63,7 @@ def text(name: str, kind: str, image: Path | None) -> str:
     template = (TEMPLATES / f"{kind}.yaml").read_text(encoding="utf-8")
     return Template(template).substitute(
         name=name,
+        build=BUILD,
         title=name.replace("_", " ").capitalize(),
         void=indent(void, "  "),
         quick=indent(small, "      "),

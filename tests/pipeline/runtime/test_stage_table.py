@@ -11,8 +11,7 @@ import pytest
 from pipeline.__main__ import main, overview
 from pipeline.datasets import TABLES
 from pipeline.problem import Problem
-from pipeline.runtime import ROOT, STAGES
-from pipeline.runtime.stage_table import Stage
+from pipeline.runtime import ROOT, STAGES, Stage
 
 HEAVY = ("jax", "numba", "numpy", "pydantic", "xarray", "yaml", "cv2", "matplotlib")
 
