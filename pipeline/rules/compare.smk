@@ -1,7 +1,7 @@
 # What was filmed beside the simulation of it, driven as the specimen was.
 rule compare:
     input:
-        unpack(compared),
+        unpack(recordings.compared),
         problem=ancient("experiments/{name}/problem.yaml"),
         design="results/{name}{preset}/design.nc",
         response="results/{name}{preset}/response.nc",
@@ -12,8 +12,8 @@ rule compare:
         "results/{name}{preset}/logs/compare_{recording}.log",
     threads: 1
     params:
-        study=options,
-        problem=section("compare"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("compare"),
         source=source_hash("pipeline.stages.compare"),
     message:
         "Comparing {wildcards.recording} of {wildcards.name}{wildcards.preset} with its simulation"

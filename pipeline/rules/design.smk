@@ -2,7 +2,7 @@
 rule design:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        start=start_design,
+        start=rule_inputs.start_design,
     output:
         "results/{name}{preset}/design_{method}.nc",
     log:
@@ -12,9 +12,9 @@ rule design:
         mem_mb=4000,
         runtime=480,
     params:
-        study=options,
+        study=rule_inputs.options,
         start=lambda wildcards, input: [f"--start {path}" for path in input.start],
-        problem=section("design"),
+        problem=rule_inputs.section("design"),
         source=source_hash("pipeline.stages.design"),
     message:
         "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
@@ -26,7 +26,7 @@ rule design:
 rule select:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        designs=designs,
+        designs=rule_inputs.designs,
     output:
         "results/{name}{preset}/design.nc",
     log:
@@ -34,8 +34,8 @@ rule select:
     localrule: True
     threads: 1
     params:
-        study=options,
-        problem=section("select"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("select"),
         source=source_hash("pipeline.stages.select"),
     message:
         "Choosing the better design of {wildcards.name}{wildcards.preset}"
@@ -59,8 +59,8 @@ rule redesign:
         mem_mb=4000,
         runtime=240,
     params:
-        study=options,
-        problem=section("redesign"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("redesign"),
         source=source_hash("pipeline.stages.redesign"),
     message:
         "Reconsidering {wildcards.name}{wildcards.preset} with contact on distance"

@@ -1,6 +1,6 @@
 rule robust_gains:
     input:
-        unpack(robust_designs),
+        unpack(rule_inputs.robust_designs),
     output:
         "results/{name}/gains.nc",
     log:

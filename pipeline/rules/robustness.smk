@@ -15,9 +15,9 @@ rule monte_carlo:
         mem_mb=2000,
         runtime=240,
     params:
-        study=options,
-        chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
-        problem=section("monte_carlo"),
+        study=rule_inputs.options,
+        chunks=lambda wildcards: len(rule_inputs.copies(wildcards, MOST_PARTS)),
+        problem=rule_inputs.section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Simulating imperfect copies of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
@@ -28,7 +28,7 @@ rule monte_carlo:
 
 rule monte_carlo_gather:
     input:
-        lambda wildcards: copies(wildcards, MOST_PARTS),
+        lambda wildcards: rule_inputs.copies(wildcards, MOST_PARTS),
     output:
         "results/{name}{preset}/scatter.nc",
     log:
@@ -36,7 +36,7 @@ rule monte_carlo_gather:
     localrule: True
     threads: 1
     params:
-        problem=section("monte_carlo"),
+        problem=rule_inputs.section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
@@ -55,8 +55,8 @@ rule verify:
         "results/{name}{preset}/logs/verification.log",
     threads: 1
     params:
-        study=options,
-        problem=section("verify"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("verify"),
         source=source_hash("pipeline.stages.verify"),
     message:
         "Checking steps and contact of {wildcards.name}{wildcards.preset}"

@@ -11,9 +11,9 @@ rule simulate:
         mem_mb=4000,
         runtime=60,
     params:
-        study=options,
+        study=rule_inputs.options,
         law=lambda wildcards: "--geometric" if wildcards.law else "",
-        problem=section("simulate"),
+        problem=rule_inputs.section("simulate"),
         source=source_hash("pipeline.stages.simulate"),
     message:
         "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"

@@ -11,8 +11,8 @@ rule virtual_specimen:
         "results/{name}{preset}/logs/specimen_{recording}.log",
     threads: 1
     params:
-        study=options,
-        problem=section("virtual_specimen"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("virtual_specimen"),
         source=source_hash("pipeline.stages.virtual_specimen"),
     message:
         "Simulating the specimen of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
@@ -24,7 +24,7 @@ rule virtual_specimen:
 rule film_weigh:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
-        response=filmed,
+        response=recordings.filmed,
     output:
         "results/{name}{preset}/recordings/{recording}_load.csv",
     log:
@@ -43,7 +43,7 @@ rule film_render:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         design="results/{name}{preset}/design.nc",
-        response=filmed,
+        response=recordings.filmed,
     output:
         video="results/{name}{preset}/recordings/{recording}.mp4",
         recording="results/{name}{preset}/recordings/{recording}.yaml",
@@ -62,7 +62,7 @@ rule film_render:
 
 rule track:
     input:
-        unpack(tracked),
+        unpack(recordings.tracked),
     output:
         track="results/{name}{preset}/recordings/{recording}/track.nc",
         table="results/{name}{preset}/recordings/{recording}/track.csv",
@@ -80,7 +80,7 @@ rule track:
 
 rule track_report:
     input:
-        unpack(tracked),
+        unpack(recordings.tracked),
         track="results/{name}{preset}/recordings/{recording}/track.nc",
     output:
         page="results/{name}{preset}/recordings/{recording}/index.html",
