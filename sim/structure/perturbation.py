@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from sim.core import Floats, Ints
+from sim.structure.contact_laws import ContactModel, VoidAngleContact
 from sim.structure.gaps import overlapping_pairs, polygons
 from sim.structure.geometry import void_angles
 from sim.structure.lattice import Lattice
@@ -69,7 +70,7 @@ def perturbed(
     vertices: Floats,
     material: Material,
     sizes: Perturbation,
-    cutoff: float,
+    contact: ContactModel,
     seed: Sequence[int],
 ) -> PerturbedStructure:
     """Draws a copy of a structure.
@@ -79,18 +80,18 @@ def perturbed(
         vertices: (n_vertices, 2) of its design, mm.
         material: its constants.
         sizes: of the deviations.
-        cutoff: void angle at which contact sets in, rad; all voids stay above it, so that the copy
-            is at rest without a load.
+        contact: law of contact; void angles stay above its cutoff, so that the copy is at rest
+            without a load.
         seed: equal seeds give equal copies, whatever else is drawn.
     """
     random = np.random.default_rng(seed)
     copy = PerturbedStructure(vertices, material)
     if sizes.geometry is not None:
-        copy = _shifted(lattice, copy, sizes.geometry, cutoff, random)
+        copy = _shifted(lattice, copy, sizes.geometry, contact, random)
     copy = replace(copy, material=_varied(lattice, material, sizes, random))
     if sizes.assembly is not None:
         joints = np.random.default_rng((*seed, 1))
-        copy = _assembled(lattice, copy, sizes.assembly, cutoff, joints)
+        copy = _assembled(lattice, copy, sizes.assembly, contact, joints)
     return copy
 
 
@@ -125,7 +126,7 @@ def _shifted(
     lattice: Lattice,
     copy: PerturbedStructure,
     largest: float,
-    cutoff: float,
+    contact: ContactModel,
     random: np.random.Generator,
 ) -> PerturbedStructure:
     """Moves every vertex by up to ``largest`` (mm) along x and y, evenly spread.
@@ -136,7 +137,7 @@ def _shifted(
     first = redrawn = 0
     for tries in range(MOST_ROUNDS):
         moved = copy.vertices + shifts[lattice.group]
-        clashing = clashing_units(lattice, moved, cutoff)
+        clashing = clashing_units(lattice, moved, contact)
         first = len(clashing) if tries == 0 else first
         if len(clashing) == 0:
             return replace(copy, vertices=moved, clashes=first, redrawn=redrawn)
@@ -150,7 +151,7 @@ def _assembled(
     lattice: Lattice,
     copy: PerturbedStructure,
     spread: tuple[float, float],
-    cutoff: float,
+    contact: ContactModel,
     random: np.random.Generator,
 ) -> PerturbedStructure:
     """Joins the units of a copy, each off its place by ``spread`` (mm, rad).
@@ -162,7 +163,7 @@ def _assembled(
     pose = deviation * random.standard_normal((lattice.n_units, 3))
     for _ in range(MOST_ROUNDS):
         placed = _placed(lattice, copy.vertices, pose)
-        clashing = clashing_units(lattice, placed, cutoff)
+        clashing = clashing_units(lattice, placed, contact)
         if len(clashing) == 0:
             return replace(copy, vertices=placed)
         pose[clashing] = deviation * random.standard_normal((len(clashing), 3))
@@ -179,10 +180,11 @@ def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
     return np.asarray((middle + pose[:, :2])[lattice.unit] + cos * arm + sin * across)
 
 
-def clashing_units(lattice: Lattice, vertices: Floats, cutoff: float) -> Ints:
+def clashing_units(lattice: Lattice, vertices: Floats, contact: ContactModel) -> Ints:
     """Finds the units (n,) that overlap or touch (by a void angle) another, or cross themselves."""
     pairs = overlapping_pairs(lattice, vertices)
     crossed = np.flatnonzero(~shapely.is_valid(polygons(lattice, vertices)))
+    cutoff = contact.cutoff if isinstance(contact, VoidAngleContact) else -np.inf
     closed = (np.asarray(void_angles(lattice, vertices)) <= cutoff).any(axis=1)
     return np.unique(
         np.concatenate([pairs.ravel(), crossed, lattice.ligament_units[closed].ravel()])

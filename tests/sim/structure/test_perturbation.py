@@ -8,6 +8,7 @@ from sim.structure import (
     Material,
     Perturbation,
     PerturbedStructure,
+    VoidAngleContact,
     overlapping_pairs,
     perturbed,
     quads,
@@ -18,6 +19,7 @@ from sim.structure.perturbation import clashing_units
 
 LATTICE = quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
 CUTOFF = np.deg2rad(-10.0)
+CONTACT = VoidAngleContact(np.deg2rad(-15.0), CUTOFF)
 PLAIN = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.1, 0.2)
 
 
@@ -25,7 +27,7 @@ def drawn(
     seed: int, vertices: np.ndarray = LATTICE.vertices, **sizes: float | tuple[float, float]
 ) -> PerturbedStructure:
     given = Perturbation(**sizes)  # type: ignore[arg-type]
-    return perturbed(LATTICE, vertices, PLAIN, given, CUTOFF, (seed,))
+    return perturbed(LATTICE, vertices, PLAIN, given, CONTACT, (seed,))
 
 
 def draw(largest: float, seed: int = 0) -> np.ndarray:
@@ -66,7 +68,7 @@ def test_a_place_without_room_gives_up() -> None:
     squeezed[:4] += [12.0, 0.0]  # the first unit lies on its neighbour
     copy = drawn(0, squeezed, geometry=1e-3)
     assert not copy.sound
-    assert set(clashing_units(LATTICE, squeezed, CUTOFF)) >= {0, 1}
+    assert set(clashing_units(LATTICE, squeezed, CONTACT)) >= {0, 1}
 
 
 def test_units_are_assembled_whole() -> None:
