@@ -1,29 +1,44 @@
 """Method of moving asymptotes, globally convergent (Svanberg 1987; 2002, SIAM J. Optim. 12, 555).
 
-The iterations are those of nlopt (LD_MMA, S. G. Johnson): each function is replaced by a separable
-convex one with a pole on either side of every variable, stiffened where it proves too optimistic.
-The constraints are cheap, so a trial that misses them is sent back without a simulation.
+Each function is replaced by a separable convex one with a pole on either side of every variable.
+If a replacement proves too optimistic at the optimum, it is stiffened and solved again. The
+constraints are cheap, so for them this happens before the loss is simulated.
 """
+
+# nlopt's LD_MMA does not take its place: without bounds on the variables its first three designs
+# of fig2@quick end at a loss of 0.353 in place of 0.247. Within +-3 mm it is as good: 60 designs
+# of figure 2 end at 0.5835 in place of 0.5856, with half the time outside the simulation.
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import nlopt
 import numpy as np
+import scipy.sparse as sp
 
-from sim.core import Floats, SimulationError
+from sim.core import Floats, Ints, SimulationError
 from sim.optimise.feasibility import feasible_start, project
+from sim.optimise.mma_subproblem import Separable, UnsolvedError, minimise_separable
 from sim.optimise.problem import ConstraintPoint, CountedProblem, EvaluatedPoint, Result
+from sim.optimise.qp import reachable
 
-ROUNDING = 1e-4
-"""Violation (mm) up to which a trial is moved back to the feasible set and simulated there."""
+SLOWER, FASTER = 0.7, 1.2
+"""Factors of the distance to the poles after a variable has turned, or gone on."""
 
-FAR = 1.0
-"""Margin (mm) of a constraint that does not matter here."""
+NEAREST, FARTHEST = 0.01, 1.5
+"""Limits of that distance, relative to the range of the variable."""
 
-MOST_REFUSALS = 200
-"""Trials in a row that miss the constraints, after which the descent has stalled."""
+MOVE = 0.9
+"""Largest move of a variable, relative to the distance of its poles."""
+
+SOFTEN, STIFFEN = 0.1, 10.0
+"""Factor of the stiffness from one design to the next; its largest growth in one correction."""
+
+ENOUGH = 0.1
+"""Share of the expected decrease with which a step is kept although the loss was underestimated."""
+
+CORRECTIONS = 3
+"""Largest number of corrections of the constraints before one simulation."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +48,8 @@ class MmaOptions:
     Attributes:
         evaluations: largest number of simulations, corrections and failures included.
         target: loss that is good enough.
-        span: range of a variable, in which a feasible start is sought.
+        span: range of a variable without finite bounds.
+        asymptote: first distance of the poles, relative to the range.
         residual: KKT residual at which a design counts as optimal.
         step_min: largest change of a variable at which the method has converged.
     """
@@ -41,118 +57,159 @@ class MmaOptions:
     evaluations: int = 60
     target: float = -np.inf
     span: float = 2.0
+    asymptote: float = 0.5
     residual: float = 1e-5
     step_min: float = 1e-6
 
 
-class _EndedError(Exception):
-    """Leaves nlopt from within a callback; the message is the reason."""
+class Approximation:
+    """Convex separable replacements of the loss (row 0) and the constraints around one design.
+
+    Svanberg's constraints read f <= 0, so f = -c. A constraint is stiffened only in the variables
+    that it depends on, which keeps it sparse.
+
+    Attributes:
+        stiffness: (1 + m,) weight of the added convex term of each function.
+    """
+
+    def __init__(self, point: EvaluatedPoint, distance: Floats, stiffness: Floats) -> None:
+        self.point = point
+        self.distance = distance
+        self.stiffness = stiffness
+        self.slopes = sp.csr_array(sp.vstack([point.gradient[None], -point.jacobian]))
+        self.slopes.eliminate_zeros()
+
+    def separable(self, rows: Ints, lower: Floats, upper: Floats) -> Separable:
+        """The subproblem with the functions ``rows`` (the loss first)."""
+        chosen = self.slopes[rows].tocoo()
+        row, column = chosen.coords
+        reach = self.distance[column]
+        extra = self.stiffness[rows][row] * reach / 4
+        up = reach**2 * np.maximum(chosen.data, 0) + extra
+        down = reach**2 * np.maximum(-chosen.data, 0) + extra
+        x = self.point.x
+        return Separable(
+            centre=x,
+            distance=self.distance,
+            low=np.maximum(lower, x - MOVE * self.distance),
+            high=np.minimum(upper, x + MOVE * self.distance),
+            up=sp.csr_array((up, (row, column)), chosen.shape),
+            down=sp.csr_array((down, (row, column)), chosen.shape),
+            at_centre=np.concatenate([[self.point.loss], -self.point.values])[rows],
+        )
+
+    def correct(self, rows: Ints, x: Floats, shortfall: Floats) -> None:
+        """Stiffens the functions that the replacements underestimated by ``shortfall`` at ``x``."""
+        square = (x - self.point.x) ** 2
+        pattern = self.slopes[rows]
+        pattern.data = np.ones_like(pattern.data)
+        growth = np.maximum(pattern @ (square / (self.distance**2 - square)) / 2, 1e-300)
+        old = self.stiffness[rows]
+        new = np.minimum(1.1 * (old + np.maximum(shortfall, 0) / growth), STIFFEN * old)
+        self.stiffness[rows] = np.where(shortfall > 0, new, old)
+
+
+@dataclass(frozen=True)
+class MmaTrial:
+    """A feasible design that the replacements propose, with the loss that they promise there."""
+
+    place: ConstraintPoint
+    promised: float
 
 
 def mma(problem: CountedProblem, x0: Floats, options: MmaOptions) -> Result:
-    """Minimises by moving asymptotes from the feasible design nearest to ``x0``."""
+    """Runs the outer iterations: replace, solve and correct, move, adapt the poles."""
     place = feasible_start(problem, x0, options.span)
     point = problem.simulate(place)
     if isinstance(point, SimulationError):
         raise point
     run = _Run(problem, point, options)
-    try:
-        run.accept(place, point)
-        _solver(problem, run, options).optimize(place.x)
-        reason = "no further progress"
-    except _EndedError as ended:
-        reason = str(ended)
-    except nlopt.RoundoffLimited:
-        reason = "no further progress"
-    return problem.result(reason)
-
-
-def _solver(problem: CountedProblem, run: _Run, options: MmaOptions) -> nlopt.opt:
-    solver = nlopt.opt(nlopt.LD_MMA, len(run.point.x))
-    solver.set_min_objective(run.loss)
-    if len(run.point.values):
-        solver.add_inequality_mconstraint(run.violations, np.full(len(run.point.values), 1e-8))
-    solver.set_lower_bounds(problem.lower)
-    solver.set_upper_bounds(problem.upper)
-    solver.set_xtol_abs(options.step_min)
-    return solver
+    problem.record(place, point, True, float(run.distance.max(initial=0.0)), run.residual)
+    while problem.finished is None and run.reason is None:
+        run.outer()
+    return problem.result(problem.finished or run.reason or "")
 
 
 class _Run:
-    """State of one run: the current design, and the trial that nlopt asks about.
-
-    nlopt moves to each feasible design of a smaller loss, so its current design is the best one.
-    """
+    """State of one run: the current design, its poles and stiffnesses."""
 
     def __init__(self, problem: CountedProblem, point: EvaluatedPoint, options: MmaOptions) -> None:
         self.problem, self.options, self.point = problem, options, point
-        self.place: ConstraintPoint = point
+        width = problem.upper - problem.lower
+        self.width = np.where(np.isfinite(width), width, options.span)
+        self.distance = options.asymptote * self.width
+        self.stiffness = np.ones(1 + len(point.values))
+        self._set_stiffness()
+        self.last = np.zeros_like(point.x)
         self.residual = problem.stationarity(point).residual
-        self.refusals = 0
+        self.reason = "stationary" if self.residual <= options.residual else None
 
-    def loss(self, x: Floats, slope: Floats) -> float:
-        """Returns the loss of a trial and writes its gradient (n,) to ``slope``.
+    def _set_stiffness(self) -> None:
+        """Starts with a tenth of each function's mean slope across the poles."""
+        slopes = abs(sp.csr_array(sp.vstack([self.point.gradient[None], self.point.jacobian])))
+        entries = np.maximum(np.diff(slopes.indptr), 1)
+        self.stiffness = np.maximum(0.1 * (slopes @ self.distance) / entries, 1e-6)
+        self.least = 1e-2 * self.stiffness
 
-        A trial that misses the constraints gets the tangent's value, which is below that of any
-        replacement, so that only the constraints' replacements are stiffened; one that fails gets
-        an infinite loss.
-        """
-        slope[:] = self.point.gradient
-        if np.array_equal(x, self.point.x):
-            return self.point.loss
-        self.place = self.problem.place(x.copy())
-        place = self._feasible()
-        if place is None:
-            return self.point.loss + float(self.point.gradient @ (x - self.point.x))
-        outcome = self.problem.simulate(place)
-        if isinstance(outcome, EvaluatedPoint) and outcome.loss < self.point.loss:
-            self.accept(place, outcome)
-        else:
-            self._record(place, outcome, False)
-        if isinstance(outcome, SimulationError):
-            return float(np.inf)
-        slope[:] = outcome.gradient
-        return outcome.loss
+    def outer(self) -> None:
+        """One accepted move, with as many corrections as it takes."""
+        model = Approximation(self.point, self.distance, self.stiffness)
+        while self.problem.finished is None:
+            try:
+                trial = self._propose(model)
+            except UnsolvedError as error:
+                self.reason = str(error)
+                return
+            if trial is None or self._length(trial.place) < self.options.step_min:
+                self.reason = "no further progress"
+                return
+            outcome = self.problem.simulate(trial.place)
+            if isinstance(outcome, EvaluatedPoint) and self._keeps(trial, outcome):
+                self._move(trial, outcome)
+                return
+            self.problem.record(
+                trial.place, outcome, False, float(self.distance.max()), self.residual
+            )
+            if isinstance(outcome, EvaluatedPoint):
+                shortfall = np.array([outcome.loss - trial.promised])
+                model.correct(np.zeros(1, dtype=int), outcome.x, shortfall)
+            else:
+                self.distance *= SLOWER**2
 
-    def violations(self, result: Floats, x: Floats, slopes: Floats) -> None:
-        """Writes the constraints of a trial as f = -c <= 0 (m,) and their gradients (m, n).
+    def _length(self, place: ConstraintPoint) -> float:
+        return float(np.abs(place.x - self.point.x).max())
 
-        One that no variable changes here counts as far away: where it is active, its replacement,
-        which grows with every variable, would leave no room to move.
-        """
-        if not np.array_equal(x, self.place.x):
-            self.place = self.problem.place(x.copy())
-        values, jacobian = self.place.values, self.place.jacobian
-        still = abs(jacobian).sum(axis=1) == 0.0
-        result[:] = -np.where(still & (values >= 0.0), np.maximum(values, FAR), values)
-        if slopes.size:
-            slopes[:] = -jacobian.toarray()
+    def _keeps(self, trial: MmaTrial, outcome: EvaluatedPoint) -> bool:
+        expected = self.point.loss - trial.promised
+        return self.point.loss - outcome.loss >= ENOUGH * expected > 0
 
-    def accept(self, place: ConstraintPoint, point: EvaluatedPoint) -> None:
-        """Moves to a design.
-
-        Raises:
-            _EndedError: it is stationary, or no evaluation may follow.
-        """
-        self.residual = self.problem.stationarity(point).residual
-        self._record(place, point, True)
-        self.point = point
+    def _move(self, trial: MmaTrial, outcome: EvaluatedPoint) -> None:
+        used = float(self.distance.max())
+        step = outcome.x - self.point.x
+        turned = step * self.last
+        self.distance *= np.where(turned > 0, FASTER, np.where(turned < 0, SLOWER, 1.0))
+        self.distance = np.clip(self.distance, NEAREST * self.width, FARTHEST * self.width)
+        self.stiffness = np.maximum(SOFTEN * self.stiffness, self.least)
+        self.point, self.last = outcome, step
+        self.residual = self.problem.stationarity(outcome).residual
         if self.residual <= self.options.residual:
-            raise _EndedError("stationary")
+            self.reason = "stationary"
+        self.problem.record(trial.place, outcome, True, used, self.residual)
 
-    def _feasible(self) -> ConstraintPoint | None:
-        """Returns the trial, moved back if it misses the constraints by rounding alone."""
-        near = self.place.violation <= ROUNDING
-        place = project(self.problem, self.place.x, 10 * ROUNDING) if near else None
-        self.refusals = self.refusals + 1 if place is None else 0
-        if self.refusals > MOST_REFUSALS:
-            raise _EndedError("no further progress")
-        return place
-
-    def _record(
-        self, place: ConstraintPoint, outcome: EvaluatedPoint | SimulationError, accepted: bool
-    ) -> None:
-        length = float(np.abs(place.x - self.point.x).max(initial=0.0))
-        self.problem.record(place, outcome, accepted, length, self.residual)
-        if self.problem.finished:
-            raise _EndedError(self.problem.finished)
+    def _propose(self, model: Approximation) -> MmaTrial | None:
+        """Solves the replacements until those of the constraints are on the safe side."""
+        problem, reach = self.problem, MOVE * float(self.distance.max())
+        rows = 1 + reachable(self.point.values, self.point.jacobian, reach)
+        rows = np.concatenate([[0], rows])
+        for _ in range(CORRECTIONS):
+            subproblem = model.separable(rows, problem.lower, problem.upper)
+            x, _ = minimise_separable(subproblem)
+            place = problem.place(x)
+            if place.violation <= 1e-9:
+                break
+            shortfall = -place.values[rows[1:] - 1] - subproblem.values(x)[1:]
+            model.correct(rows[1:], x, np.where(place.values[rows[1:] - 1] < 0, shortfall, 0.0))
+        feasible = project(problem, place.x, reach)
+        if feasible is None:
+            return None
+        return MmaTrial(feasible, float(subproblem.values(feasible.x)[0]))

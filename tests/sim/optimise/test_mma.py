@@ -2,11 +2,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import nlopt
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from sim.core import SimulationError
 from sim.optimise import MmaOptions, Result, minimise
+from sim.optimise.mma_subproblem import Separable, UnsolvedError, minimise_separable
 from tests.sim.optimise.known_problems import Known, cantilever, corner, many, shifted_bowl
 
 
@@ -15,21 +18,51 @@ def solve(known: Known, **changes: float) -> Result:
     return minimise("mma", known.loss, known.constraints, known.start, known.bounds, options)
 
 
+def by_nlopt(known: Known, evaluations: int = 500) -> np.ndarray:
+    """The optimum according to nlopt's LD_MMA."""
+    size = len(known.start)
+    lower, upper = known.bounds or (-5.0, 5.0)
+
+    def loss(x: np.ndarray, slope: np.ndarray) -> float:
+        value, gradient, _ = known.loss(x)
+        slope[:] = gradient
+        return value
+
+    def violated(result: np.ndarray, x: np.ndarray, slopes: np.ndarray) -> None:
+        assert known.constraints is not None
+        values, jacobian = known.constraints(x)
+        result[:] = -values
+        if slopes.size:
+            slopes[:] = -jacobian
+
+    solver = nlopt.opt(nlopt.LD_MMA, size)
+    solver.set_min_objective(loss)
+    solver.set_lower_bounds(np.full(size, lower))
+    solver.set_upper_bounds(np.full(size, upper))
+    if known.constraints is not None:
+        count = len(known.constraints(known.start)[0])
+        solver.add_inequality_mconstraint(violated, np.full(count, 1e-9))
+    solver.set_maxeval(evaluations)
+    solver.set_xtol_rel(1e-9)
+    return solver.optimize(known.start)
+
+
 @pytest.mark.parametrize(
     ("known", "tolerance"),
     [(corner(), 1e-5), (shifted_bowl(), 1e-4), (cantilever(), 5e-3)],
     ids=["corner", "bowl", "cantilever"],
 )
-def test_known_optima(known: Known, tolerance: float) -> None:
+def test_known_optima_which_are_nlopts_too(known: Known, tolerance: float) -> None:
     found = solve(known)
     np.testing.assert_allclose(found.x, known.optimum, atol=tolerance)
+    np.testing.assert_allclose(found.x, by_nlopt(known), atol=tolerance)
     assert found.violation == 0.0
 
 
 def test_hundreds_of_constraints() -> None:
     known = many(40, 120)
     found = solve(known)
-    np.testing.assert_allclose(found.x, known.optimum, atol=5e-2)
+    np.testing.assert_allclose(found.x, known.optimum, atol=2e-2)
     assert found.loss == pytest.approx(known.loss(known.optimum)[0], rel=1e-4)
 
 
@@ -57,3 +90,75 @@ def test_failed_evaluations_bring_the_asymptotes_closer() -> None:
     radii = [e.radius for e in failed]
     assert radii[0] > radii[1] > radii[2]
     np.testing.assert_allclose(found.x, known.optimum, atol=1e-2)
+
+
+def test_a_subproblem_without_solution_ends_the_run_with_the_best_design(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved: list[Separable] = []
+
+    def fragile(subproblem: Separable) -> tuple[np.ndarray, np.ndarray]:
+        solved.append(subproblem)
+        if len(solved) > 8:
+            raise UnsolvedError("no convergence")
+        return minimise_separable(subproblem)
+
+    monkeypatch.setattr("sim.optimise.mma.minimise_separable", fragile)
+    found = solve(cantilever())
+    assert found.reason == "no convergence"
+    assert found.loss == min(e.loss for e in found.evaluations)
+    assert found.violation == 0.0
+
+
+def test_more_digits_than_there_are_is_an_error() -> None:
+    with pytest.raises(UnsolvedError, match="asymptotes"):
+        minimise_separable(separable(5, 3), tolerance=0.0)
+
+
+def separable(size: int, count: int, seed: int = 0) -> Separable:
+    """A random subproblem; its centre is feasible."""
+    random = np.random.default_rng(seed)
+    shape = (count + 1, size)
+    up, down = (sp.csr_array(random.uniform(0, 1, shape) ** 3) for _ in range(2))
+    return Separable(
+        centre=np.zeros(size),
+        distance=np.full(size, 1.0),
+        low=np.full(size, -0.9),
+        high=np.full(size, 0.9),
+        up=up,
+        down=down,
+        at_centre=np.concatenate([[1.0], -random.uniform(0, 0.05, count)]),
+    )
+
+
+@pytest.mark.parametrize(("size", "count"), [(30, 6), (6, 30), (8, 0)])
+def test_subproblem_satisfies_its_optimality_conditions(size: int, count: int) -> None:
+    problem = separable(size, count)
+    x, price = minimise_separable(problem)
+    values = problem.values(x)[1:]
+    slope = problem.slopes(x).T @ np.concatenate([[1.0], price])
+    inside = (x > problem.low + 1e-6) & (x < problem.high - 1e-6)
+    np.testing.assert_allclose(slope[inside], 0, atol=1e-6)
+    assert (slope[x <= problem.low + 1e-6] >= -1e-6).all()
+    assert (slope[x >= problem.high - 1e-6] <= 1e-6).all()
+    assert (values <= 1e-7).all()
+    np.testing.assert_allclose(price * values, 0, atol=1e-6)
+    assert (price >= 0).all()
+
+
+def test_subproblem_slopes_and_curvature_agree_with_differences() -> None:
+    problem = separable(5, 3)
+    x, step = np.linspace(-0.5, 0.5, 5), 1e-5
+    weights = np.array([1.0, 0.3, 0.2, 0.7])
+    ahead, behind = (problem.values(x + sign * step * np.eye(5)[1]) for sign in (1, -1))
+    np.testing.assert_allclose(
+        problem.slopes(x).toarray()[:, 1], (ahead - behind) / (2 * step), rtol=1e-7
+    )
+    ahead, behind = (problem.slopes(x + sign * step * np.eye(5)[1]) for sign in (1, -1))
+    bend = ((ahead - behind).T @ weights)[1] / (2 * step)
+    assert problem.curvature(x, weights)[1] == pytest.approx(bend, rel=1e-4)
+
+
+def test_replacements_touch_the_functions_at_the_centre() -> None:
+    problem = separable(7, 4)
+    np.testing.assert_allclose(problem.values(problem.centre), problem.at_centre)

@@ -1,0 +1,227 @@
+"""Convex separable subproblem of the method of moving asymptotes, by a primal-dual interior point.
+
+    minimise    g_0(x) + weight * sum(y)
+    subject to  g_i(x) <= y_i,  y >= 0,  low <= x <= high
+    with        g_i(x) = at_centre_i + sum_j up_ij r(U_j - x_j) + down_ij r(x_j - L_j),
+                r(gap) = 1/gap - 1/d_j,  U = centre + d,  L = centre - d.
+
+The elastic variables y make it solvable whatever the constraints are. The Newton systems (Svanberg
+2007, "MMA and GCMMA", section 5) are reduced to the variables or to the constraints, whichever are
+fewer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve
+
+from sim.core import Floats
+
+GROWTH = 10.0
+"""Growth of the residual that a Newton step may cause; insisting on descent makes steps tiny."""
+
+WEIGHT = 1000.0
+"""Price of violating a constraint, relative to the steepest slope of the objective."""
+
+
+class UnsolvedError(ArithmeticError):
+    """The interior point of a subproblem does not converge."""
+
+
+@dataclass(frozen=True)
+class Separable:
+    """The functions of the subproblem; row 0 is the objective.
+
+    Attributes:
+        centre, distance, low, high: (n,) expansion point, distance to the poles, bounds.
+        up, down: (1 + m, n) coefficients, >= 0.
+        at_centre: (1 + m,) values at the centre.
+    """
+
+    centre: Floats
+    distance: Floats
+    low: Floats
+    high: Floats
+    up: sp.csr_array
+    down: sp.csr_array
+    at_centre: Floats
+
+    def values(self, x: Floats) -> Floats:
+        """All functions (1 + m,)."""
+        above, below = self._gaps(x)
+        rise, fall = 1 / above - 1 / self.distance, 1 / below - 1 / self.distance
+        return self.at_centre + self.up @ rise + self.down @ fall
+
+    def slopes(self, x: Floats) -> sp.csr_array:
+        """Their derivatives (1 + m, n)."""
+        above, below = self._gaps(x)
+        return sp.csr_array(self.up.multiply(above**-2) - self.down.multiply(below**-2))
+
+    def curvature(self, x: Floats, multipliers: Floats) -> Floats:
+        """Diagonal (n,) of the Hessian of their sum, weighted with ``multipliers`` (1 + m,)."""
+        above, below = self._gaps(x)
+        return 2 * (self.up.T @ multipliers * above**-3 + self.down.T @ multipliers * below**-3)
+
+    def _gaps(self, x: Floats) -> tuple[Floats, Floats]:
+        return self.centre + self.distance - x, x - self.centre + self.distance
+
+
+@dataclass(frozen=True)
+class _State:
+    """Unknowns of the interior point; all but x are positive.
+
+    Attributes:
+        x: (n,) variables.
+        y, slack: (m,) elastic variables and slacks of the constraints.
+        price, floor: (m,) multipliers of the constraints and of y >= 0.
+        left, right: (n,) multipliers of the bounds.
+    """
+
+    x: Floats
+    y: Floats
+    slack: Floats
+    price: Floats
+    floor: Floats
+    left: Floats
+    right: Floats
+
+    def moved(self, step: _State, length: float) -> _State:
+        return _State(
+            *(getattr(self, f.name) + length * getattr(step, f.name) for f in fields(self))
+        )
+
+
+def minimise_separable(problem: Separable, tolerance: float = 1e-8) -> tuple[Floats, Floats]:
+    """Solves the subproblem; returns x (n,) and the multipliers (m,) of the constraints.
+
+    Raises:
+        UnsolvedError: no convergence: numbers of wildly different scales, or too small a tolerance.
+    """
+    scale = float(np.abs(problem.slopes(problem.centre)[[0]].data).max(initial=0.0)) or 1.0
+    solver = _InteriorPoint(_scaled(problem, scale))
+    state = solver.start()
+    barrier = 1.0
+    for _ in range(300):
+        residual = solver.residual(state, barrier)
+        if np.abs(residual).max() < 0.9 * barrier:
+            if barrier <= tolerance:
+                return state.x, state.price * scale
+            barrier /= 10
+        state = solver.advance(state, barrier)
+    raise UnsolvedError("the subproblem of moving asymptotes did not converge")
+
+
+def _scaled(problem: Separable, scale: float) -> Separable:
+    factor = np.ones(len(problem.at_centre))
+    factor[0] = 1 / scale
+    rows = sp.diags_array(factor)
+    return Separable(
+        problem.centre,
+        problem.distance,
+        problem.low,
+        problem.high,
+        sp.csr_array(rows @ problem.up),
+        sp.csr_array(rows @ problem.down),
+        factor * problem.at_centre,
+    )
+
+
+class _InteriorPoint:
+    def __init__(self, problem: Separable) -> None:
+        self.problem = problem
+        self.count = len(problem.at_centre) - 1
+
+    def start(self) -> _State:
+        low, high = self.problem.low, self.problem.high
+        x = np.clip(self.problem.centre, 0.9 * low + 0.1 * high, 0.1 * low + 0.9 * high)
+        ones = np.ones(self.count)
+        return _State(
+            x, ones, ones, ones, ones * WEIGHT / 2,
+            np.maximum(1.0, 1 / (x - low)), np.maximum(1.0, 1 / (high - x)),
+        )  # fmt: skip
+
+    def residual(self, state: _State, barrier: float) -> Floats:
+        """Optimality conditions with complementarity relaxed to ``barrier``, all in one vector."""
+        problem, weights = self.problem, np.concatenate([[1.0], state.price])
+        return np.concatenate(
+            [
+                problem.slopes(state.x).T @ weights - state.left + state.right,
+                WEIGHT - state.price - state.floor,
+                problem.values(state.x)[1:] - state.y + state.slack,
+                state.left * (state.x - problem.low) - barrier,
+                state.right * (problem.high - state.x) - barrier,
+                state.floor * state.y - barrier,
+                state.price * state.slack - barrier,
+            ]
+        )
+
+    def advance(self, state: _State, barrier: float) -> _State:
+        """One damped Newton step towards the central path."""
+        step = self._newton(state, barrier)
+        length = self._room(state, step)
+        before = np.linalg.norm(self.residual(state, barrier))
+        for _ in range(50):
+            trial = state.moved(step, length)
+            if np.linalg.norm(self.residual(trial, barrier)) < GROWTH * before:
+                break
+            length /= 2
+        return trial
+
+    def _newton(self, state: _State, barrier: float) -> _State:
+        problem = self.problem
+        below, above = state.x - problem.low, problem.high - state.x
+        weights = np.concatenate([[1.0], state.price])
+        slopes = problem.slopes(state.x)
+        matrix = slopes[1:]
+        diagonal = problem.curvature(state.x, weights) + state.left / below + state.right / above
+        give = state.slack / state.price + state.y / state.floor
+        push = -(slopes.T @ weights - barrier / below + barrier / above)
+        pull = -(
+            problem.values(state.x)[1:]
+            - state.y
+            + barrier / state.price
+            + state.y * (WEIGHT - state.price) / state.floor
+            - barrier / state.floor
+        )
+        dx, price = _saddle(diagonal, matrix, give, push, pull)
+        floor = WEIGHT - state.price - price - state.floor
+        return _State(
+            x=dx,
+            y=barrier / state.floor - state.y - state.y * floor / state.floor,
+            slack=barrier / state.price - state.slack - state.slack * price / state.price,
+            price=price,
+            floor=floor,
+            left=barrier / below - state.left - state.left * dx / below,
+            right=barrier / above - state.right + state.right * dx / above,
+        )
+
+    def _room(self, state: _State, step: _State) -> float:
+        """Longest step, at most 1, that keeps everything positive by a margin."""
+        pairs = [
+            (getattr(state, name), getattr(step, name))
+            for name in ("y", "slack", "price", "floor", "left", "right")
+        ]
+        pairs += [
+            (state.x - self.problem.low, step.x),
+            (self.problem.high - state.x, -step.x),
+        ]
+        closing = max(float(np.max(-change / value, initial=0.0)) for value, change in pairs)
+        return 1.0 / max(1.0, 1.01 * closing)
+
+
+def _saddle(
+    diagonal: Floats, matrix: sp.csr_array, give: Floats, push: Floats, pull: Floats
+) -> tuple[Floats, Floats]:
+    """Solves diagonal dx + matrix^T dp = push and matrix dx - give dp = pull."""
+    if matrix.shape[0] < matrix.shape[1]:
+        scaled = matrix.multiply(1 / diagonal)
+        schur = (scaled @ matrix.T).toarray() + np.diag(give)
+        dp = cho_solve(cho_factor(schur), scaled @ push - pull)
+        return (push - matrix.T @ dp) / diagonal, dp
+    scaled = sp.csr_array(matrix.multiply((1 / give)[:, None]))
+    schur = (matrix.T @ scaled).toarray() + np.diag(diagonal)
+    dx = cho_solve(cho_factor(schur), push + scaled.T @ pull)
+    return dx, (matrix @ dx - pull) / give
