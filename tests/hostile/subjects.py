@@ -19,7 +19,6 @@ from pipeline.calibration.inputs import Calibration, csv_readings
 from pipeline.datasets.tables import TABLES, Kind
 from pipeline.fabrication.papers import manifest
 from pipeline.posing import scene_of
-from pipeline.posing.to_scene import TIME_SERIES_COLUMNS
 from pipeline.problem import canonical_json
 from pipeline.problem.fields import units
 from pipeline.problem.reading import joint_figure, load, section
@@ -130,7 +129,7 @@ def _driven(text: str) -> str:
 
 def _motion(folder: Path) -> Path:
     rows = "\n".join(f"{k / 10},{-k / 30},0,0" for k in range(11))
-    return _text("motion.csv", ",".join(TIME_SERIES_COLUMNS) + f"\n{rows}\n", folder)
+    return _text("motion.csv", f"time (s),ux (mm),uy (mm),theta (rad)\n{rows}\n", folder)
 
 
 def _lattice(suffix: str, folder: Path) -> Path:

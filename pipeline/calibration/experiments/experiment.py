@@ -14,6 +14,8 @@ Kind = Literal["force_displacement", "free_decay", "track"]
 
 _UNSEEN = 1e-8
 
+LEAST_LINES = 5
+"""Lines of a file of readings that any fit needs."""
 ELASTIC: tuple[Name, ...] = (
     "axial_stiffness",
     "shear_stiffness",

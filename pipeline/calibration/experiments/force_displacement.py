@@ -10,14 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
+from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
 from pipeline.calibration.experiments.simulated_experiment import (
     KnownDrive,
     Seen,
     SpecimenSimulation,
 )
-from pipeline.calibration.inputs import Constants, ForceDisplacement, Name, csv_readings
-from pipeline.problem.fields import units
+from pipeline.calibration.inputs import Constants, ForceDisplacement, Name
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
@@ -40,7 +40,7 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
     assert asked.file is not None
     path = folder / asked.file
     wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
-    displacement, force = csv_readings.read(path, wanted).T
+    displacement, force = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
     if not (np.abs(displacement) > 0).any():
         remedy = "give a test in which the top row moves"
         raise UserError("the displacement is zero throughout", file=path, remedy=remedy)

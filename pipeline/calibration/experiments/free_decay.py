@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import detrend, find_peaks
 
-from pipeline.calibration.experiments.experiment import MeasuredValues
-from pipeline.calibration.inputs import Constants, FreeDecay, Name, csv_readings
-from pipeline.problem.fields import units
+from pipeline.calibration.experiments.experiment import LEAST_LINES, MeasuredValues
+from pipeline.calibration.inputs import Constants, FreeDecay, Name
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
 
@@ -46,7 +46,7 @@ def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
     assert asked.file is not None
     path = folder / asked.file
     wanted = {asked.columns.time: units.TIME, asked.columns.angle: units.ANGLE}
-    time, angle = csv_readings.read(path, wanted).T
+    time, angle = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
     key, remedy = asked.columns.time, "sort the lines by time, each time once"
     if (np.diff(time) <= 0).any():
         line = int(np.argmax(np.diff(time) <= 0)) + 2

@@ -1,4 +1,3 @@
-from . import csv_readings as csv_readings
 from .computed_measurements import Error as Error
 from .constants import UNITS as UNITS
 from .constants import WRITTEN as WRITTEN

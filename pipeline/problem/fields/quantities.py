@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.problem.fields import units
+from pipeline.runtime import UserError
 
 SIM_UNITS = {"sim_units": True}
 """Validation context that takes bare floats as they are: for problems read back from a dataset."""
@@ -35,8 +36,8 @@ def _reader(dimension: units.Dimension, minimum: float | None, exclusive: bool) 
             return float(value)
         try:
             number = units.parse(value, dimension)
-        except units.QuantityError as error:
-            raise fault(error.what, error.remedy) from error
+        except UserError as error:
+            raise fault(error.what, str(error.remedy)) from error
         if minimum is not None and (number < minimum or (exclusive and number == minimum)):
             bound = "greater than zero" if exclusive else "zero or more"
             raise fault(f"{dimension.name} must be {bound}", f"give a value {bound}, {example}")

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from pipeline.runtime import UserError
+
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
@@ -68,15 +70,6 @@ ROTARY_DAMPING = Dimension(
 )
 
 
-class QuantityError(ValueError):
-    """A quantity that cannot be read; `remedy` says how to write it."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.what = what
-        self.remedy = remedy
-
-
 @lru_cache(maxsize=1)
 def _registry() -> UnitRegistry:
     from pint import UnitRegistry
@@ -94,21 +87,21 @@ def parse(text: object, dimension: Dimension) -> float:
     """The quantity `text` as a float in the working unit of `dimension`.
 
     Raises:
-        QuantityError: no unit, an unknown one, one of another dimension, or no finite number.
+        UserError: no unit, an unknown one, one of another dimension, or no finite number.
     """
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
-        raise QuantityError("not a quantity", wanted)
+        raise UserError("not a quantity", remedy=wanted)
     match = _QUANTITY.fullmatch(str(text)[:_LONGEST])
     if match is None:
-        raise QuantityError("not a number with a unit", wanted)
+        raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
-        raise QuantityError(f"unknown unit {match['rest']!r}", wanted)
+        raise UserError(f"unknown unit {match['rest']!r}", remedy=wanted)
     if match["unit"] is None:
-        raise QuantityError("the unit is missing", wanted)
+        raise UserError("the unit is missing", remedy=wanted)
     value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
     if not math.isfinite(value):
-        raise QuantityError("not a finite number", wanted)
+        raise UserError("not a finite number", remedy=wanted)
     return value
 
 
@@ -120,8 +113,8 @@ def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit))
     except UndefinedUnitError as error:
-        raise QuantityError(f"unknown unit {unit!r}", wanted) from error
+        raise UserError(f"unknown unit {unit!r}", remedy=wanted) from error
     for accepted in (dimension.unit, *dimension.also):
         if given.is_compatible_with(accepted):
             return float(given.to(accepted).magnitude)
-    raise QuantityError(f"the unit {unit!r} is not that of {dimension.name}", wanted)
+    raise UserError(f"the unit {unit!r} is not that of {dimension.name}", remedy=wanted)

@@ -1,7 +1,5 @@
 from . import formula as formula
-from .images import ImageError as ImageError
 from .images import read_outlines as read_outlines
-from .network_files import NetworkError as NetworkError
 from .network_files import read_network as read_network
 from .plane import Outline as Outline
 from .plane import Point as Point

@@ -15,7 +15,8 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
-from pipeline.problem.outlines import NetworkError, read_network
+from pipeline.problem.outlines import read_network
+from pipeline.runtime import UserError
 from sim.structure import kagome, listed, quads
 
 if TYPE_CHECKING:
@@ -202,8 +203,8 @@ class ListedNetwork(Section):
             polygons, ligaments = read_network(Path(folder) / self.file)
             made = self.model_copy(update={"polygons": polygons, "ligaments": ligaments})
             made.network()
-        except NetworkError as error:
-            raise fault(error.what, error.remedy, "file") from error
+        except UserError as error:
+            raise fault(error.what, str(error.remedy), "file") from error
         except ValueError as error:
             remedy = "end every ligament at a corner of a unit"
             raise fault(str(error), remedy, "file") from error

@@ -22,7 +22,6 @@ from pipeline.problem.fields import (
     fault,
 )
 from pipeline.problem.outlines import (
-    ImageError,
     Outline,
     Point,
     box_middle,
@@ -32,6 +31,7 @@ from pipeline.problem.outlines import (
     read_outlines,
     turned,
 )
+from pipeline.runtime import UserError
 
 
 def _centre_tag(value: object) -> str:
@@ -237,8 +237,8 @@ class Image(Section):
         folder = (info.context or {}).get(FOLDER, ".")
         try:
             outlines = read_outlines(Path(folder) / self.file)
-        except ImageError as error:
-            raise fault(error.what, error.remedy, "file") from error
+        except UserError as error:
+            raise fault(error.what, str(error.remedy), "file") from error
         return self.model_copy(update={"read": outlines})
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.calibration.experiments.experiment import MeasuredValues
-from pipeline.calibration.inputs import csv_readings
-from pipeline.problem.fields import units
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
@@ -29,7 +28,7 @@ def refused(text: str, folder: Path) -> UserError:
     path = folder / "readings.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as caught:
-        csv_readings.read(path, WANTED)
+        csv_columns.read_quantities(path, WANTED, least=5)
     assert caught.value.file == str(path)
     assert caught.value.remedy
     return caught.value
@@ -38,7 +37,7 @@ def refused(text: str, folder: Path) -> UserError:
 def test_units_of_columns_are_minded(tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
     path.write_text(f"# a comment\nforce [kN];displacement (cm)\n{ROWS.replace(',', ';')}\n")
-    found = csv_readings.read(path, WANTED)
+    found = csv_columns.read_quantities(path, WANTED, least=5)
     np.testing.assert_allclose(found[0], [20.0, 1000.0])
 
 
