@@ -3,6 +3,7 @@ from .cloak_reduction import reduction as reduction
 from .compared_quantities import middle_units as middle_units
 from .compared_quantities import quantities as quantities
 from .comparison_dataset import Compared as Compared
+from .comparison_dataset import attributes as attributes
 from .comparison_dataset import dataset as dataset
 from .measured_side import measurement as measurement
 from .nominal_side import along as along
@@ -12,4 +13,3 @@ from .registration import measured_places as measured_places
 from .registration import pixel_size as pixel_size
 from .registration import register as register
 from .simulated_side import simulation as simulation
-from .wording import words as words

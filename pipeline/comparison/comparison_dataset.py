@@ -11,10 +11,11 @@ from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
 from pipeline.comparison.curves import Sides
 from pipeline.comparison.measured_side import Measurement
-from pipeline.comparison.metrics import METRICS, Pair, estimates
+from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimates
 from pipeline.comparison.nominal_side import ComparisonAxis, Nominal
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
+from pipeline.problem import Problem
 from sim.core import Floats
 
 SEED = 0
@@ -22,6 +23,20 @@ SEED = 0
 _MOTION = ("time", "unit", "dof")
 _OF_SIDE = ("side", "dof", "estimate")
 Variables = dict[str, tuple[Any, ...]]
+
+_BY_TIME = (
+    "cross-correlation of the measured and the nominal motion of the driven units, refined below a"
+    " frame by golden section"
+)
+_BY_LOAD = (
+    "equal displacement of the driven units along the drive is equal load, both on the way there"
+    " and back"
+)
+_AMBIGUOUS = "; other lags are as good: the nearest to the video's start was taken"
+_DRIVING = (
+    "each degree of freedom of the driven and clamped units by a smoothing spline that departs from"
+    " the track by its standard uncertainty"
+)
 
 
 class Compared(NamedTuple):
@@ -204,3 +219,42 @@ def root_mean_square(values: Floats, axis: int) -> Floats:
     total = np.where(known, values, 0.0) ** 2
     mean = total.sum(axis=axis) / np.maximum(count, 1)
     return np.where(count > 0, np.sqrt(mean), np.nan)
+
+
+def attributes(asked: Problem, made: Compared) -> dict[str, str]:
+    """Describes in words how the sides were brought together, and how the band was drawn.
+
+    Args:
+        asked: the problem, with the tolerances of the band.
+        made: the comparison.
+    """
+    lag = made.axis.lag
+    ambiguous = lag is not None and lag.ambiguous
+    return {
+        "axis": "load" if lag is None else "time",
+        "alignment": (_BY_LOAD if lag is None else _BY_TIME) + (_AMBIGUOUS if ambiguous else ""),
+        "resampling": _resampling(made),
+        "driving": _DRIVING,
+        "band": _band(asked, made),
+        "bootstrap": f"{COPIES} copies over units and blocks of frames, with the measurement's"
+        f" noise; {100 * LEVEL:g} % intervals; seed {SEED}",
+    }
+
+
+def _resampling(made: Compared) -> str:
+    kept, whole = len(made.measurement.frames), made.measurement.track.sizes["time"]
+    return (
+        f"none of the measurement ({kept} of {whole} frames); the redriven simulation is asked for"
+        " at the frames; the response of the study is a cubic spline through its samples"
+    )
+
+
+def _band(asked: Problem, made: Compared) -> str:
+    shares = asked.tolerances.model_dump(exclude={"assembly"})
+    sizes = ", ".join(f"{name} {size:g}" for name, size in shares.items())
+    off = asked.tolerances.assembly
+    places = f"assembly {off.shift:g} mm and {np.rad2deg(off.turn):.2g} deg"
+    samples = len(made.simulation.copies)
+    return (
+        f"{100 * made.level:g} % of {samples} imperfect copies ({sizes}, {places}), at each instant"
+    )

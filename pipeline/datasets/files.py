@@ -11,9 +11,8 @@ import psutil
 import xarray as xr
 
 from pipeline.datasets import seal
-from pipeline.datasets.migration import MIGRATED, migrated
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind, Variable
-from pipeline.datasets.validation import faults
+from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
+from pipeline.datasets.validation import MIGRATED, faults, migrate
 from pipeline.runtime import UserError, write_atomically
 
 _CHUNK = bytes(1 << 20)
@@ -79,7 +78,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     except _UNREADABLE as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
     _check_origin(dataset, path, kind, remedy)
-    dataset = migrated(dataset, kind)
+    dataset = migrate(dataset, kind)
     for fault in faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
     if dataset.attrs.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
@@ -144,7 +143,7 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
     labels = [name for name in names if name in table and table[name].coordinate]
     attributes = {
         "Conventions": "CF-1.11",
-        "title": TITLES[kind],
+        "title": SCHEMAS[kind].title,
         "kind": kind,
         "schema_version": SCHEMA_VERSION,
         **dataset.attrs,

@@ -1,4 +1,4 @@
-"""Whether a dataset is what its table says: the first thing that is not, in words."""
+"""Checks datasets against their tables, those of older versions as if they were written today."""
 
 from __future__ import annotations
 
@@ -8,9 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
+from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
 
 _KINDS = {"float64": "f", "float32": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
+MIGRATED = (1,)
+"""Versions that are read besides the present one."""
+
+_SPELT = {"deg": "degree", "px": "1"}
+_WORDS = ("px, mm", "as in constraint_units")
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
             yield from _variable_faults(dataset.variables[name], name, variable)
     for unknown in dataset.variables.keys() - table.keys():
         yield SchemaFault(f"a {kind} dataset has no such variable", str(unknown))
-    for name, meaning in ATTRIBUTES[kind].items():
+    for name, meaning in SCHEMAS[kind].attributes.items():
         if name not in dataset.attrs:
             yield SchemaFault(f"the attribute is missing ({meaning})", name)
 
@@ -81,3 +86,23 @@ def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:
 
 def _tuple(names: object) -> str:
     return "(" + ", ".join(map(str, names)) + ")"  # type: ignore[call-overload]
+
+
+def migrate(dataset: xr.Dataset, kind: Kind) -> xr.Dataset:
+    """Gives a dataset the attributes of the present version.
+
+    Version 1 had the same variables in the same units, which it spelled for people only, and no
+    title.
+    """
+    if dataset.attrs["schema_version"] == SCHEMA_VERSION:
+        return dataset
+    for name, table in TABLES[kind].items():
+        if name in dataset.variables:
+            _respell(dataset[name].attrs, table)
+    return dataset.assign_attrs(schema_version=SCHEMA_VERSION, title=SCHEMAS[kind].title)
+
+
+def _respell(attributes: dict[str, object], table: Variable) -> None:
+    units = str(attributes.pop("units", table.units))
+    units = table.units if units in _WORDS else _SPELT.get(units, units)
+    attributes[table.unit_attribute] = units

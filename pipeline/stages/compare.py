@@ -16,6 +16,7 @@ from pipeline import datasets, problem
 from pipeline.comparison import (
     Compared,
     along,
+    attributes,
     axis,
     dataset,
     measurement,
@@ -23,7 +24,6 @@ from pipeline.comparison import (
     pixel_size,
     quantities,
     simulation,
-    words,
 )
 from pipeline.datasets import provenance
 from pipeline.posing import read_design, scene_of, structures_of
@@ -154,7 +154,7 @@ def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, st
         "title": recording.title or f"{recording.structure} structure",
         "structure": recording.structure,
         "case": str(recording.case),
-        **words(asked, made),
+        **attributes(asked, made),
     }
 
 

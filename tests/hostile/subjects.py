@@ -15,12 +15,12 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration.inputs import Calibration, csv_readings
+from pipeline.calibration.inputs import Calibration
 from pipeline.datasets.tables import TABLES, Kind
 from pipeline.fabrication.papers import manifest
 from pipeline.posing import scene_of
 from pipeline.problem import canonical_json
-from pipeline.problem.fields import units
+from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.reading import joint_figure, load, section
 from pipeline.problem.sections import Codec
 from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
@@ -235,7 +235,7 @@ def _cloud(path: Path) -> Told:
 
 def _readings(path: Path) -> Told:
     wanted = {"displacement": units.LENGTH, "force": units.FORCE}
-    return list(csv_readings.read(path, wanted).tolist())
+    return list(csv_columns.read_quantities(path, wanted).tolist())
 
 
 def _from_study(name: str) -> Callable[[Path], Path]:

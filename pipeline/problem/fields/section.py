@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import ClassVar
@@ -10,8 +12,10 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validato
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from pipeline.problem.fields.key_docs import lead, meanings
 from pipeline.problem.fields.quantities import fault
+
+_ATTRIBUTES = re.compile(r"\n*^Attributes:\n", re.MULTILINE)
+_KEY = re.compile(r"^    (\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
 
 
 class Section(BaseModel):
@@ -28,8 +32,8 @@ class Section(BaseModel):
         """The schema, in which every key has the meaning that the docstring tells."""
         made = handler(core_schema)
         whole = handler.resolve_ref_schema(made)
-        whole["description"] = lead(cls)
-        told = meanings(cls)
+        whole["description"] = _lead(cls)
+        told = _meanings(cls)
         for name, field in cls.model_fields.items():
             if (key := field.alias or name) in whole["properties"] and name in told:
                 whole["properties"][key]["description"] = told[name]
@@ -59,3 +63,22 @@ def exactly_one(section: Section, *names: str) -> None:
     if len(given) != 1:
         what = "nothing given" if not given else f"{' and '.join(given)} exclude each other"
         raise fault(what, f"give exactly one of: {', '.join(names)}")
+
+
+def _lead(section: type) -> str:
+    """Takes the text before the attributes from a docstring, a line for each paragraph."""
+    told = _ATTRIBUTES.split(inspect.cleandoc(section.__doc__ or ""))[0]
+    return "\n\n".join(map(_on_one_line, told.split("\n\n")))
+
+
+def _meanings(section: type) -> dict[str, str]:
+    """Takes the meaning of each attribute from the docstrings, those of the bases first."""
+    found: dict[str, str] = {}
+    for base in reversed(section.__mro__):
+        listed = _ATTRIBUTES.split(inspect.cleandoc(base.__doc__ or ""))[1:]
+        found |= {key: _on_one_line(told) for part in listed for key, told in _KEY.findall(part)}
+    return found
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())

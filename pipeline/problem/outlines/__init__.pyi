@@ -1,9 +1,10 @@
-from . import formula as formula
 from .images import read_outlines as read_outlines
 from .network_files import read_network as read_network
+from .plane import FormulaError as FormulaError
 from .plane import Outline as Outline
 from .plane import Point as Point
 from .plane import box_middle as box_middle
+from .plane import compile_formula as compile_formula
 from .plane import extents as extents
 from .plane import inside as inside
 from .plane import placed as placed

@@ -22,11 +22,12 @@ from pipeline.problem.fields import (
     fault,
 )
 from pipeline.problem.outlines import (
+    FormulaError,
     Outline,
     Point,
     box_middle,
+    compile_formula,
     extents,
-    formula,
     placed,
     read_outlines,
     turned,
@@ -187,14 +188,14 @@ class Formula(Section):
         for name in ("x", "y"):
             try:
                 values = self._along(getattr(self, name))
-            except formula.FormulaError as error:
+            except FormulaError as error:
                 raise fault(str(error), 'write e.g. "16 * sin(t)^3"', name) from error
             if max(values) == min(values):
                 raise fault("the curve has no extent", "let the formula depend on t", name)
         return self
 
     def _along(self, text: str) -> list[float]:
-        function = formula.compiled(text)
+        function = compile_formula(text)
         return [function(2 * math.pi * k / self.points) for k in range(self.points)]
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
