@@ -1,4 +1,4 @@
-"""The dataset `calibration`, and the lines that a problem file takes from it."""
+"""Writes the dataset `calibration`, and the lines that a problem file takes from it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sim.core import Floats
 
 
 def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
-    """The dataset of a fit, and the values in it.
+    """Assembles the dataset of a fit, and the values in it.
 
     Raises:
         SimulationError: an equilibrium on the way is not stable.
@@ -62,7 +62,7 @@ def _by_peaks(each: Experiment) -> tuple[float, float]:
 
 
 def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
-    """All measured values with what the fit makes of them."""
+    """Lists all measured values with their fit."""
     every = [each.measured for each in fit.model.experiments]
     return {
         "set_of_point": ("point", fit.model.set_of_row),
@@ -83,7 +83,7 @@ def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
-    """The lines `material:` of a problem file, the interval of each fitted value beside it."""
+    """Writes the lines `material:` of a problem file, with the interval of each fitted value."""
     here = fit.model.constants(fit.unknowns)
     told = {
         name: "  # not determined by the data"

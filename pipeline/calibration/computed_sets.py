@@ -1,4 +1,4 @@
-"""Computed measurements: what sets would be if the constants were known, with noise."""
+"""Computes measurements from known constants, with noise."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ YAML = "calibration.yaml"
 
 
 def truth(asked: Calibration) -> Constants:
-    """The constants that computed data are made with."""
+    """Returns the constants that computed data are made with."""
     assert asked.virtual is not None
     return start(asked)._replace(material=asked.virtual.truth, cutoff=asked.virtual.cutoff_angle)
 
@@ -38,7 +38,7 @@ def truth(asked: Calibration) -> Constants:
 def forces_of(
     asked: ForceDisplacement, true: Constants, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Displacements in mm and noisy forces in N."""
+    """Simulates a test: displacements in mm and noisy forces in N."""
     assert asked.virtual is not None
     displacement = np.linspace(0.0, asked.virtual.end, asked.virtual.points + 1)[1:]
     force = force_displacement.simulation(asked, true, displacement).predict(true)
@@ -48,7 +48,7 @@ def forces_of(
 def decay_of(
     asked: FreeDecay, true: Constants, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Times in s and noisy angles in rad, of the oscillation about one hinge."""
+    """Computes times in s and noisy angles in rad, of the oscillation about one hinge."""
     given = asked.virtual
     assert given is not None
     inertia = UNROTATED_MOMENT * true.material.density * true.spacing**4
@@ -93,7 +93,7 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
 def _written(
     each: Set, path: Path, true: Constants, random: np.random.Generator, folder: Path
 ) -> str:
-    """The name of the file that a set was written to; `path` is the calibration's."""
+    """Writes a set, and returns the name of its file; `path` is the calibration's."""
     name = f"{each.name}.csv"
     if isinstance(each, ForceDisplacement):
         columns = (f"{each.columns.displacement} (mm)", f"{each.columns.force} (N)")

@@ -1,4 +1,4 @@
-"""A computed track: a study's structure under its own drive, seen with noise."""
+"""Simulates a study's structure under its own drive, and adds a tracker's noise."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sim.structure import Material
 def track_of(
     asked: TrackedMotion, folder: Path, true: Constants, random: np.random.Generator
 ) -> xr.Dataset:
-    """The dataset `track` of the initial structure of a study, made of the true constants.
+    """Simulates the `track` of a study's initial structure, made of the true constants.
 
     Raises:
         UserError: the problem is wrong.
@@ -46,7 +46,7 @@ def track_of(
 
 
 def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
-    """The scene made of the true constants, to be simulated much finer than a fit would."""
+    """Poses the scene made of the true constants, to be simulated much finer than in a fit."""
     scene = made.scene
     axial, shear, bending, translation, rotation = true.numbers
     constants = Material(
@@ -63,7 +63,7 @@ def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
 
 
 def _motion(posed: Scene, case: int, time: Floats) -> Floats:
-    """Motion (n_times, n_units, 3) without noise."""
+    """Computes the motion (n_times, n_units, 3) without noise."""
     plan = make_plan(posed, posed.lattice.vertices, time, every_case=True)
     values, drive = concrete_parameters(posed, posed.lattice.vertices), posed.drives[case]
     _, _, record = solve_case(plan.solver, values, drive)
@@ -74,7 +74,7 @@ def _motion(posed: Scene, case: int, time: Floats) -> Floats:
 def _force(
     made: TrackedSpecimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
 ) -> Floats:
-    """Force (n_times,) of the drive along its direction, N.
+    """Computes the force (n_times,) of the drive along its direction, N.
 
     Raises:
         UserError: it has no direction.

@@ -1,4 +1,4 @@
-"""From the YAML of a calibration and its files to a fit."""
+"""Fits constants to the sets that the YAML of a calibration names."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ AGREED = 0.2
 
 
 def fitted(asked: Calibration, path: Path) -> Fit:
-    """The fit that a calibration asks for.
+    """Fits the constants of a calibration.
 
     Args:
         asked: the calibration.
@@ -60,14 +60,14 @@ def fitted(asked: Calibration, path: Path) -> Fit:
 
 
 def unsimulated(error: SimulationError, path: Path) -> UserError:
-    """What it means that measured states cannot be simulated."""
+    """Explains that measured states cannot be simulated."""
     remedy = "check lattice, displacements and the values in material that the fit starts from"
     what = f"the measured states cannot be simulated: {error}"
     return UserError(what, file=path, key="data", remedy=remedy)
 
 
 def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
-    """One set as an experiment.
+    """Reads one set as an experiment.
 
     Raises:
         UserError: its file cannot be used.
@@ -89,7 +89,7 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
 
 
 def settled(model: Model) -> Fit:
-    """The fit with steps in time, and an effect of the drives' noise, that suit what it finds."""
+    """Fits with steps in time, and an effect of the drives' noise, that suit the result."""
     if not any(isinstance(each, FullFieldExperiment) for each in model.experiments):
         return fit(model)
     found = fit(_noisy(model, model.begin))
@@ -102,7 +102,7 @@ def settled(model: Model) -> Fit:
 
 
 def _resolved(found: Fit) -> Fit:
-    """The fit with steps in time so short that half of them would move no constant."""
+    """Fits with steps in time so short that half of them would move no constant."""
     for _ in range(_HALVINGS):
         finer = found.model._replace(experiments=[_finer(each) for each in found.model.experiments])
         change = finer.residual(found.unknowns) - found.model.residual(found.unknowns)
@@ -115,13 +115,13 @@ def _resolved(found: Fit) -> Fit:
 
 
 def _moved(found: Fit, change: Floats) -> float:
-    """The largest of the constants' changes, in standard errors."""
+    """Computes the largest of the constants' changes, in standard errors."""
     error = np.sqrt(np.diag(inverted(found.jacobian)))
     return float(np.abs(change / error)[: len(found.model.names)].max())
 
 
 def _noisy(model: Model, at: Constants) -> Model:
-    """The model with what the noise of its drives does at some constants."""
+    """Adds the effect of the drives' noise at some constants to the model."""
     knowing = [
         each.with_drive_noise(at) if isinstance(each, FullFieldExperiment) else each
         for each in model.experiments

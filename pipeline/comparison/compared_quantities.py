@@ -1,4 +1,4 @@
-"""What is followed along a recording: turning, shift, departure from the intact, contraction."""
+"""Computes quantities along a recording: rotation, displacement, mimicking, contraction."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_erro
 
 
 class Quantity(NamedTuple):
-    """A number that units have together.
+    """Holds a number that units have together.
 
     Attributes:
         of: makes it (..., frames) of motions (..., frames, n, 3) in mm and rad.
@@ -33,14 +33,14 @@ class Quantity(NamedTuple):
     sampled: bool = True
 
     def along(self, motion: Floats, units: Ints) -> Floats:
-        """The number (..., frames) of motions (..., frames, n, 3) of units of these places (n,)."""
+        """Computes the number (..., frames) of motions (..., frames, n, 3), units at places (n,)."""
         return self.of(motion if self.less is None else motion - self.less[:, units])
 
 
 def quantities(
     asked: Problem, response: xr.Dataset, time: Floats, inside: Mask
 ) -> dict[str, Quantity]:
-    """What is followed, by its name; without an intact structure there is nothing to mimic.
+    """Lists the quantities by name; without an intact structure there is nothing to mimic.
 
     Args:
         asked: the problem.
@@ -67,29 +67,29 @@ def quantities(
 
 
 def rotation(motion: Floats) -> Floats:
-    """Mean |theta|, rad."""
+    """Computes the mean |theta|, rad."""
     return mean(np.abs(motion[..., 2]))
 
 
 def distance(motion: Floats) -> Floats:
-    """Mean |u|, mm."""
+    """Computes the mean |u|, mm."""
     return mean(np.linalg.norm(motion[..., :2], axis=-1))
 
 
 def nearing(motion: Floats, lower: int) -> Floats:
-    """How much nearer the first ``lower`` units come to the others, which are above them, mm."""
+    """Computes the approach of the first ``lower`` units to the others, which are above, mm."""
     rise = motion[..., 1]
     return mean(rise[..., :lower]) - mean(rise[..., lower:])
 
 
 def size(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
-    """Root mean square of |U|, U = (ux / spacing, uy / spacing, theta), in multiples of a unit."""
+    """Computes the root mean square of |U|, U = (ux/spacing, uy/spacing, theta), in units."""
     square = np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1)
     return np.asarray(np.sqrt(mean(square)) / unit)
 
 
 def middle_units(problem: Problem, side: str) -> list[int]:
-    """Units of a side in the middle half of the lattice (7 columns of 15)."""
+    """Selects units of a side in the middle half of the lattice (7 columns of 15)."""
     lattice = problem.lattice
     along = {unit: x for unit, x, _ in lattice.sites()}
     low, high = min(along.values()), max(along.values())
@@ -98,7 +98,7 @@ def middle_units(problem: Problem, side: str) -> list[int]:
 
 
 def mean(values: Floats) -> Floats:
-    """Mean over the last axis of those that are known; NaN of none."""
+    """Computes the mean over the last axis of those that are known; NaN of none."""
     known = np.isfinite(values)
     count = known.sum(axis=-1)
     total = np.where(known, values, 0.0).sum(axis=-1)

@@ -1,4 +1,4 @@
-"""A comparison as a dataset: both sides at the frames, metrics, and how they were brought there."""
+"""Assembles a comparison: both sides at the frames, metrics, and their alignment."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _DRIVING = (
 
 
 class Compared(NamedTuple):
-    """All that a comparison is made of.
+    """Holds all parts of a comparison.
 
     Attributes:
         measurement: the measured side.
@@ -73,7 +73,7 @@ class Compared(NamedTuple):
 
 
 def dataset(made: Compared) -> xr.Dataset:
-    """The dataset ``comparison``, without its attributes."""
+    """Assembles the dataset ``comparison``, without its attributes."""
     random = np.random.default_rng(SEED)
     design, axis, measurement = made.design, made.axis, made.measurement
     lag = 0.0 if axis.lag is None else axis.lag.value
@@ -159,7 +159,7 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
 
 
 def _forces(made: Compared, random: np.random.Generator) -> Variables:
-    """How far the forces are from those of the load cell; its noise is in their scatter."""
+    """Computes errors of the forces against the load cell; its noise is in their scatter."""
     measured = made.measurement.force[:, None, None]
     still = np.zeros_like(measured)
     sides = (made.simulation.force, made.nominal.force)
@@ -213,7 +213,7 @@ def _alignment(made: Compared) -> Variables:
 
 
 def root_mean_square(values: Floats, axis: int) -> Floats:
-    """Root of the mean square over an axis of those that are known; NaN of none."""
+    """Computes the root mean square over an axis of the known values; NaN of none."""
     known = np.isfinite(values)
     count = known.sum(axis=axis)
     total = np.where(known, values, 0.0) ** 2

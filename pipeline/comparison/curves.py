@@ -1,4 +1,4 @@
-"""Curves and maps of both sides: what is followed along the frames, peak to peak of every unit."""
+"""Computes curves along the frames and maps, peak to peak of every unit, of both sides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
 class Sides(NamedTuple):
-    """The sides of a comparison at its frames.
+    """Holds the sides of a comparison at its frames.
 
     Attributes:
         measured, sigma: (frames, units, 3) with their standard uncertainty.
@@ -42,14 +42,14 @@ class Sides(NamedTuple):
         return self.measured, self.simulated, self.nominal
 
     def within(self, copies: Floats) -> Floats:
-        """Lower limit, median, upper limit (3, ...) of what was made of copies; NaN of none."""
+        """Computes lower limit, median and upper limit (3, ...) over copies; NaN of none."""
         if len(copies) == 0:
             return np.full((3, *copies.shape[1:]), np.nan)
         return bands.limits(copies, self.level)
 
 
 def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """A quantity along the frames (3 sides, frames, 3 estimates).
+    """Computes a quantity along the frames (3 sides, frames, 3 estimates).
 
     Args:
         sides: of the comparison.
@@ -66,7 +66,7 @@ def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floa
 
 
 def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """Interval (2, frames) by a bootstrap over the units that stand for others, with the noise."""
+    """Computes an interval (2, frames) by a bootstrap over units, with the noise."""
     units, count = quantity.units, len(quantity.units)
     copies = np.empty((COPIES, len(sides.measured)))
     for copy in copies:
@@ -78,7 +78,7 @@ def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generat
 
 
 def peak_to_peak(motion: Floats) -> Floats:
-    """Largest less smallest (..., units, 3) of motions (..., frames, units, 3); NaN of none.
+    """Subtracts extremes (..., units, 3) of motions (..., frames, units, 3); NaN of none.
 
     The extremes are those of parabolas through the extreme frames and their neighbours: a peak
     between two frames is not missed.
@@ -89,7 +89,7 @@ def peak_to_peak(motion: Floats) -> Floats:
 
 
 def _highest(motion: Floats) -> Floats:
-    """The highest value (..., units, 3) along the frames."""
+    """Computes the highest value (..., units, 3) along the frames."""
     values = np.where(np.isfinite(motion), motion, -np.inf)
     at = values.argmax(axis=-3, keepdims=True)
     near = [np.clip(at + step, 0, motion.shape[-3] - 1) for step in (-1, 0, 1)]
@@ -101,7 +101,7 @@ def _highest(motion: Floats) -> Floats:
 
 
 def peaks(sides: Sides, random: np.random.Generator) -> Floats:
-    """Peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
+    """Computes peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
     Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
     noise at the two extreme frames, about the value less what noise adds to it.
@@ -118,7 +118,7 @@ def peaks(sides: Sides, random: np.random.Generator) -> Floats:
 
 
 def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
-    """By how much (units, dofs) noise makes peak to peak larger: that of the smoothed motion."""
+    """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
     smooth = _smooth(sides)
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
     for _ in range(_TRIALS):
@@ -128,7 +128,7 @@ def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
 
 
 def _smooth(sides: Sides) -> Floats:
-    """The measured motion without its noise; NaN for units that are seldom seen."""
+    """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)
     there = np.isfinite(sides.measured + sides.sigma)
@@ -140,7 +140,7 @@ def _smooth(sides: Sides) -> Floats:
 
 
 def coverage(sides: Sides, band: Floats) -> Floats:
-    """Share (dofs,) of the measurements that lie in the band, widened by their noise.
+    """Computes the share (dofs,) of measurements in the band, widened by their noise.
 
     Args:
         sides: of the comparison.
@@ -154,7 +154,7 @@ def coverage(sides: Sides, band: Floats) -> Floats:
 
 
 def usual_coverage(copies: Floats, band: Floats, level: float) -> Floats:
-    """Share (dofs,) of its motion in the band that a copy has, or more, with a probability.
+    """Computes the share (dofs,) of its motion in the band that a copy has with a probability.
 
     One specimen is one draw: where it is far off in a constant, all its units leave the band
     together.

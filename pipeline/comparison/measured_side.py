@@ -1,4 +1,4 @@
-"""The measured side: which frames and units of a track are compared, in the design's frame."""
+"""Selects frames and units of a track to compare, and turns them into the design's frame."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SAME = 0.5  # mm between a vertex of the track and of the design
 
 
 class Measurement(NamedTuple):
-    """What was measured, in the design's frame.
+    """Holds the measured side, in the design's frame.
 
     Attributes:
         frames: (n_frames,) numbers of those that are compared, in the track.
@@ -52,12 +52,12 @@ class Measurement(NamedTuple):
 
     @property
     def compared(self) -> Mask:
-        """Which units (n_units,) are compared."""
+        """Tells the units (n_units,) that are compared."""
         return np.asarray(self.use == COMPARED)
 
 
 def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
-    """The measured side of a comparison.
+    """Prepares the measured side of a comparison.
 
     Args:
         track: of the recording.
@@ -122,7 +122,7 @@ def _another(why: str) -> UserError:
 
 
 def chosen_frames(track: xr.Dataset) -> Ints:
-    """Frames to compare: no duplicates, and every so many of a long track."""
+    """Selects frames to compare: no duplicates, and every so many of a long track."""
     duplicate = TABLES["track"]["timing"].flags["duplicate"]
     frames = np.flatnonzero(track["timing"].values != duplicate)
     return frames[:: -(-len(frames) // MOST_FRAMES)]

@@ -1,4 +1,4 @@
-"""How far a simulation is from a measurement, in numbers with intervals.
+"""Measures the distance of a simulation from a measurement, with intervals.
 
 The intervals are those of a bootstrap over units and over blocks of frames (Kuensch, Ann. Stat. 17
 (1989) 1217). To every copy noise of the measurement's own uncertainty is added, and its mean square
@@ -23,7 +23,7 @@ _STEPS = 6
 
 
 class Pair(NamedTuple):
-    """Both sides of a comparison, NaN in either where there is nothing to compare.
+    """Holds both sides of a comparison, NaN in either where there is nothing to compare.
 
     Attributes:
         measured, simulated: (frames, units, dofs).
@@ -39,19 +39,19 @@ class Pair(NamedTuple):
     added: bool = False
 
     def taken(self, frames: Ints, units: Ints) -> Pair:
-        """The frames and units of these numbers, which may come more than once."""
+        """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
         return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
 
     def noisier(self, random: np.random.Generator) -> Pair:
-        """The same with noise added to the measured side."""
+        """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)
 
 
 class _Moments(NamedTuple):
-    """Means (dofs,) over frames and units of what the metrics are made of."""
+    """Holds means (dofs,) over frames and units of what the metrics are made of."""
 
     residual: Floats
     measured: Floats
@@ -61,7 +61,7 @@ class _Moments(NamedTuple):
 
 
 def metrics(pair: Pair) -> Floats:
-    """The metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
+    """Computes metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
     mean = _moments(pair)
     with np.errstate(invalid="ignore", divide="ignore"):
         rows = [
@@ -95,7 +95,7 @@ def _moments(pair: Pair) -> _Moments:
 
 
 def _shift(pair: Pair) -> Floats:
-    """How far (dofs,) the measured side is behind, s, to first order in it."""
+    """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
     ahead = (pair.measured - pair.simulated) * pair.slope
@@ -106,7 +106,7 @@ def _shift(pair: Pair) -> Floats:
 
 
 def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
-    """The pair with the simulated side as late as the measured one, and by how much (dofs,), s.
+    """Delays the simulated side as much as the measured one, and tells by how much (dofs,), s.
 
     The shift is NaN where the sides are so unlike that none is found.
 
@@ -124,7 +124,7 @@ def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
 
 
 def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
-    """The pair with the simulated side later by ``lag`` (dofs,) s; NaN where that is not known."""
+    """Delays the simulated side by ``lag`` (dofs,) s; NaN where that is not known."""
     made = np.full_like(pair.simulated, np.nan)
     for dof, late in enumerate(lag):
         for unit in range(made.shape[1]):
@@ -138,7 +138,7 @@ def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
 
 
 def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
-    """Value and ends of the interval (3, len(METRICS), dofs) of every metric.
+    """Computes value and ends of the interval (3, len(METRICS), dofs) of every metric.
 
     Args:
         pair: both sides.
@@ -157,7 +157,7 @@ def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> F
 def bootstrap(
     pair: Pair, statistic: Callable[[Pair], Floats], random: np.random.Generator
 ) -> Floats:
-    """A statistic's value and the ends of its interval, stacked (3, ...)."""
+    """Computes a statistic's value and the ends of its interval, stacked (3, ...)."""
     frames, units = pair.measured.shape[:2]
     length = block_length(pair.measured - pair.simulated)
 
@@ -170,7 +170,7 @@ def bootstrap(
 
 
 def limits(copies: Floats) -> Floats:
-    """The ends (2, ...) of the interval that holds most of the copies (n, ...); NaN for none."""
+    """Computes the ends (2, ...) of the interval of most copies (n, ...); NaN for none."""
     ends = np.full((2, *copies.shape[1:]), np.nan)
     known = np.isfinite(copies).all(axis=0)
     tail = (1 - LEVEL) / 2
@@ -179,7 +179,7 @@ def limits(copies: Floats) -> Floats:
 
 
 def block_length(residual: Floats) -> int:
-    """Frames in a block: until residuals (frames, ...) forget, at most a quarter of them all."""
+    """Computes a block's frames: until residuals (frames, ...) forget, at most a quarter."""
     flat = np.nan_to_num(residual.reshape(len(residual), -1))
     most = max(len(flat) // _LONGEST, 1)
     size = float(np.sum(flat**2))
@@ -190,7 +190,7 @@ def block_length(residual: Floats) -> int:
 
 
 def _blocks(frames: int, length: int, random: np.random.Generator) -> Ints:
-    """Numbers of as many frames, in blocks that start anywhere and go round the end."""
+    """Draws numbers of as many frames, in blocks that start anywhere and go round the end."""
     count = -(-frames // length)
     starts = random.integers(frames, size=count)
     return ((starts[:, None] + np.arange(length)).ravel()[:frames]) % frames

@@ -1,4 +1,4 @@
-"""The nominal side: the study's own response at the times or loads of the measured frames."""
+"""Interpolates the study's own response at the times or loads of the measured frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.core import Floats
 
 
 class ComparisonAxis(NamedTuple):
-    """What both sides have in common.
+    """Holds the time or load that both sides have in common.
 
     Attributes:
         time: (frames,) of the response, s; NaN where it has none.
@@ -31,7 +31,7 @@ class ComparisonAxis(NamedTuple):
 
 
 class Nominal(NamedTuple):
-    """The response at the frames.
+    """Holds the response at the frames.
 
     Attributes:
         displacement: (frames, units, 3) mm and rad, NaN where there is none.
@@ -45,13 +45,13 @@ class Nominal(NamedTuple):
 
 
 def along(response: xr.Dataset) -> Floats:
-    """Unit vector (2,) of the drive of a response of one case."""
+    """Computes the unit vector (2,) of the drive of a response of one case."""
     angle = np.deg2rad(float(response["direction"]))
     return np.array([np.cos(angle), np.sin(angle)])
 
 
 def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
-    """How the measured frames lie on the axis of a response of one structure and case.
+    """Places the measured frames on the axis of a response of one structure and case.
 
     Args:
         time: (frames,) on the track's clock, s.
@@ -77,7 +77,7 @@ def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> 
 
 
 def nominal(response: xr.Dataset, time: Floats) -> Nominal:
-    """A response of one structure and case at its own times, NaN where these are.
+    """Interpolates a response of one structure and case at its own times, NaN where these are.
 
     Before its start it rests; between its samples runs a cubic spline.
     """

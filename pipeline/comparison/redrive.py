@@ -1,4 +1,4 @@
-"""The simulation driven as the specimen was: by the measured motion of the units that are held.
+"""Simulates a specimen driven as it was: by the measured motion of the units that are held.
 
 Each degree of freedom of each of these units is filtered by a smoothing spline (Dierckx 1975) that
 departs from the track by its standard uncertainty, no more and no less: the sum of the squared
@@ -31,7 +31,7 @@ LEAST_SEEN = 8
 
 
 class HermiteMotion(NamedTuple):
-    """A smooth motion, by values and slopes at equally spaced instants; it rests before and after.
+    """Interpolates a motion by values and slopes at equal intervals; it rests before and after.
 
     Attributes:
         step: between the instants, s; the first is at zero.
@@ -44,7 +44,7 @@ class HermiteMotion(NamedTuple):
     slope: Numbers
 
     def __call__(self, times: Numbers) -> Array:
-        """Motion (n_times, n_units, 3) at the given times, s: cubic between the instants."""
+        """Computes the motion (n_times, n_units, 3) at times in s: cubic between the instants."""
         value, slope = jnp.asarray(self.value), jnp.asarray(self.slope)
         last = len(value) - 1
         place = jnp.clip(jnp.asarray(times) / self.step, 0.0, last)
@@ -57,7 +57,7 @@ class HermiteMotion(NamedTuple):
 
 
 class Held(NamedTuple):
-    """Filtered motion of the units that supports and drive hold.
+    """Holds the filtered motion of the units that supports and drive hold.
 
     Attributes:
         unit: (n,) places in the scene's lattice, ascending.
@@ -78,7 +78,7 @@ class Held(NamedTuple):
 
 
 class Redriven(NamedTuple):
-    """A simulation under the measured motion.
+    """Holds a simulation under the measured motion.
 
     Attributes:
         displacement: (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end
@@ -93,7 +93,7 @@ class Redriven(NamedTuple):
 
 
 def held_motion(track: xr.Dataset, scene: Scene) -> Held:
-    """The motion of the driven units and of those clamped in all three degrees of freedom.
+    """Filters the motion of the driven units and of those clamped in all three dofs.
 
     Args:
         track: of the specimen; its displacement in the specimen's frame.
@@ -137,19 +137,19 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
 
 
 def held_units(scene: Scene) -> tuple[Ints, Mask]:
-    """Places of the driven units and of those clamped in all dofs, and which of them are driven."""
+    """Locates the driven units and those clamped in all dofs, and tells which are driven."""
     clamped, count = np.unique(scene.clamped // 3, return_counts=True)
     unit = np.union1d(clamped[count == 3], scene.driven)
     return unit, np.isin(unit, scene.driven)
 
 
 def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
-    """The smoothing spline of a course (n,) with standard uncertainties (n,); n at least 8."""
+    """Fits the smoothing spline of a course (n,) with standard uncertainties (n,); n >= 8."""
     return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
 
 
 def under(scene: Scene, held: Held) -> Scene:
-    """The scene with all held units driven as measured; its end is that of the measurement."""
+    """Drives all held units as measured; the scene's end is that of the measurement."""
     followed = (3 * held.unit[:, None] + np.arange(3)).ravel()
     return replace(
         scene,
@@ -164,7 +164,7 @@ def under(scene: Scene, held: Held) -> Scene:
 
 
 def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
-    """The structure under the measured motion: in time, or as a path of equilibria.
+    """Simulates the structure under the measured motion: in time, or as a path of equilibria.
 
     Args:
         structure: as designed, under the planned drives.

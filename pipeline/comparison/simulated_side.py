@@ -1,4 +1,4 @@
-"""The simulated side: driven by the measured motion, with imperfect copies for its band."""
+"""Simulates a structure and imperfect copies of it under the measured motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOG = logging.getLogger(__name__)
 
 
 class SimulatedSide(NamedTuple):
-    """What a structure does under the measured motion of what holds it.
+    """Holds the response of a structure to the measured motion of its held units.
 
     Attributes:
         displacement: (frames, units, 3) of all units, mm and rad; NaN for those that are absent.

@@ -1,4 +1,4 @@
-"""How far a simulation spreads under the tolerances of specimens and the doubt about constants.
+"""Samples the spread of a simulation under tolerances of specimens and constants.
 
 Specimens are drawn (pipeline/posing/drawn_specimen.py) and simulated under the same drive. The
 band between
@@ -30,7 +30,7 @@ STREAM = 1
 
 
 class Samples(NamedTuple):
-    """Specimens that were simulated.
+    """Holds specimens that were simulated.
 
     Attributes:
         displacement: (n_samples, n_times, n_units, 3) of the units of the structure's lattice.
@@ -93,12 +93,12 @@ def sampled(
 
 
 def _alone(scene: Scene, case: int) -> Scene:
-    """The scene under one of its load cases."""
+    """Keeps one load case of a scene."""
     return replace(scene, motions=(scene.motions[case],), weights=np.ones(1))
 
 
 def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
-    """The plan's solver; of a path of equilibria, with the steps of the structure as designed."""
+    """Plans the solver; of a path of equilibria, with the steps of the structure as designed."""
     solver = make_plan(scene, vertices, times).solver
     if not isinstance(solver, StaticSolver):
         return solver
@@ -116,7 +116,7 @@ def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
 
 
 def limits(values: Floats, level: float) -> Floats:
-    """Lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
+    """Computes lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
 
     The limits hold the next sample with the probability ``level``; with too few samples for that
     they are the least and the greatest of them.
@@ -127,7 +127,7 @@ def limits(values: Floats, level: float) -> Floats:
 
 
 def widened(band: Floats, sigma: Floats, level: float) -> Floats:
-    """The band (3, ...) of what is measured with standard uncertainties ``sigma`` (...)."""
+    """Widens the band (3, ...) by standard uncertainties ``sigma`` (...) of a measurement."""
     low, middle, high = band
     noise = ndtri((1 + level) / 2) * sigma
     return np.stack(

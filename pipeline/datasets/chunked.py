@@ -1,4 +1,4 @@
-"""Stages that work in parts, which are then joined: their command line, and the joining."""
+"""Runs stages in parts: their command line, and the joining of the parts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.runtime import UserError, cli
 
 
 def parser(stage: str, description: str) -> argparse.ArgumentParser:
-    """A command line with the commands `run` (one part) and `gather` (all of them)."""
+    """Builds a command line with the commands `run` (one part) and `gather` (all of them)."""
     made = cli.parser(stage, description, study=False)
     commands = made.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="compute one part", allow_abbrev=False)

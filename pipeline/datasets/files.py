@@ -1,4 +1,4 @@
-"""Datasets on disk: netCDF-4, whole or not at all, and the same bytes for the same data."""
+"""Stores datasets as netCDF-4, whole or not at all: the same bytes for the same data."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, Attrib
 
 
 class SchemaError(ValueError):
-    """A stage tried to write what the tables do not describe: a mistake in the code."""
+    """Reports that a stage tried to write what the tables do not describe: a mistake in code."""
 
 
 def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping[str, str]) -> None:
-    """Write `dataset` as a file of `kind`, atomically: another file appears whole or not at all.
+    """Writes `dataset` as a file of `kind`, atomically: another file appears whole or not at all.
 
     Units, long names, flag meanings and types come from the table of the kind; the variables need
     not carry them.
@@ -57,7 +57,7 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
 
 
 def read(path: str | Path, kind: Kind) -> xr.Dataset:
-    """Read a file of `kind` into memory, checked against its table.
+    """Reads a file of `kind` into memory, checked against its table.
 
     Raises:
         UserError: missing, truncated, foreign, of another kind or version, or not as the table
@@ -92,7 +92,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
 
 
 def _loaded(path: Path) -> xr.Dataset:
-    """What a file holds, in memory.
+    """Loads a file into memory.
 
     Raises:
         UserError: it claims to hold more than it can, or than there is room for.
@@ -132,7 +132,7 @@ def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> N
 
 
 def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -> xr.Dataset:
-    """The dataset in the order of its table, with the attributes and types that this states."""
+    """Gives a dataset the order of its table, and the attributes and types that this states."""
     table = TABLES[kind]
     described = {
         str(name): _describe(variable, table[str(name)]) if name in table else variable
@@ -183,7 +183,7 @@ def _encoding(table: Variable) -> dict[str, object]:
 
 
 def _probe(path: Path, size: int) -> OSError | None:
-    """The error that plain writing of `size` bytes meets at `path`, if any."""
+    """Tries plain writing of `size` bytes at `path`, and returns its error, if any."""
     try:
         with path.open("wb") as file:
             for _ in range(size // len(_CHUNK) + 1):

@@ -1,4 +1,4 @@
-"""Where a dataset comes from, as attributes: problem, parents, versions, commit and plan.
+"""Records the origin of datasets as attributes: problem, parents, versions, commit and plan.
 
 No dates, hosts or wall times: the same sources make the same bytes.
 """
@@ -33,7 +33,7 @@ def attributes(
     parents: Mapping[str, Path] | None = None,
     plan: object = None,
 ) -> dict[str, str]:
-    """The provenance of a dataset that `stage` makes.
+    """Records the provenance of a dataset that `stage` makes.
 
     Args:
         problem: the problem; as much of it as the stage depends on is stored in full.
@@ -53,7 +53,7 @@ def attributes(
 def recorded(
     description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
 ) -> dict[str, str]:
-    """The provenance of what is made of a recording, or of the measurements of a calibration.
+    """Records the provenance of what is made of a recording or of a calibration's measurements.
 
     Args:
         description: its YAML as JSON.
@@ -99,7 +99,7 @@ def check_parent(made: xr.Dataset, file: Path, role: str, parent: Path) -> None:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes, or of the names and bytes of a folder's files, in hex."""
+    """Hashes a file's bytes, or the names and bytes of a folder's files: SHA-256, in hex."""
     if path.is_dir():
         inside = sorted(each for each in path.iterdir() if each.is_file())
         listed = "".join(f"{each.name} {file_hash(each)}\n" for each in inside)
@@ -122,7 +122,7 @@ def package_versions() -> Mapping[str, str]:
 
 @lru_cache(maxsize=1)
 def git_commit() -> str:
-    """The commit of the sources, or "unknown" outside a git checkout."""
+    """Asks git for the commit of the sources; "unknown" outside a checkout."""
     command = ["git", "-C", str(_ROOT), "rev-parse", "--verify", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)

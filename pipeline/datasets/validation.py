@@ -20,7 +20,7 @@ _WORDS = ("px, mm", "as in constraint_units")
 
 @dataclass(frozen=True)
 class SchemaFault:
-    """What is wrong with which variable (or attribute)."""
+    """Reports a fault of a variable or attribute."""
 
     what: str
     name: str
@@ -28,7 +28,7 @@ class SchemaFault:
 
 
 def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
-    """What keeps `dataset` from being one of `kind`, beside its provenance."""
+    """Finds faults that keep `dataset` from being one of `kind`, beside its provenance."""
     table = TABLES[kind]
     for name, variable in table.items():
         if name not in dataset.variables:
@@ -58,7 +58,7 @@ def _known_units(told: object, table: Variable) -> bool:
 
 
 def _units(found: xr.Variable, table: Variable) -> object:
-    """Its unit as told; that of the table where it tells none, as before it is written."""
+    """Reads the unit; that of the table where there is none, as before it is written."""
     return found.attrs.get(table.unit_attribute, table.units)
 
 
@@ -78,7 +78,7 @@ def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Sc
 
 
 def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:
-    """The values that a coordinate should have: all, or those that are there, in their order."""
+    """Lists the values that a coordinate should have: all, or those present, in their order."""
     if not table.subset:
         return table.values
     return tuple(value for value in table.values if value in values)

@@ -1,4 +1,4 @@
-"""What it means to the user that a structure cannot be designed or simulated."""
+"""Explains to the user that a structure cannot be designed or simulated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _KEYS = {"convexity": "convex"}
 def infeasible(
     error: InfeasibleStartError, constraints: ConstraintVector, source: Path
 ) -> UserError:
-    """No design near the start can be made."""
+    """Explains that no design near the start can be made."""
     kind, where = constraints.named(error.constraint)
     return UserError(
         f"infeasible at the start, by {error.violation:.3g} mm (angles times 5 mm) at {where},"
@@ -34,7 +34,7 @@ def infeasible(
 
 
 class Simulated(NamedTuple):
-    """What was to be simulated: a structure of a problem file at solver times (n_asked,)."""
+    """Names the structure of a problem file that was simulated at solver times (n_asked,)."""
 
     source: Path
     scene: Scene
@@ -43,7 +43,7 @@ class Simulated(NamedTuple):
 
 
 def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> UserError:
-    """A structure's motion could not be followed to its end.
+    """Explains that a structure's motion could not be followed to its end.
 
     Args:
         error: the solver's.

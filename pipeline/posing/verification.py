@@ -1,4 +1,4 @@
-"""What is kept of a structure that was simulated in another way, and the dataset of such checks."""
+"""Assembles the dataset of structures that were simulated in other ways."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AS_RUN = "as run"
 
 
 class Numbers(NamedTuple):
-    """A structure under one check: the extremes of its load cases; fields as in the dataset."""
+    """Holds the extremes of a structure's load cases under one check; fields as in the dataset."""
 
     loss: float
     departure: float
@@ -33,7 +33,7 @@ Rows = Mapping[str, Mapping[str, Numbers]]
 
 
 def assemble_verification(found: Rows, status: Mapping[str, str]) -> xr.Dataset:
-    """The dataset ``verification`` of structures by check; those without a result have a reason."""
+    """Assembles the dataset ``verification``; structures without a result have a reason."""
     import xarray as xr
 
     structures = list(found[AS_RUN])

@@ -1,4 +1,4 @@
-"""Force over displacement of a small lattice: bottom row clamped, top row moved."""
+"""Tests force over displacement of a small lattice: bottom row clamped, top row moved."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TOLERANCE = 1e-12
 
 
 def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
-    """Displacements in mm and forces in N from the file of a set.
+    """Reads displacements in mm and forces in N from the file of a set.
 
     Raises:
         UserError: the file cannot be used.
@@ -49,7 +49,7 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class ForceTest:
-    """A test of forces (``experiment.Experiment``)."""
+    """Holds a test of forces (``experiment.Experiment``)."""
 
     measured: MeasuredValues
     simulation: SpecimenSimulation
@@ -58,7 +58,7 @@ class ForceTest:
 
     @property
     def own_start(self) -> Floats:
-        """The load cell's zero, N, if it is unknown."""
+        """Computes the load cell's zero, N, if it is unknown."""
         return np.zeros(int(self.tare))
 
     @property
@@ -67,18 +67,18 @@ class ForceTest:
         return np.full(int(self.tare), float(np.abs(self.measured.values).max()))
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
+        """Predicts forces, see ``experiment.Experiment``."""
         return self.simulation.predict(constants) + own.sum()
 
     def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
         return self.simulation.pulled_back(constants, bar)
 
 
 def experiment(
     asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats
 ) -> ForceTest:
-    """The set as an experiment on equilibria."""
+    """Returns the set as an experiment on equilibria."""
     sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
     known = asked.noise is not None
     measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
@@ -88,7 +88,7 @@ def experiment(
 def simulation(
     asked: ForceDisplacement, begin: Constants, displacement: Floats
 ) -> SpecimenSimulation:
-    """The specimen at the measured displacements."""
+    """Poses the specimen at the measured displacements."""
     lattice, contact = asked.lattice.network(), begin.contact
     bottom, top = (np.array(asked.lattice.side(name)) for name in ("bottom", "top"))
     towards = np.array([*DIRECTIONS[asked.test], 0.0])
@@ -107,7 +107,7 @@ def simulation(
 
 
 def force_on(lattice: Lattice, moved: Ints, towards: Floats) -> Seen:
-    """The force (n,) on units along a direction: the change of energy with their displacement.
+    """Computes the force (n,) on units along a direction: the slope of energy over their shift.
 
     Contact acts on rotations alone, so its energy does not change with a displacement.
     """

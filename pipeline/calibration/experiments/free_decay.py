@@ -1,4 +1,4 @@
-"""Free decay of two units on one ligament: an angle over time."""
+"""Measures the free decay of two units on one ligament: an angle over time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SAMPLES = 32
 
 
 class Peaks(NamedTuple):
-    """What a line through the logarithms of peaks tells.
+    """Holds the decay by a line through the logarithms of peaks.
 
     Attributes:
         ratio, error: damping ratio and its standard error.
@@ -38,7 +38,7 @@ class Peaks(NamedTuple):
 
 
 def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
-    """Times in s, from zero, and angles in rad from the file of a set.
+    """Reads times in s, from zero, and angles in rad from the file of a set.
 
     Raises:
         UserError: the file cannot be used.
@@ -62,7 +62,7 @@ def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
 
 
 def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
-    """Damping ratio by the authors' method: the slope of the logarithms of the peaks.
+    """Computes the damping ratio by the authors' method: the slope of the logarithms of peaks.
 
     A trend is taken off first. With the slope m and the frequency w of the damped oscillation, the
     ratio is 1 / sqrt(1 + (w / m)^2). The logarithms are weighted by the peaks' heights, since noise
@@ -92,7 +92,7 @@ def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
 
 @dataclass(frozen=True)
 class Decay:
-    """A trace (``experiment.Experiment``).
+    """Holds a trace (``experiment.Experiment``).
 
     Its own unknowns are offset (rad), drift (rad/s), the amplitudes of cosine and sine (rad), and
     the logarithm of the undamped frequency (rad/s).
@@ -104,7 +104,7 @@ class Decay:
 
     @property
     def own_start(self) -> Floats:
-        """What a linear fit with the peaks' frequency and damping finds."""
+        """Fits offset, drift and amplitudes at the peaks' frequency and damping."""
         frequency = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
         shapes = terms(self.measured.abscissa, self.peaks.ratio, frequency)
         return np.append(np.linalg.lstsq(shapes, self.measured.values)[0], np.log(frequency))
@@ -116,20 +116,20 @@ class Decay:
         return np.array([size, size / whole, size, size, 1 / (self.peaks.frequency * whole)])
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
+        """Predicts angles, see ``experiment.Experiment``."""
         shapes = terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
         return np.asarray(shapes @ own[:-1])
 
 
 def terms(time: Floats, ratio: float, frequency: float) -> Floats:
-    """What the trace (n,) is a sum of (n, 4): 1, t, and a decaying cosine and sine."""
+    """Computes the terms (n, 4) of a trace (n,): 1, t, and a decaying cosine and sine."""
     envelope, phase = np.exp(-ratio * frequency * time), frequency * np.sqrt(1 - ratio**2) * time
     oscillation = [envelope * np.cos(phase), envelope * np.sin(phase)]
     return np.stack([np.ones_like(time), time, *oscillation], axis=1)
 
 
 def experiment(asked: FreeDecay, time: Floats, angle: Floats) -> Decay:
-    """The set as an experiment."""
+    """Returns the set as an experiment."""
     sigma = np.full(len(angle), 1.0 if asked.noise is None else asked.noise)
     measured = MeasuredValues(asked.name, asked.kind, time, angle, sigma, asked.noise is not None)
     peaks = by_peaks(time, angle)

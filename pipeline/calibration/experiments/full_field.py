@@ -1,4 +1,4 @@
-"""Full-field fit: the motion of every free unit of a track, driven as its held units were."""
+"""Fits the motion of every free unit of a track, driven as its held units were."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ COARSE = (
 
 @dataclass(frozen=True)
 class FullFieldExperiment:
-    """A track as an experiment (``experiment.Experiment``).
+    """Holds a track as an experiment (``experiment.Experiment``).
 
     Attributes:
         measured: displacements of the free units, one course after the other; then the load.
@@ -77,16 +77,16 @@ class FullFieldExperiment:
         return np.zeros(0)
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
+        """Predicts the motion, see ``experiment.Experiment``."""
         del own
         return self.simulation.predict(constants, self.drive) - self.part
 
     def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
         return self.simulation.pulled_back(constants, bar, self.drive)
 
     def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
+        """Computes derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
         motion = self.simulation.pulled_to_drive(constants, bar, self.drive)
         assert isinstance(motion, redrive.HermiteMotion)
         value, slope = np.asarray(motion.value), np.asarray(motion.slope)
@@ -99,7 +99,7 @@ class FullFieldExperiment:
         )
 
     def with_drive_noise(self, constants: Constants) -> FullFieldExperiment:
-        """The same, knowing what the noise of the measured drive does to the prediction.
+        """Adds the effect of the measured drive's noise on the prediction.
 
         That is linearised about the drive that the free units speak for as well, by the noise that
         is known so far: one of a noisy drive would belong to another motion (Gauss and Newton's
@@ -122,14 +122,14 @@ class FullFieldExperiment:
         return replace(self, measured=measured, drive=drive, part=causes @ size)
 
     def finer(self) -> FullFieldExperiment:
-        """The same with half the steps in time; of equilibria there are none."""
+        """Halves the steps in time; of equilibria there are none."""
         return replace(self, simulation=self.simulation.finer())
 
 
 def experiment(
     asked: TrackedMotion, folder: Path, begin: Constants, track: xr.Dataset
 ) -> FullFieldExperiment:
-    """The set as an experiment.
+    """Returns the set as an experiment.
 
     Raises:
         UserError: the problem is wrong, or the track is of something else.
@@ -170,7 +170,7 @@ def experiment(
 
 
 def three(error: Error) -> Floats:
-    """An error of places and rotations for (ux, uy, theta)."""
+    """Repeats an error of places and rotations for (ux, uy, theta)."""
     return np.array([error.displacement, error.displacement, error.rotation])
 
 
@@ -185,7 +185,7 @@ def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
 
 
 def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
-    """(n, 3) place of the unit, dof, frame of what counts: free, well seen, course by course.
+    """Selects (n, 3) place of the unit, dof, frame: free, well seen, course by course.
 
     The first frame is the reference of all others: by definition nothing has moved.
     """
@@ -203,7 +203,7 @@ def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
 def _measured(
     asked: TrackedMotion, track: xr.Dataset, driven: Scene, chosen: Ints
 ) -> MeasuredValues:
-    """What counts of a track in the design's frame."""
+    """Selects the values of a track that count, in the design's frame."""
     place, dof, frame = chosen.T
     unit = driven.lattice.id[place]
     values, sigma = (
@@ -224,7 +224,7 @@ def _measured(
 
 
 def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
-    """What is measured of a motion: what counts of it, and the load if there is a cell."""
+    """Measures a motion: the displacements that count, and the load if there is a cell."""
     unit, dof, frame = chosen.T
 
     def seen(motion: Numbers, made: Parameters) -> Array:
@@ -236,7 +236,7 @@ def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
 
 
 def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
-    """The solver of the motion at the asked times, differentiable by every ligament's constants."""
+    """Chooses the solver at the asked times, differentiable by every ligament's constants."""
     whole = topology(
         driven.lattice, driven.held, driven.barrier, driven.cutoff, None, driven.contact_distance
     )

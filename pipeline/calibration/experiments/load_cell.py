@@ -1,4 +1,4 @@
-"""The load cell of a track: the force of the drive along its direction, at equilibria."""
+"""Reads the load cell of a track: the force of the drive along its direction, at equilibria."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class LoadCellReadings(NamedTuple):
     channel: int
 
     def joined(self, motion: MeasuredValues) -> MeasuredValues:
-        """The motion with the readings behind it."""
+        """Appends the readings to a motion."""
         count = len(self.value)
         return replace(
             motion,
@@ -55,7 +55,7 @@ class LoadCellReadings(NamedTuple):
 def load_of(
     asked: LoadCell, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
 ) -> LoadCellReadings:
-    """The readings of a track's load cell.
+    """Reads the load cell of a track.
 
     Raises:
         UserError: there are none, or what they read is not known.

@@ -1,4 +1,4 @@
-"""The measured motion of the held units as a fit takes it: without bias, and with its covariance.
+"""Smooths the measured motion of the held units: without bias, and with its covariance.
 
 Every course is a cubic spline with equal intervals that begins at zero, as the simulation does, and
 a constant that stays with its unit, which is no motion. A spline that smooths until its residuals
@@ -37,7 +37,7 @@ _PART = 0.5
 
 
 class Change(NamedTuple):
-    """One course of a drive changed by one standard deviation of its noise.
+    """Changes one course of a drive by one standard deviation of its noise.
 
     Attributes:
         place, dof: which course.
@@ -53,7 +53,7 @@ class Change(NamedTuple):
 def changed(
     motion: redrive.HermiteMotion, changes: Sequence[Change], size: Floats
 ) -> redrive.HermiteMotion:
-    """The motion with changes of a size each, in standard deviations."""
+    """Adds changes of a size each to a motion, in standard deviations."""
     value, slope = (np.array(part) for part in (motion.value, motion.slope))
     for each, times in zip(changes, size, strict=True):
         value[:, each.place, each.dof] += times * each.value
@@ -62,7 +62,7 @@ def changed(
 
 
 class Followed(NamedTuple):
-    """The drive of a fit.
+    """Holds the drive of a fit.
 
     Attributes:
         held: units, and their motion by values and slopes at the knots.
@@ -77,7 +77,7 @@ class Followed(NamedTuple):
 
 @dataclass(frozen=True)
 class _Seen:
-    """Courses of the held units. At the first frame they rest: it tells the constants.
+    """Holds courses of the held units. At the first frame they rest: it tells the constants.
 
     Attributes:
         time: (n,) s.
@@ -95,7 +95,7 @@ class _Seen:
     reach: Floats
 
     def equations(self, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
-        """Whitened equations (n, 1 + n_coefficients) of a course, and their right sides (n,).
+        """Builds whitened equations (n, 1 + n_coefficients) of a course, and right sides (n,).
 
         The first unknown is the constant; the first coefficient is zero. Where no frame tells a
         coefficient, the course goes on as it went, give or take the range of the motions.
@@ -111,24 +111,24 @@ class _Seen:
         return rows, np.append(given, np.zeros(len(straight) + 1))
 
     def basis(self, intervals: int) -> Floats:
-        """(n, n_coefficients) all splines of the basis at the frames."""
+        """Evaluates all splines of the basis at the frames (n, n_coefficients)."""
         knots = self.knots(intervals)
         return np.asarray(BSpline.design_matrix(self.time, knots, _DEGREE).toarray())
 
     def knots(self, intervals: int) -> Floats:
-        """Of the spline, those at the ends fourfold."""
+        """Places the knots of the spline, those at the ends fourfold."""
         inner = np.linspace(0.0, self.time[-1], intervals + 1)
         return np.pad(inner, _DEGREE, mode="edge")
 
     def misfit(self, intervals: int, place: int, dof: int) -> float:
-        """Sum of squares that a course of so many intervals leaves, in the tracker's variances."""
+        """Sums squares that a course of so many intervals leaves, in the tracker's variances."""
         rows, given = self.equations(intervals, place, dof)
         rest = rows @ np.linalg.lstsq(rows, given)[0] - given
         return float(np.sum(rest[: np.count_nonzero(self.there[:, place])] ** 2))
 
 
 def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
-    """The motion of the held units of a track, which begins at rest.
+    """Smooths the motion of the held units of a track, which begins at rest.
 
     Args:
         track: of the specimen, in the design's frame.
@@ -173,12 +173,12 @@ def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> 
 
 
 def _doubled(most: int) -> list[int]:
-    """1, 2, 4 and so on, up to a number."""
+    """Lists 1, 2, 4 and so on, up to a number."""
     return [1 << k for k in range(most.bit_length())]
 
 
 def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
-    """Akaike's criterion of all courses with so many intervals."""
+    """Computes Akaike's criterion of all courses with so many intervals."""
     count = 3 * int(seen.there[:, places].sum())
     unknown = 3 * len(places) * (intervals + _DEGREE)
     misfit = sum(seen.misfit(intervals, place, dof) for place in places for dof in range(3))
@@ -187,7 +187,7 @@ def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
 
 
 def _course(seen: _Seen, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
-    """Values and slopes (1 + n_changes, n_knots) of a course, and of its independent changes."""
+    """Fits values and slopes (1 + n_changes, n_knots) of a course and its independent changes."""
     rows, given = seen.equations(intervals, place, dof)
     orthogonal, factor = np.linalg.qr(rows)
     root = np.linalg.inv(factor)

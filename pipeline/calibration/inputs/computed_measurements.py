@@ -1,4 +1,4 @@
-"""What computed measurements are made with: the sections `virtual` of a calibration."""
+"""Describes computed measurements: the sections `virtual` of a calibration."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class VirtualTrack(Section):
 
 
 class ComputedMeasurements(Section):
-    """What computed data are made with.
+    """True constants and noise of computed data.
 
     Attributes:
         truth: the true constants.

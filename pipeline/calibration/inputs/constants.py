@@ -1,4 +1,4 @@
-"""The constants that can be found, and a specimen's values of them as logarithms."""
+"""Converts the constants of a specimen to logarithms and back."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WRITTEN: dict[Name, tuple[str, float]] = {
 
 
 class Constants(NamedTuple):
-    """Values of all constants of a specimen, wanted or not.
+    """Holds values of all constants of a specimen, wanted or not.
 
     Attributes:
         material: density, stiffness and damping.
@@ -67,7 +67,7 @@ class Constants(NamedTuple):
         return rotation / (2 * math.sqrt(inertia * self.material.bending_stiffness))
 
     def value(self, name: Name) -> float:
-        """The value of one constant in its working unit."""
+        """Computes the value of one constant in its working unit."""
         if name == "contact_cutoff":
             return self.angles[1]
         if name == "damping_ratio":
@@ -86,14 +86,14 @@ class Constants(NamedTuple):
         return self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
 
     def logs(self, names: Sequence[Name]) -> Floats:
-        """Natural logarithms of constants; of the cut-off, that of its distance to the barrier."""
+        """Computes logarithms of constants; of the cut-off, that of its distance to the barrier."""
         barrier = self.angles[0]
         return np.log(
             [self.value(name) - (barrier if name == "contact_cutoff" else 0.0) for name in names]
         )
 
     def at(self, names: Sequence[Name], logs: Floats) -> Constants:
-        """These constants with the named ones replaced."""
+        """Replaces the named constants."""
         stiffness: dict[str, float] = {}
         damping: dict[str, float] = {}
         cutoff = self.cutoff
@@ -110,6 +110,6 @@ class Constants(NamedTuple):
 
 
 def start(asked: Calibration) -> Constants:
-    """The constants that a calibration starts from."""
+    """Returns the constants that a calibration starts from."""
     made = Constants(asked.material, asked.contact, asked.spacing)
     return made._replace(cutoff=made.angles[1]) if "contact_cutoff" in asked.fit else made

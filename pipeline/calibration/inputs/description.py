@@ -1,4 +1,4 @@
-"""The YAML file of a calibration: which constants are wanted, and what was measured."""
+"""Describes a calibration: the wanted constants and the measurements."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminat
 
 
 class Calibration(Section):
-    """Which constants are wanted, from which measurements.
+    """Constants that are wanted, and the measurements to find them from.
 
     Attributes:
         title: one line about it.
@@ -198,7 +198,7 @@ class Calibration(Section):
 
 
 def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
-    """What the sections do not see by themselves: fault, remedy, key."""
+    """Checks the sections against one another: fault, remedy, key."""
     found = []
     names = [each.name for each in asked.data]
     if len(set(names)) < len(names):

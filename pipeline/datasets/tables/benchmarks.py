@@ -1,4 +1,4 @@
-"""What datasets hold of benchmarks: times, errors and work of methods, point by point."""
+"""Lists variables of benchmarks: times, errors and work of methods, point by point."""
 
 from __future__ import annotations
 

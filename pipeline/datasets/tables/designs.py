@@ -1,4 +1,4 @@
-"""What datasets hold of a design: the network, its shape, and how the optimiser came to it."""
+"""Lists variables of a design: the network, its shape, the history of its optimisations."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
 
 
 class CsvCells(NamedTuple):
-    """The cells of a CSV.
+    """Holds the cells of a CSV.
 
     Attributes:
         rows: of cells, without blanks about them.

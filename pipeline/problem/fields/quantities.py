@@ -1,4 +1,4 @@
-"""Field types of a problem: strings with units outside, floats in mm, N, s, tonne, rad inside."""
+"""Defines field types: strings with units outside, floats in mm, N, s, tonne, rad inside."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONGEST = 300  # letters of what a file's reader complains of, which may cite w
 
 
 def fault(what: str, remedy: str, key: str | None = None) -> PydanticCustomError:
-    """A validation error that knows its remedy, and the key below the validated section."""
+    """Builds a validation error with its remedy, and the key below the validated section."""
     legible = "".join(letter if letter.isprintable() else "?" for letter in what[:_LONGEST])
     told = {"what": legible, "remedy": remedy, "key": key}
     return PydanticCustomError("problem", "{what}", told)

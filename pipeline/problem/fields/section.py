@@ -1,4 +1,4 @@
-"""The base of every section of a problem: frozen, strict about its keys, with a helpful refusal."""
+"""Defines the base of all sections of a problem: frozen, strict about keys, with remedies."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _KEY = re.compile(r"^    (\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
 
 
 class Section(BaseModel):
-    """An immutable part of a problem; unknown keys are refused with the nearest known one."""
+    """Refuses unknown keys, with the nearest known one; no value can be changed."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", validate_by_name=False, validate_by_alias=True
@@ -29,7 +29,7 @@ class Section(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """The schema, in which every key has the meaning that the docstring tells."""
+        """Adds to the schema the meaning of every key by the docstring."""
         made = handler(core_schema)
         whole = handler.resolve_ref_schema(made)
         whole["description"] = _lead(cls)
@@ -54,7 +54,7 @@ class Section(BaseModel):
 
 
 def exactly_one(section: Section, *names: str) -> None:
-    """Refuse a section that gives none or several of the alternatives `names`.
+    """Refuses a section that gives none or several of the alternatives `names`.
 
     Raises:
         PydanticCustomError: naming the alternatives.

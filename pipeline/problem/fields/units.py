@@ -1,4 +1,4 @@
-"""Quantities in words ("15 mm", "6.18 kg/m^2") to floats in the working units mm, N, s, tonne, rad.
+"""Converts quantities ("15 mm", "6.18 kg/m^2") to floats in the units mm, N, s, tonne, rad.
 
 The registry is our own and small: it loads in a millisecond, and it counts the angle as a dimension
 so that degrees cannot be given where a length is wanted, nor a bare number where an angle is.
@@ -47,7 +47,7 @@ _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """A kind of quantity: its name, the working unit, units of equal right, and an example."""
+    """Describes a kind of quantity: its name, working unit, units of equal right, an example."""
 
     name: str
     unit: str
@@ -78,13 +78,13 @@ def _registry() -> UnitRegistry:
 
 
 def take_apart(text: str) -> tuple[float, str] | None:
-    """Number and unit ("" if there is none) of a quantity; None if the text is none."""
+    """Splits a quantity into number and unit ("" for none); None if the text is none."""
     match = _QUANTITY.fullmatch(text[:_LONGEST])
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
 def parse(text: object, dimension: Dimension) -> float:
-    """The quantity `text` as a float in the working unit of `dimension`.
+    """Converts the quantity `text` to a float in the working unit of `dimension`.
 
     Raises:
         UserError: no unit, an unknown one, one of another dimension, or no finite number.
@@ -106,7 +106,7 @@ def parse(text: object, dimension: Dimension) -> float:
 
 
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
-    """Working units of `dimension` in one `unit`."""
+    """Converts one `unit` to working units of `dimension`."""
     from pint.errors import UndefinedUnitError
 
     registry = _registry()

@@ -1,4 +1,4 @@
-"""The outline of what is dark in a binary image, or of the paths in an SVG drawing."""
+"""Reads outlines of the dark part of a binary image, or of the paths in an SVG drawing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SEGMENTS = 24  # chords of a curved piece of a path
 
 
 def read_outlines(path: Path) -> tuple[Outline, ...]:
-    """Closed outlines of the shape in an image, y up, in pixels or in the drawing's own unit.
+    """Reads closed outlines of an image's shape, y up, in pixels or the drawing's own unit.
 
     A point within an odd number of them lies in the shape.
 
@@ -66,7 +66,7 @@ def _of_pixels(held: bytes) -> list[NDArray[Any]]:
 
 
 def _grey(held: bytes) -> NDArray[np.uint8]:
-    """Grey levels of a binary image, what is transparent being white.
+    """Computes grey levels of a binary image; transparent pixels are white.
 
     Raises:
         UserError: unreadable, too large or not binary.

@@ -1,4 +1,4 @@
-"""Polygons and ligaments from a file: a list in CSV, a netCDF dataset, or a drawing in DXF."""
+"""Reads polygons and ligaments: a list in CSV, a netCDF dataset, or a drawing in DXF."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ COLUMNS = ("kind", "number", "x (mm)", "y (mm)")
 
 
 class Content(NamedTuple):
-    """Corners of the units and end points of the ligaments, mm."""
+    """Holds corners of the units and end points of the ligaments, mm."""
 
     polygons: tuple[tuple[Point, ...], ...]
     ligaments: tuple[tuple[Point, Point], ...]
 
 
 def read_network(path: Path) -> Content:
-    """The units and ligaments in a file, told by its suffix.
+    """Reads the units and ligaments in a file, told by its suffix.
 
     Raises:
         UserError: no such file, unreadable, or without units or ligaments.
@@ -75,7 +75,7 @@ def _of_csv(path: Path) -> Content:
 
 
 def _of_netcdf(path: Path) -> Content:
-    """The design of a study, or any dataset with its `vertices` and `ligament_*` variables."""
+    """Reads a study's design, or any dataset with its `vertices` and `ligament_*` variables."""
     import numpy as np
     import xarray as xr
 
@@ -97,7 +97,7 @@ def _of_netcdf(path: Path) -> Content:
 
 
 def _of_dxf(path: Path) -> Content:
-    """Closed polylines as units and lines as ligaments, whatever their layers; lengths in mm."""
+    """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm."""
     from ezdxf import recover
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
@@ -128,7 +128,7 @@ def _of_dxf(path: Path) -> Content:
 
 
 def _corners(line: LWPolyline | Polyline) -> list[tuple[float, float]]:
-    """Corners of a polyline, the first not repeated at its end."""
+    """Lists corners of a polyline, the first not repeated at its end."""
     from ezdxf.entities.lwpolyline import LWPolyline
 
     if isinstance(line, LWPolyline):

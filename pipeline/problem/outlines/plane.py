@@ -28,7 +28,7 @@ _LONGEST = 500
 
 
 def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
-    """Which points lie within an odd number of closed outlines, or within `hair` of one."""
+    """Finds points within an odd number of closed outlines, or within `hair` of one."""
     import numpy as np
 
     px, py = np.array(points, dtype=float).reshape(-1, 2).T[..., None]
@@ -50,7 +50,7 @@ def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) 
 def placed(
     outline: Outline, size: tuple[float, float], origin: Point, centre: Point, orientation: float
 ) -> Outline:
-    """An outline whose box is scaled to `size`, with `origin` at `centre`, turned about it."""
+    """Scales an outline's box to `size`, moves `origin` to `centre`, and turns it about that."""
     scale_x, scale_y = (wanted / has for wanted, has in zip(size, extents(outline), strict=True))
     moved = tuple(
         (centre[0] + scale_x * (x - origin[0]), centre[1] + scale_y * (y - origin[1]))
@@ -60,7 +60,7 @@ def placed(
 
 
 def turned(outline: Outline, angle: float, centre: Point) -> Outline:
-    """An outline turned by `angle` (rad) about `centre`."""
+    """Turns an outline by `angle` (rad) about `centre`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     arms = ((x - centre[0], y - centre[1]) for x, y in outline)
     return tuple(
@@ -69,19 +69,19 @@ def turned(outline: Outline, angle: float, centre: Point) -> Outline:
 
 
 def extents(outline: Outline) -> tuple[float, float]:
-    """Width and height of an outline's box."""
+    """Computes width and height of an outline's box."""
     width, height = (max(axis) - min(axis) for axis in zip(*outline, strict=True))
     return width, height
 
 
 def box_middle(outline: Outline) -> Point:
-    """The middle of an outline's box."""
+    """Computes the middle of an outline's box."""
     (x1, x2), (y1, y2) = ((min(axis), max(axis)) for axis in zip(*outline, strict=True))
     return (x1 + x2) / 2, (y1 + y2) / 2
 
 
 class FormulaError(ValueError):
-    """A text that is no formula of t."""
+    """Reports a text that is no formula of t."""
 
 
 def compile_formula(text: str) -> Callable[[float], float]:

@@ -1,4 +1,4 @@
-"""What one key alone cannot tell: geometry, regions, supports, loads, a feasible start."""
+"""Checks sections against one another: geometry, regions, supports, loads, the start."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.problem.sections import (
 
 @dataclass(frozen=True)
 class Finding:
-    """A fault in a problem: what, at which key, and what to do."""
+    """Reports a fault in a problem, its key, and its remedy."""
 
     what: str
     keys: KeyPath
@@ -33,7 +33,7 @@ Findings = Iterator[Finding]
 
 
 def findings(problem: Problem) -> Findings:
-    """The faults of a problem, in the order in which they should be mended."""
+    """Finds the faults of a problem, in the order in which they should be mended."""
     for check in _CHECKS:
         yield from check(problem)
 

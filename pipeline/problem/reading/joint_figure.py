@@ -1,4 +1,4 @@
-"""Figures that show several studies side by side: `figure.yaml` in a folder of experiments."""
+"""Reads figures of several studies side by side: `figure.yaml` in a folder of experiments."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Joint(Section):
 
 
 def load(path: Path) -> Joint:
-    """The figure in a YAML file.
+    """Reads the figure in a YAML file.
 
     Raises:
         UserError: naming the file, the key and the remedy.

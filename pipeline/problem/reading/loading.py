@@ -1,4 +1,4 @@
-"""From a YAML file and the name of a preset to a checked problem, or one clear message."""
+"""Reads a YAML file and one of its presets to a checked problem, or one clear message."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Alone = TypeVar("Alone", bound=Section)
 
 
 def load(path: str | Path, preset: str | None = None) -> Problem:
-    """The problem in a YAML file, with one of its presets laid over it, or one of its designs.
+    """Reads the problem in a YAML file, with one of its presets laid over it, or a design.
 
     Args:
         path: the file.
@@ -82,7 +82,7 @@ def _check_sweep(
 
 
 def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
-    """`base` with `overlay` laid over it: mappings merge, all else replaces, null removes a key."""
+    """Lays `overlay` over `base`: mappings merge, all else replaces, null removes a key."""
     merged = dict(base)
     for key, value in overlay.items():
         below = merged.get(key)
@@ -96,7 +96,7 @@ def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, A
 
 
 def preset_names(path: str | Path) -> tuple[str, ...]:
-    """The names of the presets in a problem file.
+    """Reads the names of the presets in a problem file.
 
     Raises:
         UserError: the file cannot be read.
@@ -124,7 +124,7 @@ def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
 
 
 def section(path: Path, kind: type[Alone]) -> Alone:
-    """A section that is a YAML file of its own.
+    """Reads a section that is a YAML file of its own.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
@@ -139,7 +139,7 @@ def section(path: Path, kind: type[Alone]) -> Alone:
 def told(
     error: ValidationError, document: Document, data: dict[str, Any], preset: str | None
 ) -> UserError:
-    """The first of the errors of validation, in words; `data` is the document with its preset."""
+    """Explains the first error of validation; `data` is the document with its preset."""
     first, *others = error.errors(include_url=False)
     keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
     what, remedy, key = _in_words(first)
@@ -151,7 +151,7 @@ def told(
 
 
 def reason(error: ValidationError) -> tuple[str, str]:
-    """What is wrong first, and the remedy."""
+    """Explains the first error of validation: fault and remedy."""
     what, remedy, _ = _in_words(error.errors(include_url=False)[0])
     return what, remedy
 
@@ -180,7 +180,7 @@ _WORDS = {
 
 
 def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
-    """What is wrong, the remedy, and a key below the error's place if there is one."""
+    """Translates an error: the fault, the remedy, and a key below its place if there is one."""
     context = error.get("ctx", {})
     if error["type"] == "problem":
         return context["what"], context["remedy"], context["key"]
@@ -189,7 +189,7 @@ def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
 
 
 def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:
-    """The location without the tags of unions, which are no keys of the file."""
+    """Removes the tags of unions, which are no keys of the file, from a location."""
     keys: list[str | int] = []
     tag: object = None
     for part in location:
@@ -231,7 +231,7 @@ def _dotted(keys: KeyPath) -> str:
 
 
 def _value(data: object, keys: KeyPath) -> object:
-    """The value at `keys` if it is a plain one: a whole section would not help the reader."""
+    """Reads the value at `keys` if it is plain: a whole section would not help the reader."""
     for key in keys:
         if isinstance(data, Mapping):
             data = data.get(key)
@@ -241,7 +241,7 @@ def _value(data: object, keys: KeyPath) -> object:
 
 
 def _with_recording(problem: Problem, document: Document) -> Problem:
-    """The problem with the content hash of the measured motion that it refers to, if any."""
+    """Adds the content hash of the measured motion that a problem refers to, if any."""
     drive = problem.drive
     if not isinstance(drive, TimeSeriesDrive):
         return problem

@@ -1,4 +1,4 @@
-"""Regions of the specimen, and what lies in them.
+"""Describes regions of the specimen.
 
 A region is a set of points of the specimen frame (mm); a unit belongs to it if its site does.
 """
@@ -65,7 +65,7 @@ class Region(Section):
         return None
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """Closed outlines, mm; a point within an odd number of them lies in the region.
+        """Draws closed outlines, mm; a point within an odd number of them lies in the region.
 
         Args:
             middle: of the lattice, for shapes that are centred there.
@@ -79,7 +79,7 @@ class Region(Section):
         return () if shape is None else shape.outlines(middle)
 
     def holds(self, points: Sequence[Point], middle: Point, hair: float) -> list[bool]:
-        """Which points (mm) lie in the region, or within `hair` of its outer rim."""
+        """Tells which points (mm) lie in the region, or within `hair` of its outer rim."""
         if self.bounds is not None:
             named, inner, outer = self.bounds
             centre = at(named, middle)
@@ -88,7 +88,7 @@ class Region(Section):
 
 
 class VoidRegion(Region):
-    """What is cut out.
+    """Region that is cut out.
 
     Attributes:
         loose: what to do where units are cut off from the rest: refuse, or remove them as well.
@@ -108,7 +108,7 @@ class Around(Section):
 
 
 class CloakRegion(Region):
-    """Where units may be redesigned: a region, or all around something.
+    """Units that may be redesigned: those of a region, or all around something.
 
     Attributes:
         around: all near the void, the inclusion, or the region of interest.

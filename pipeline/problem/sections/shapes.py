@@ -1,4 +1,4 @@
-"""Shapes that a problem file may name: discs, rings, polygons, curves and images."""
+"""Describes shapes of a problem file: discs, rings, polygons, curves and images."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Centre = Annotated[
 
 
 def at(centre: Centre, middle: Point) -> Point:
-    """A centre by its coordinates, mm."""
+    """Returns a centre by its coordinates, mm."""
     return middle if isinstance(centre, str) else centre
 
 
@@ -89,7 +89,7 @@ class PolygonShape(Section):
     orientation: Angle = 0.0
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The polygon in the specimen frame, mm."""
+        """Draws the polygon in the specimen frame, mm."""
         del middle
         centre = box_middle(self.vertices)
         return (turned(self.vertices, self.orientation, centre),)
@@ -113,7 +113,7 @@ class Heart(Section):
     points: Annotated[int, Field(ge=8, le=1000, strict=True)] = 50
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The curve in the specimen frame, mm."""
+        """Draws the curve in the specimen frame, mm."""
         turns = [2 * math.pi * k / (self.points - 1) for k in range(self.points)]
         curve = tuple((16 * math.sin(t) ** 3, _heart_height(t)) for t in turns)
         return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
@@ -145,7 +145,7 @@ class Smile(Section):
     orientation: Angle = 0.0
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The crescent in the specimen frame, mm."""
+        """Draws the crescent in the specimen frame, mm."""
         step = 2 * math.pi / 40
         inner = [_on_circle(self.inner_radius, math.pi + k * step) for k in range(1, 20)]
         outer = [_on_circle(self.outer_radius, -k * step) for k in range(21)]
@@ -199,7 +199,7 @@ class Formula(Section):
         return [function(2 * math.pi * k / self.points) for k in range(self.points)]
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The curve in the specimen frame, mm."""
+        """Draws the curve in the specimen frame, mm."""
         curve = tuple(zip(self._along(self.x), self._along(self.y), strict=True))
         return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
 
@@ -208,7 +208,7 @@ Curve = Annotated[Heart | Smile | Formula, Field(discriminator="kind")]
 
 
 class Image(Section):
-    """What is dark in a binary image (PNG, JPG) or filled in an SVG, upright as one sees it.
+    """Dark part of a binary image (PNG, JPG) or fill of an SVG, upright as one sees it.
 
     The outline is read from the file when the problem is.
 
@@ -243,7 +243,7 @@ class Image(Section):
         return self.model_copy(update={"read": outlines})
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The shape's outlines in the specimen frame, mm."""
+        """Draws the shape's outlines in the specimen frame, mm."""
         assert self.read is not None
         whole = tuple(point for outline in self.read for point in outline)
         width, height = extents(whole)

@@ -1,4 +1,4 @@
-"""The section `sweep:`: which parameters of a problem take which values, and in what combinations.
+"""Describes values of parameters and their combinations: the section `sweep:`.
 
 A parameter is named by its keys, joined by dots: `drive.frequency`, `material.bending_stiffness`.
 Its values are written as they would be at that key, with their unit.
@@ -29,12 +29,12 @@ Word = StrictStr | StrictBool | StrictInt | StrictFloat
 
 
 def in_words(number: float, unit: str) -> Word:
-    """A number and its unit ("" for none) as a problem file has them, every digit kept."""
+    """Writes a number and its unit ("" for none) as a problem file has them, exactly."""
     return f"{number!r} {unit}" if unit else number
 
 
 def taken_apart(word: Word) -> tuple[float, str] | None:
-    """Number and unit ("" for none) of a value; None if it is no number."""
+    """Splits a value into number and unit ("" for none); None if it is no number."""
     return None if isinstance(word, bool) else units.take_apart(str(word))
 
 
@@ -46,7 +46,7 @@ def _in_one_unit(words: tuple[Word, ...]) -> tuple[Word, ...]:
 
 
 def _numbers(first: Word, second: Word) -> tuple[float, float, str]:
-    """Two quantities in the unit that both are given in."""
+    """Splits two quantities in the unit that both are given in."""
     one, two = taken_apart(first), taken_apart(second)
     if one is None or two is None:
         raise fault("numbers are wanted here", 'give numbers with their unit, e.g. "2 Hz"')
@@ -76,7 +76,7 @@ class Range(Section):
 
     @property
     def words(self) -> tuple[Word, ...]:
-        """The values."""
+        """Returns the values."""
         first, last, unit = _numbers(self.start, self.stop)
         return tuple(
             in_words(float(value), unit) for value in np.linspace(first, last, self.points)
@@ -102,7 +102,7 @@ class Between(Section):
         return self
 
     def drawn(self, random: np.random.Generator) -> Word:
-        """One value."""
+        """Draws one value."""
         first, last, unit = _numbers(self.start, self.stop)
         return in_words(float(random.uniform(first, last)), unit)
 
@@ -124,13 +124,13 @@ class Normal(Section):
         return self
 
     def drawn(self, random: np.random.Generator) -> Word:
-        """One value."""
+        """Draws one value."""
         mean, deviation, unit = _numbers(self.mean, self.deviation)
         return in_words(float(random.normal(mean, abs(deviation))), unit)
 
 
 def _form(value: object) -> str:
-    """Which of the forms of a parameter's values is meant."""
+    """Tells the form of a parameter's values."""
     if not isinstance(value, Mapping | Section):
         return "values"
     return "normal" if {"mean", "deviation"} & set(dict(value)) else "between"
@@ -179,18 +179,18 @@ class Sweep(Section):
 
     @property
     def form(self) -> str:
-        """The key below which the parameters are."""
+        """Returns the key below which the parameters are."""
         return next(name for name in ("grid", "list", "random") if getattr(self, name) is not None)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The names of the parameters."""
+        """Returns the names of the parameters."""
         named: Mapping[str, object] = getattr(self, self.form)
         return tuple(named)
 
     @property
     def values(self) -> dict[str, tuple[Word, ...]]:
-        """The values that each parameter takes on a grid or in a list."""
+        """Returns the values that each parameter takes on a grid or in a list."""
         named = self.grid or self.list or {}
         return {
             key: value.words if isinstance(value, Range) else value for key, value in named.items()

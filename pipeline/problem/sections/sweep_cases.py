@@ -1,4 +1,4 @@
-"""The cases of a sweep, and what each sets."""
+"""Lists the cases of a sweep with their settings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DIRECTIONS = "drive.directions"
 
 
 def case_count(sweep: Sweep) -> int:
-    """Number of cases."""
+    """Counts the cases."""
     if sweep.samples is not None:
         return sweep.samples
     sizes = [len(values) for values in sweep.values.values()]
@@ -28,7 +28,7 @@ def case_count(sweep: Sweep) -> int:
 
 
 def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
-    """What each case sets, one after the other."""
+    """Lists the settings of the cases, one after the other."""
     if sweep.random is not None:
         yield from (_drawn(sweep, number) for number in range(case_count(sweep)))
     elif sweep.list is not None:
@@ -40,7 +40,7 @@ def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
 
 
 def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
-    """A random case: the same whatever other cases there are."""
+    """Draws a random case: the same whatever other cases there are."""
     assert sweep.random is not None
     random = np.random.default_rng((sweep.seed, number))
     return {key: spread.drawn(random) for key, spread in sweep.random.items()}
@@ -48,7 +48,7 @@ def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
 
 @dataclass(frozen=True)
 class DirectionGroup:
-    """Cases one after the other that differ by the direction of their drive alone.
+    """Groups cases one after the other that differ by the direction of their drive alone.
 
     They are load cases of one scene: what is a copy of another, turned, is not simulated.
     """
@@ -71,18 +71,18 @@ class DirectionGroup:
 
 
 def group_size(sweep: Sweep) -> int:
-    """Cases in each group: directions are grouped where a grid names them first."""
+    """Counts cases in each group: directions are grouped where a grid names them first."""
     grouped = sweep.grid is not None and sweep.keys[0] == DIRECTIONS
     return len(sweep.values[DIRECTIONS]) if grouped else 1
 
 
 def group_count(sweep: Sweep) -> int:
-    """Number of groups of cases."""
+    """Counts the groups of cases."""
     return case_count(sweep) // group_size(sweep)
 
 
 def part(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
-    """The groups of one of several parts of a sweep, none of which is empty or much larger."""
+    """Selects the groups of one of several parts of a sweep, none empty or much larger."""
     size, total = group_size(sweep), group_count(sweep)
     first, last = (size * (total * (number + edge) // parts) for edge in (0, 1))
     cases = islice(settings(sweep), first, last)
@@ -93,13 +93,13 @@ def part(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
 
 
 def unit_of(sweep: Sweep, key: str) -> str:
-    """The unit in which a parameter's values are given; "1" for plain numbers and for words."""
+    """Finds the unit of a parameter's values; "1" for plain numbers and for words."""
     first = taken_apart(next(islice(settings(sweep), 1))[key])
     return (first and first[1]) or "1"
 
 
 def laid(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
-    """The content of a problem file with a setting laid over it.
+    """Lays a setting over the content of a problem file.
 
     A single value at a key that holds a list is a list of one; new directions weigh equally.
     """
