@@ -33,7 +33,7 @@ class Quantity(NamedTuple):
     sampled: bool = True
 
     def along(self, motion: Floats, units: Ints) -> Floats:
-        """Computes the number (..., frames) of motions (..., frames, n, 3), units at places (n,)."""
+        """Computes the number (..., frames) of motions (..., frames, n, 3) of units (n,)."""
         return self.of(motion if self.less is None else motion - self.less[:, units])
 
 
