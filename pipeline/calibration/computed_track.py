@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.calibration.experiments import TrackedSpecimen, specimen, three
+from pipeline.calibration.experiments import TrackedSpecimen, per_dof, pose_specimen
 from pipeline.calibration.inputs import Constants, TrackedMotion
-from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
+from pipeline.posing import lattice_of, network_variables, spread_to_units, unit_coordinates
 from pipeline.runtime import UserError
 from pipeline.tracking.output import absent, labelled
 from sim.core import Floats
@@ -20,7 +20,7 @@ from sim.solvers import solve_case
 from sim.structure import Material
 
 
-def track_of(
+def simulate_track(
     asked: TrackedMotion, folder: Path, true: Constants, random: np.random.Generator
 ) -> xr.Dataset:
     """Simulates the `track` of a study's initial structure, made of the true constants.
@@ -29,23 +29,23 @@ def track_of(
         UserError: the problem is wrong.
     """
     assert asked.virtual is not None
-    made = specimen(asked, folder)
+    made = pose_specimen(asked, folder)
     count = 1 + int(made.scene.duration * asked.virtual.rate * (1 + 1e-9))
     time = np.arange(count) / asked.virtual.rate
-    posed = _posed(made, true)
+    posed = _true_scene(made, true)
     motion = _motion(posed, asked.case, time)
     force = np.full(count, np.nan)
     if asked.virtual.load is not None:
         clean = _force(made, posed, asked, motion, folder)
         force = clean + asked.virtual.load * random.normal(size=count)
-    noise = three(asked.virtual.noise)
-    bias = np.zeros(3) if asked.virtual.bias is None else three(asked.virtual.bias)
+    noise = per_dof(asked.virtual.noise)
+    bias = np.zeros(3) if asked.virtual.bias is None else per_dof(asked.virtual.bias)
     shape = motion.shape
     motion = motion + noise * random.normal(size=shape) + bias * random.normal(size=shape[1:])
     return _dataset(made, time, motion, np.broadcast_to(noise, shape), force)
 
 
-def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
+def _true_scene(made: TrackedSpecimen, true: Constants) -> Scene:
     """Poses the scene made of the true constants, to be simulated much finer than in a fit."""
     scene = made.scene
     axial, shear, bending, translation, rotation = true.numbers
@@ -94,13 +94,14 @@ def _dataset(
 ) -> xr.Dataset:
     intact, lattice = lattice_of(made.problem), made.scene.lattice
     network = network_variables(made.problem, made.scene)
-    vertices = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
+    vertices = spread_to_units(lattice.padded(lattice.vertices), lattice, intact.n_units)
     design = xr.Dataset(
         {"support": network["support"], "vertices": (("unit", "vertex", "xy"), vertices)},
         unit_coordinates(intact),
     )
     moved, told = (
-        spread(part, lattice, intact.n_units, axis=1).astype(np.float32) for part in (motion, sigma)
+        spread_to_units(part, lattice, intact.n_units, axis=1).astype(np.float32)
+        for part in (motion, sigma)
     )
     there = np.isin(intact.id, lattice.id)
     quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))

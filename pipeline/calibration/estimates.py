@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from pipeline.calibration.fit_uncertainty import Uncertainty, slopes
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats, Ints
 
@@ -19,7 +19,7 @@ WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 TOLD_APART = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
-DERIVED: tuple[Name, ...] = ("damping_translation", "damping_rotation")
+DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
 """What follows from a damping ratio by the authors' law."""
 
 
@@ -39,7 +39,7 @@ class Estimate(NamedTuple):
             each counted in its own standard errors.
     """
 
-    names: tuple[Name, ...]
+    names: tuple[ConstantName, ...]
     wanted: int
     value: Floats
     error: Floats
@@ -73,7 +73,7 @@ class Quality(NamedTuple):
     autocorrelation: Floats
 
 
-def estimate(fit: Fit, known: Uncertainty) -> Estimate:
+def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:
     """Computes values with their 95 % intervals, which are symmetric in the logarithm."""
     names = fit.model.names
     follows = DERIVED if "damping_ratio" in names else ()
@@ -98,7 +98,7 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     )
 
 
-def _values(here: Constants, names: Sequence[Name], logs: Floats) -> Floats:
+def _values(here: Constants, names: Sequence[ConstantName], logs: Floats) -> Floats:
     """Computes constants in working units, each from its own logarithm."""
     barrier = np.array([here.angles[0] if name == "contact_cutoff" else 0.0 for name in names])
     return barrier + np.exp(np.minimum(logs, 300.0))
@@ -113,7 +113,7 @@ def _quantile(fit: Fit) -> float:
     return float(student.ppf(0.975, max(len(fit.residual) - len(fit.unknowns) - unbiased, 1)))
 
 
-def quality(fit: Fit) -> Quality:
+def measure_quality(fit: Fit) -> Quality:
     """Measures how well the fit explains each set."""
     basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
     taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
@@ -136,7 +136,7 @@ def _autocorrelation(residual: Floats, fit: Fit, k: int) -> float:
     return float(product / max((residual**2).mean(), 1e-300))
 
 
-def warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
+def list_warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
     """Warns of weak constants and of sets that the model misses, a sentence each."""
     words = {
         WEAK: "{name} is weakly determined by these data: its standard error is {error:.0%}",

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.calibration.experiments import ForceTest, FullFieldExperiment
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.experiments import ForceExperiment, FullFieldExperiment
+from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats
 
@@ -35,7 +35,7 @@ class Uncertainty(NamedTuple):
     newton: float
 
 
-def uncertainty(fit: Fit) -> Uncertainty:
+def estimate_errors(fit: Fit) -> Uncertainty:
     """Returns the errors of a fit.
 
     The covariance is H^-1 J'J H^-1 (Huber 1967), with H the second derivatives of half the sum of
@@ -45,12 +45,12 @@ def uncertainty(fit: Fit) -> Uncertainty:
         SimulationError: an equilibrium on the way is not stable.
     """
     wanted = slice(len(fit.model.names))
-    inverse = inverted(fit.jacobian)
+    inverse = invert_information(fit.jacobian)
     by_adjoint = fit.jacobian.T @ fit.residual
-    by_adjoint[wanted] = gradient(fit)
+    by_adjoint[wanted] = adjoint_gradient(fit)
     step = inverse @ by_adjoint
     bound = np.sqrt(np.diag(inverse))
-    covariance = _wider(inverse, lost_to_drives(fit))[wanted, wanted]
+    covariance = _wider(inverse, information_lost(fit))[wanted, wanted]
     newton = float(np.abs(step / bound)[wanted].max())
     return Uncertainty(covariance, inverse[wanted, wanted], newton)
 
@@ -65,7 +65,7 @@ def _wider(inverse: Floats, lost: Floats) -> Floats:
     return np.asarray(axes @ axes.T)
 
 
-def lost_to_drives(fit: Fit) -> Floats:
+def information_lost(fit: Fit) -> Floats:
     """Computes the part of the second derivatives that drives known by measurement alone take.
 
     Which motion of the driven units explains the residuals best is another one at other constants:
@@ -104,7 +104,7 @@ def _lost_to_drive(fit: Fit, k: int, each: FullFieldExperiment) -> Floats:
     return (mixed + mixed.T + turned.T @ each.measured.unexplained(turned)) / level**2
 
 
-def inverted(jacobian: Floats) -> Floats:
+def invert_information(jacobian: Floats) -> Floats:
     """Inverts the information J'J; huge, not infinite, where the data tell nothing."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), _TINY)
     _, singular, right = np.linalg.svd(jacobian / size, full_matrices=False)
@@ -112,7 +112,7 @@ def inverted(jacobian: Floats) -> Floats:
     return np.asarray((scaled @ scaled.T) / np.outer(size, size))
 
 
-def gradient(fit: Fit) -> Floats:
+def adjoint_gradient(fit: Fit) -> Floats:
     """Computes derivatives (n_names,) of half the sum of squares, by the adjoint where possible."""
     model = fit.model
     constants, slopes = model.constants(fit.unknowns), _slopes(fit)
@@ -121,7 +121,7 @@ def gradient(fit: Fit) -> Floats:
     for k, each in enumerate(model.experiments):
         mine = model.set_of_row == k
         column = fit.jacobian[mine, : len(total)].T @ fit.residual[mine]
-        if not isinstance(each, ForceTest | FullFieldExperiment):
+        if not isinstance(each, ForceExperiment | FullFieldExperiment):
             total += column
             continue
         bar = each.measured.transposed(fit.residual[mine]) / fit.level[k]
@@ -137,7 +137,7 @@ def _slopes(fit: Fit) -> Floats:
 
 
 def slopes(
-    begin: Constants, names: Sequence[Name], logs: Floats, of: Callable[[Constants], Floats]
+    begin: Constants, names: Sequence[ConstantName], logs: Floats, of: Callable[[Constants], Floats]
 ) -> Floats:
     """Differentiates numbers (m,) of a specimen by logarithms of its constants (m, n_names)."""
     columns = []

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.calibration.experiments import Experiment
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from sim.core import Floats, SimulationError
 
 STEP = 1e-4
@@ -28,7 +28,7 @@ AGREED = 0.01
 ROUNDS = 6
 
 
-class Model(NamedTuple):
+class FitModel(NamedTuple):
     """Combines the wanted constants with all sets.
 
     Attributes:
@@ -38,7 +38,7 @@ class Model(NamedTuple):
     """
 
     begin: Constants
-    names: tuple[Name, ...]
+    names: tuple[ConstantName, ...]
     experiments: Sequence[Experiment]
 
     @property
@@ -118,7 +118,7 @@ class Fit(NamedTuple):
         bounds: (n_unknowns, 2) within which it was looked for.
     """
 
-    model: Model
+    model: FitModel
     unknowns: Floats
     level: Floats
     residual: Floats
@@ -126,7 +126,7 @@ class Fit(NamedTuple):
     bounds: Floats
 
 
-def fit(model: Model, near: Floats | None = None) -> Fit:
+def fit_least_squares(model: FitModel, near: Floats | None = None) -> Fit:
     """Finds the constants that fit best, from `near` on, or from the start.
 
     Levels of noise that are not known follow from the residuals of their sets, and weigh the sets
@@ -142,7 +142,7 @@ def fit(model: Model, near: Floats | None = None) -> Fit:
     bounds = np.stack([begin - reach, begin + reach], axis=1)
     level = _level(model, model.residual(unknowns), np.zeros((len(rows), 1)))
     for _ in range(ROUNDS):
-        unknowns = _solved(model, unknowns, level[rows], bounds)
+        unknowns = _solve(model, unknowns, level[rows], bounds)
         residual, jacobian = model.residual(unknowns), model.jacobian(unknowns)
         found = _level(model, residual, jacobian / level[rows, None])
         settled = np.ptp(np.log(found / level)) < AGREED
@@ -153,7 +153,7 @@ def fit(model: Model, near: Floats | None = None) -> Fit:
     return Fit(model, unknowns, level, residual / within, jacobian / within[:, None], bounds)
 
 
-def _solved(model: Model, start: Floats, level: Floats, bounds: Floats) -> Floats:
+def _solve(model: FitModel, start: Floats, level: Floats, bounds: Floats) -> Floats:
     """Solves for the least sum of squares at given levels (n,) of noise."""
     first = model.residual(start)
     wall = 10 * float(np.linalg.norm(first / level)) + 1.0
@@ -178,7 +178,7 @@ def _solved(model: Model, start: Floats, level: Floats, bounds: Floats) -> Float
     return np.asarray(found.x)
 
 
-def _level(model: Model, residual: Floats, jacobian: Floats) -> Floats:
+def _level(model: FitModel, residual: Floats, jacobian: Floats) -> Floats:
     """Computes root mean squares (n_sets,) of whitened residuals, over the freedom left."""
     basis = np.linalg.svd(jacobian, full_matrices=False)[0] if jacobian.any() else jacobian
     taken = (basis**2).sum(axis=1)

@@ -78,7 +78,7 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     seen = np.isfinite(measured.value).all(axis=1)
     held = SampledMotion(measured.time[seen], measured.value[seen])
     if len(held.time) < LEAST_FRAMES:
-        raise too_few(len(held.time))
+        raise too_few_frames(len(held.time))
     tried = _lags(held, nominal)
     found = np.array([_correlation(held, nominal, lag) for lag in tried])
     place, ambiguous = _best(tried, found)
@@ -97,7 +97,7 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     return Lag(lag, sigma, correlation, gain, gain_sigma, ambiguous)
 
 
-def too_few(frames: int) -> UserError:
+def too_few_frames(frames: int) -> UserError:
     """Explains that a track is too short."""
     return UserError(
         "too few frames show the driven units",
@@ -174,7 +174,7 @@ def _inflation(rest: Floats) -> float:
     return (1 + alike) / (1 - alike)
 
 
-def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
+def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
     """Finds the nominal time (frames,) of the measured drive's place; NaN beyond its ends.
 
     Args:
@@ -189,7 +189,7 @@ def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
         remedy = "compare under a ramp: give the problem a drive of that kind"
         raise UserError("a quasi-static drive to and fro has no load axis", remedy=remedy)
     if (seen := int(np.isfinite(measured).sum())) < LEAST_FRAMES:
-        raise too_few(seen)
+        raise too_few_frames(seen)
     span = float(np.ptp(course))
     if (reached := float(np.nanmax(measured) - course[0])) < _LEAST_RANGE * span:
         raise UserError(
@@ -204,7 +204,7 @@ def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
     return np.where(inside, np.interp(measured, finer, dense), np.nan)
 
 
-def branches(measured: Floats) -> NDArray[np.int8]:
+def find_branches(measured: Floats) -> NDArray[np.int8]:
     """Tells growing from falling load (frames,); while it rests, as before."""
     course = _filled(measured)
     width = max(len(course) // 40, 1)
@@ -221,7 +221,7 @@ def _filled(values: Floats) -> Floats:
     return np.interp(np.arange(len(values)), seen, values[seen])
 
 
-def turn(measured: Floats, nominal: Floats) -> float:
+def drive_turn(measured: Floats, nominal: Floats) -> float:
     """Computes the direction of a measured drive (frames, 2) less that of the nominal one, rad."""
     both = np.isfinite(measured + nominal).all(axis=1)
     first, last = measured[both], nominal[both]

@@ -7,7 +7,7 @@ import numpy as np
 from sim.core import Floats
 
 
-def reduction(before: Floats, after: Floats) -> Floats:
+def compute_reduction(before: Floats, after: Floats) -> Floats:
     """Computes value and ends of the interval (3,) of 1 - after / before.
 
     The distances of the ends from the values add up as those of independent errors do, to first

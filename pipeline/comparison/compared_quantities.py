@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.comparison.nominal_side import nominal
+from pipeline.comparison.nominal_side import interpolate_response
 from pipeline.problem import Problem
 from sim.core import Floats, Ints, Mask
 
@@ -37,7 +37,7 @@ class Quantity(NamedTuple):
         return self.of(motion if self.less is None else motion - self.less[:, units])
 
 
-def quantities(
+def list_quantities(
     asked: Problem, response: xr.Dataset, time: Floats, inside: Mask
 ) -> dict[str, Quantity]:
     """Lists the quantities by name; without an intact structure there is nothing to mimic.
@@ -50,42 +50,44 @@ def quantities(
     """
     units = np.flatnonzero(inside)
     low, high = (middle_units(asked, side) for side in ("bottom", "top"))
-    nearer, rows = partial(nearing, lower=len(low)), np.array([*low, *high])
+    nearer, rows = partial(mean_approach, lower=len(low)), np.array([*low, *high])
     found = {
-        "mean_rotation": Quantity(rotation, units),
-        "mean_displacement": Quantity(distance, units),
+        "mean_rotation": Quantity(mean_rotation, units),
+        "mean_displacement": Quantity(mean_displacement, units),
         "contraction": Quantity(nearer, rows, sampled=False),
     }
     if "intact" in response["structure"].values:
         intact = response.sel(structure="intact")
-        of = partial(size, spacing=asked.lattice.spacing)
+        of = partial(normalised_rms, spacing=asked.lattice.spacing)
         motion = intact["displacement"].transpose("time", "unit", "dof").values
         course = of(motion[:, units])
         of = partial(of, unit=course[-1] if asked.static else course.max())
-        found["mimicking_error"] = Quantity(of, units, nominal(intact, time).displacement)
+        found["mimicking_error"] = Quantity(
+            of, units, interpolate_response(intact, time).displacement
+        )
     return found
 
 
-def rotation(motion: Floats) -> Floats:
+def mean_rotation(motion: Floats) -> Floats:
     """Computes the mean |theta|, rad."""
-    return mean(np.abs(motion[..., 2]))
+    return known_mean(np.abs(motion[..., 2]))
 
 
-def distance(motion: Floats) -> Floats:
+def mean_displacement(motion: Floats) -> Floats:
     """Computes the mean |u|, mm."""
-    return mean(np.linalg.norm(motion[..., :2], axis=-1))
+    return known_mean(np.linalg.norm(motion[..., :2], axis=-1))
 
 
-def nearing(motion: Floats, lower: int) -> Floats:
+def mean_approach(motion: Floats, lower: int) -> Floats:
     """Computes the approach of the first ``lower`` units to the others, which are above, mm."""
     rise = motion[..., 1]
-    return mean(rise[..., :lower]) - mean(rise[..., lower:])
+    return known_mean(rise[..., :lower]) - known_mean(rise[..., lower:])
 
 
-def size(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
+def normalised_rms(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
     """Computes the root mean square of |U|, U = (ux/spacing, uy/spacing, theta), in units."""
     square = np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1)
-    return np.asarray(np.sqrt(mean(square)) / unit)
+    return np.asarray(np.sqrt(known_mean(square)) / unit)
 
 
 def middle_units(problem: Problem, side: str) -> list[int]:
@@ -97,7 +99,7 @@ def middle_units(problem: Problem, side: str) -> list[int]:
     return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
 
 
-def mean(values: Floats) -> Floats:
+def known_mean(values: Floats) -> Floats:
     """Computes the mean over the last axis of those that are known; NaN of none."""
     known = np.isfinite(values)
     count = known.sum(axis=-1)

@@ -9,10 +9,10 @@ import xarray as xr
 
 from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
-from pipeline.comparison.curves import Sides
+from pipeline.comparison.curves import ComparedSides
 from pipeline.comparison.measured_side import Measurement
-from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimates
-from pipeline.comparison.nominal_side import ComparisonAxis, Nominal
+from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, ComparedPair, estimate_metrics
+from pipeline.comparison.nominal_side import ComparisonAxis, NominalSide
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
 from pipeline.problem import Problem
@@ -57,7 +57,7 @@ class Compared(NamedTuple):
     measurement: Measurement
     axis: ComparisonAxis
     simulation: SimulatedSide
-    nominal: Nominal
+    nominal: NominalSide
     quantities: dict[str, Quantity]
     design: xr.Dataset
     frequency: float
@@ -65,14 +65,16 @@ class Compared(NamedTuple):
     pixel: tuple[float, float]
 
     @property
-    def sides(self) -> Sides:
+    def sides(self) -> ComparedSides:
         """Both simulations and what was measured, NaN where there is nothing to compare."""
         measured, sigma = self.measurement.displacement, self.measurement.sigma
         simulated, copies = self.simulation.displacement, self.simulation.copies
-        return Sides(measured, sigma, simulated, self.nominal.displacement, copies, self.level)
+        return ComparedSides(
+            measured, sigma, simulated, self.nominal.displacement, copies, self.level
+        )
 
 
-def dataset(made: Compared) -> xr.Dataset:
+def assemble_comparison(made: Compared) -> xr.Dataset:
     """Assembles the dataset ``comparison``, without its attributes."""
     random = np.random.default_rng(SEED)
     design, axis, measurement = made.design, made.axis, made.measurement
@@ -127,10 +129,10 @@ def _motions(made: Compared) -> Variables:
         "quality": (("time", "unit"), quality),
         "use": (("unit",), measurement.use),
         "nominal_drive": (("time", "xy"), made.nominal.drive),
-        "band_coverage": (("dof",), curves.coverage(compared, band)),
+        "band_coverage": (("dof",), curves.band_coverage(compared, band)),
         "band_coverage_usual": (
             ("dof",),
-            curves.usual_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
+            curves.expected_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
         ),
         "band_samples": ((), len(sides.copies)),
     }
@@ -140,10 +142,10 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
     sides, inside = made.sides, made.measurement.compared
     time = None if made.axis.lag is None else made.measurement.time
     pairs = [
-        Pair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
+        ComparedPair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
         for motion in sides.motions[1:]
     ]
-    found = np.stack([estimates(pair, time, random) for pair in pairs])
+    found = np.stack([estimate_metrics(pair, time, random) for pair in pairs])
     table: Variables = {
         name: (_OF_SIDE, np.moveaxis(found[:, :, place], 1, -1))
         for place, name in enumerate(METRICS)
@@ -163,8 +165,8 @@ def _forces(made: Compared, random: np.random.Generator) -> Variables:
     measured = made.measurement.force[:, None, None]
     still = np.zeros_like(measured)
     sides = (made.simulation.force, made.nominal.force)
-    pairs = [Pair(measured, force[:, None, None], still) for force in sides]
-    found = np.stack([estimates(pair, None, random)[..., 0] for pair in pairs])
+    pairs = [ComparedPair(measured, force[:, None, None], still) for force in sides]
+    found = np.stack([estimate_metrics(pair, None, random)[..., 0] for pair in pairs])
     names = {"force_rmse": "rmse", "force_nrmse": "nrmse"}
     return {
         name: (("side", "estimate"), found[:, :, METRICS.index(metric)])
@@ -176,14 +178,17 @@ def _curves(made: Compared, random: np.random.Generator) -> Variables:
     sides, along = made.sides, ("source", "time", "estimate")
     nothing = np.full((3, len(sides.measured), 3), np.nan)
     followed = {
-        name: curves.curve(sides, made.quantities[name], random)
+        name: curves.quantity_curve(sides, made.quantities[name], random)
         if name in made.quantities
         else nothing
         for name in FOLLOWED
     }
     return {
         **{name: (along, values) for name, values in followed.items()},
-        "peak_to_peak": (("source", "unit", "dof", "estimate"), curves.peaks(sides, random)),
+        "peak_to_peak": (
+            ("source", "unit", "dof", "estimate"),
+            curves.estimate_peaks(sides, random),
+        ),
     }
 
 
@@ -221,7 +226,7 @@ def root_mean_square(values: Floats, axis: int) -> Floats:
     return np.where(count > 0, np.sqrt(mean), np.nan)
 
 
-def attributes(asked: Problem, made: Compared) -> dict[str, str]:
+def describe_comparison(asked: Problem, made: Compared) -> dict[str, str]:
     """Describes in words how the sides were brought together, and how the band was drawn.
 
     Args:

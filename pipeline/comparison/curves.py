@@ -9,8 +9,8 @@ from scipy.special import ndtri
 
 from pipeline.comparison import tolerance_band as bands
 from pipeline.comparison.compared_quantities import Quantity
-from pipeline.comparison.metrics import COPIES, LEVEL, limits
-from pipeline.comparison.redrive import filtered
+from pipeline.comparison.metrics import COPIES, LEVEL, interval_ends
+from pipeline.comparison.redrive import fit_smoothing_spline
 from sim.core import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
@@ -19,7 +19,7 @@ _TRIALS = 50
 _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
-class Sides(NamedTuple):
+class ComparedSides(NamedTuple):
     """Holds the sides of a comparison at its frames.
 
     Attributes:
@@ -45,10 +45,10 @@ class Sides(NamedTuple):
         """Computes lower limit, median and upper limit (3, ...) over copies; NaN of none."""
         if len(copies) == 0:
             return np.full((3, *copies.shape[1:]), np.nan)
-        return bands.limits(copies, self.level)
+        return bands.band_limits(copies, self.level)
 
 
-def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+def quantity_curve(sides: ComparedSides, quantity: Quantity, random: np.random.Generator) -> Floats:
     """Computes a quantity along the frames (3 sides, frames, 3 estimates).
 
     Args:
@@ -65,7 +65,9 @@ def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floa
     return out
 
 
-def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+def _measured_limits(
+    sides: ComparedSides, quantity: Quantity, random: np.random.Generator
+) -> Floats:
     """Computes an interval (2, frames) by a bootstrap over units, with the noise."""
     units, count = quantity.units, len(quantity.units)
     copies = np.empty((COPIES, len(sides.measured)))
@@ -74,7 +76,7 @@ def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generat
         drawn = units[random.integers(count, size=count)] if sampled else units
         noise = random.standard_normal((len(copy), count, 3)) * sides.sigma[:, drawn]
         copy[:] = quantity.along(sides.measured[:, drawn] + noise, drawn)
-    return limits(copies)
+    return interval_ends(copies)
 
 
 def peak_to_peak(motion: Floats) -> Floats:
@@ -100,7 +102,7 @@ def _highest(motion: Floats) -> Floats:
     return np.asarray(np.where(inner, top + rise, top).squeeze(axis=-3))
 
 
-def peaks(sides: Sides, random: np.random.Generator) -> Floats:
+def estimate_peaks(sides: ComparedSides, random: np.random.Generator) -> Floats:
     """Computes peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
     Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
@@ -117,7 +119,7 @@ def peaks(sides: Sides, random: np.random.Generator) -> Floats:
     return out
 
 
-def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
+def _added_by_noise(sides: ComparedSides, random: np.random.Generator) -> Floats:
     """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
     smooth = _smooth(sides)
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
@@ -127,7 +129,7 @@ def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
     return added
 
 
-def _smooth(sides: Sides) -> Floats:
+def _smooth(sides: ComparedSides) -> Floats:
     """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)
@@ -135,25 +137,25 @@ def _smooth(sides: Sides) -> Floats:
     for unit, dof in np.argwhere(there.mean(axis=0) >= _SEEN):
         known = there[:, unit, dof]
         course, sigma = (each[known, unit, dof] for each in (sides.measured, sides.sigma))
-        out[known, unit, dof] = filtered(frames[known], course, sigma)(frames[known])
+        out[known, unit, dof] = fit_smoothing_spline(frames[known], course, sigma)(frames[known])
     return out
 
 
-def coverage(sides: Sides, band: Floats) -> Floats:
+def band_coverage(sides: ComparedSides, band: Floats) -> Floats:
     """Computes the share (dofs,) of measurements in the band, widened by their noise.
 
     Args:
         sides: of the comparison.
         band: (3, frames, units, dofs) of displacements.
     """
-    low, _, high = bands.widened(band, sides.sigma, sides.level)
+    low, _, high = bands.widen_band(band, sides.sigma, sides.level)
     known = np.isfinite(sides.measured) & np.isfinite(low)
     inside = (sides.measured >= low) & (sides.measured <= high) & known
     count = known.sum(axis=(0, 1))
     return np.where(count > 0, inside.sum(axis=(0, 1)) / np.maximum(count, 1), np.nan)
 
 
-def usual_coverage(copies: Floats, band: Floats, level: float) -> Floats:
+def expected_coverage(copies: Floats, band: Floats, level: float) -> Floats:
     """Computes the share (dofs,) of its motion in the band that a copy has with a probability.
 
     One specimen is one draw: where it is far off in a constant, all its units leave the band

@@ -22,7 +22,7 @@ _LONGEST = 4  # blocks in a recording, at least
 _STEPS = 6
 
 
-class Pair(NamedTuple):
+class ComparedPair(NamedTuple):
     """Holds both sides of a comparison, NaN in either where there is nothing to compare.
 
     Attributes:
@@ -38,13 +38,15 @@ class Pair(NamedTuple):
     slope: Floats | None = None
     added: bool = False
 
-    def taken(self, frames: Ints, units: Ints) -> Pair:
+    def taken(self, frames: Ints, units: Ints) -> ComparedPair:
         """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
-        return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
+        return ComparedPair(
+            self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope
+        )
 
-    def noisier(self, random: np.random.Generator) -> Pair:
+    def noisier(self, random: np.random.Generator) -> ComparedPair:
         """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)
@@ -60,7 +62,7 @@ class _Moments(NamedTuple):
     correlation: Floats
 
 
-def metrics(pair: Pair) -> Floats:
+def compute_metrics(pair: ComparedPair) -> Floats:
     """Computes metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
     mean = _moments(pair)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -74,7 +76,7 @@ def metrics(pair: Pair) -> Floats:
     return np.where(np.isfinite(rows), rows, np.nan)
 
 
-def _moments(pair: Pair) -> _Moments:
+def _moments(pair: ComparedPair) -> _Moments:
     both = np.isfinite(pair.measured - pair.simulated)
     count = both.sum(axis=(0, 1))
 
@@ -94,7 +96,7 @@ def _moments(pair: Pair) -> _Moments:
     return _Moments(residual, mean(pair.measured**2) - extra, variance, noise, alike)
 
 
-def _shift(pair: Pair) -> Floats:
+def _shift(pair: ComparedPair) -> Floats:
     """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
@@ -105,7 +107,7 @@ def _shift(pair: Pair) -> Floats:
         return np.asarray(-np.where(known, ahead, 0.0).sum(axis=(0, 1)) / steep.sum(axis=(0, 1)))
 
 
-def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
+def align_in_time(pair: ComparedPair, time: Floats) -> tuple[ComparedPair, Floats]:
     """Delays the simulated side as much as the measured one, and tells by how much (dofs,), s.
 
     The shift is NaN where the sides are so unlike that none is found.
@@ -116,14 +118,14 @@ def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
     """
     most = float(np.ptp(time)) / _LONGEST
     total = np.zeros(pair.measured.shape[-1])
-    moved = _late(pair, time, total)
+    moved = _delay(pair, time, total)
     for _ in range(_STEPS):
         total = np.clip(total + np.nan_to_num(_shift(moved)), -most, most)
-        moved = _late(pair, time, total)
+        moved = _delay(pair, time, total)
     return moved, np.where(np.abs(total) < most, total, np.nan)
 
 
-def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
+def _delay(pair: ComparedPair, time: Floats, lag: Floats) -> ComparedPair:
     """Delays the simulated side by ``lag`` (dofs,) s; NaN where that is not known."""
     made = np.full_like(pair.simulated, np.nan)
     for dof, late in enumerate(lag):
@@ -137,7 +139,9 @@ def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
     return pair._replace(simulated=made, slope=np.gradient(made, time, axis=0))
 
 
-def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
+def estimate_metrics(
+    pair: ComparedPair, time: Floats | None, random: np.random.Generator
+) -> Floats:
     """Computes value and ends of the interval (3, len(METRICS), dofs) of every metric.
 
     Args:
@@ -145,31 +149,31 @@ def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> F
         time: (frames,) s; None for a quasi-static pair, which has no shift in time.
         random: draws the copies.
     """
-    found = bootstrap(pair, metrics, random)
+    found = bootstrap(pair, compute_metrics, random)
     if time is None:
         return found
-    late, total = shifted(pair, time)
+    late, total = align_in_time(pair, time)
     shift = bootstrap(late, lambda copy: _shift(copy)[None], random)[:, 0]
     found[:, METRICS.index("time_shift")] = total + shift - shift[0]
     return found
 
 
 def bootstrap(
-    pair: Pair, statistic: Callable[[Pair], Floats], random: np.random.Generator
+    pair: ComparedPair, statistic: Callable[[ComparedPair], Floats], random: np.random.Generator
 ) -> Floats:
     """Computes a statistic's value and the ends of its interval, stacked (3, ...)."""
     frames, units = pair.measured.shape[:2]
     length = block_length(pair.measured - pair.simulated)
 
-    def copy() -> Pair:
+    def copy() -> ComparedPair:
         drawn = np.asarray(random.integers(units, size=units))
         return pair.taken(_blocks(frames, length, random), drawn).noisier(random)
 
     copies = [statistic(copy()) for _ in range(COPIES)]
-    return np.concatenate([statistic(pair)[None], limits(np.array(copies))])
+    return np.concatenate([statistic(pair)[None], interval_ends(np.array(copies))])
 
 
-def limits(copies: Floats) -> Floats:
+def interval_ends(copies: Floats) -> Floats:
     """Computes the ends (2, ...) of the interval of most copies (n, ...); NaN for none."""
     ends = np.full((2, *copies.shape[1:]), np.nan)
     known = np.isfinite(copies).all(axis=0)

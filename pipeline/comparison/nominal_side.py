@@ -30,7 +30,7 @@ class ComparisonAxis(NamedTuple):
     turn: float
 
 
-class Nominal(NamedTuple):
+class NominalSide(NamedTuple):
     """Holds the response at the frames.
 
     Attributes:
@@ -44,13 +44,13 @@ class Nominal(NamedTuple):
     force: Floats
 
 
-def along(response: xr.Dataset) -> Floats:
+def drive_direction(response: xr.Dataset) -> Floats:
     """Computes the unit vector (2,) of the drive of a response of one case."""
     angle = np.deg2rad(float(response["direction"]))
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
+def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
     """Places the measured frames on the axis of a response of one structure and case.
 
     Args:
@@ -65,18 +65,18 @@ def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> 
     nominal = SampledMotion(response["time"].values, response["drive_displacement"].values)
     if not static:
         lag = alignment.find_lag(SampledMotion(time, drive), nominal)
-        turn = alignment.turn(drive, nominal.at(time - lag.value))
+        turn = alignment.drive_turn(drive, nominal.at(time - lag.value))
         still = np.full(len(time), alignment.MOTION, dtype=np.int8)
         shown = np.where(time - lag.value <= nominal.time[-1], time - lag.value, np.nan)
         return ComparisonAxis(shown, still, lag, turn)
-    way = along(response)
+    way = drive_direction(response)
     pushed = SampledMotion(nominal.time, (nominal.value @ way)[:, None])
-    shown = alignment.load_time(drive @ way, pushed)
-    turn = alignment.turn(drive, nominal.at(shown))
-    return ComparisonAxis(shown, alignment.branches(drive @ way), None, turn)
+    shown = alignment.find_load_time(drive @ way, pushed)
+    turn = alignment.drive_turn(drive, nominal.at(shown))
+    return ComparisonAxis(shown, alignment.find_branches(drive @ way), None, turn)
 
 
-def nominal(response: xr.Dataset, time: Floats) -> Nominal:
+def interpolate_response(response: xr.Dataset, time: Floats) -> NominalSide:
     """Interpolates a response of one structure and case at its own times, NaN where these are.
 
     Before its start it rests; between its samples runs a cubic spline.
@@ -95,5 +95,7 @@ def nominal(response: xr.Dataset, time: Floats) -> Nominal:
     displacement = np.full((len(time), *motion.shape[1:]), np.nan)
     displacement[:, present] = course(motion[:, present])
     drive = course(response["drive_displacement"].transpose("time", "xy").values)
-    force = course(response["drive_force"].transpose("time", "xy").values @ along(response))
-    return Nominal(displacement, drive, force)
+    force = course(
+        response["drive_force"].transpose("time", "xy").values @ drive_direction(response)
+    )
+    return NominalSide(displacement, drive, force)

@@ -56,7 +56,7 @@ class HermiteMotion(NamedTuple):
         return value[before] + s * rise + s * (1 - s) * ((1 - s) * bend + s * other)
 
 
-class Held(NamedTuple):
+class HeldMotion(NamedTuple):
     """Holds the filtered motion of the units that supports and drive hold.
 
     Attributes:
@@ -77,7 +77,7 @@ class Held(NamedTuple):
     assumed: Mask
 
 
-class Redriven(NamedTuple):
+class RedrivenMotion(NamedTuple):
     """Holds a simulation under the measured motion.
 
     Attributes:
@@ -92,7 +92,7 @@ class Redriven(NamedTuple):
     failure: str | None = None
 
 
-def held_motion(track: xr.Dataset, scene: Scene) -> Held:
+def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     """Filters the motion of the driven units and of those clamped in all three dofs.
 
     Args:
@@ -123,7 +123,9 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     for place, dof in np.ndindex(noise.shape):
         if not assumed[place]:
             kept = there[:, place]
-            spline = filtered(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
+            spline = fit_smoothing_spline(
+                time[kept], measured[kept, place, dof], sigma[kept, place, dof]
+            )
             value[:, place, dof] = spline(instants)
             slope[:, place, dof] = spline(instants, 1)
             rest = measured[kept, place, dof] - spline(time[kept])
@@ -131,7 +133,7 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     mean = driven & ~assumed
     for course in (value, slope):
         course[:, driven & assumed] = course[:, mean].mean(axis=1, keepdims=True)
-    return Held(
+    return HeldMotion(
         unit, driven, HermiteMotion(step, value, slope), noise, 1 - there.mean(axis=0), assumed
     )
 
@@ -143,12 +145,12 @@ def held_units(scene: Scene) -> tuple[Ints, Mask]:
     return unit, np.isin(unit, scene.driven)
 
 
-def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
+def fit_smoothing_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
     """Fits the smoothing spline of a course (n,) with standard uncertainties (n,); n >= 8."""
     return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
 
 
-def under(scene: Scene, held: Held) -> Scene:
+def driven_as_measured(scene: Scene, held: HeldMotion) -> Scene:
     """Drives all held units as measured; the scene's end is that of the measurement."""
     followed = (3 * held.unit[:, None] + np.arange(3)).ravel()
     return replace(
@@ -163,7 +165,7 @@ def under(scene: Scene, held: Held) -> Scene:
     )
 
 
-def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
+def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats) -> RedrivenMotion:
     """Simulates the structure under the measured motion: in time, or as a path of equilibria.
 
     Args:
@@ -172,7 +174,7 @@ def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
         times: (n_times,) on the track's clock, ascending, s.
     """
     scene, vertices = structure
-    driven = under(scene, held)
+    driven = driven_as_measured(scene, held)
     values = concrete_parameters(driven, vertices)
     shape = (len(times), scene.lattice.n_units, 3)
     displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)
@@ -188,4 +190,4 @@ def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
         reaction = observe(driven.topology, values, found).reaction
         displacement[: len(found)] = found
         force[: len(found)] = reaction[:, scene.driven, :2].sum(axis=1)
-    return Redriven(displacement, force, failure)
+    return RedrivenMotion(displacement, force, failure)

@@ -71,7 +71,7 @@ def register(design: Floats, measured: Floats) -> Registration:
     )
 
 
-def measured_places(track: xr.Dataset, design: Floats) -> Floats:
+def measure_places(track: xr.Dataset, design: Floats) -> Floats:
     """Computes the places of the units at rest (units, 2) by the camera, mm; NaN if unseen.
 
     Args:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import redrive, tolerance_band
-from pipeline.posing import PosedStructure, spread
+from pipeline.posing import PosedStructure, spread_to_units
 from pipeline.problem import Problem
 from sim.core import Floats
 
@@ -34,7 +34,7 @@ class SimulatedSide(NamedTuple):
     failures: tuple[str, ...]
 
 
-def simulation(
+def simulate_specimen(
     asked: Problem,
     structure: PosedStructure,
     track: xr.Dataset,
@@ -55,22 +55,22 @@ def simulation(
     Raises:
         UserError: no driven unit was seen.
     """
-    held = redrive.held_motion(track, structure.scene)
+    held = redrive.filter_held_motion(track, structure.scene)
     clock = times - track["time"].values[0]
-    made = redrive.redriven(structure, held, clock)
+    made = redrive.simulate_redriven(structure, held, clock)
     lattice, size = structure.scene.lattice, track.sizes["unit"]
-    displacement = spread(made.displacement, lattice, size, axis=1)
+    displacement = spread_to_units(made.displacement, lattice, size, axis=1)
     if made.failure is not None:
         LOG.warning("warning: the simulation ended early: %s", made.failure)
         nothing = np.empty((0, *displacement.shape))
         return SimulatedSide(
             displacement, made.drive_force @ way, nothing, nothing[..., 0, 0], (made.failure,)
         )
-    copies = tolerance_band.sampled(asked, structure, clock, held, threads=threads)
+    copies = tolerance_band.sample_specimens(asked, structure, clock, held, threads=threads)
     return SimulatedSide(
         displacement,
         made.drive_force @ way,
-        spread(copies.displacement, lattice, size, axis=2),
+        spread_to_units(copies.displacement, lattice, size, axis=2),
         copies.drive_force @ way,
         copies.failures,
     )

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.comparison.redrive import Held, under
+from pipeline.comparison.redrive import HeldMotion, driven_as_measured
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem import Problem
 from pipeline.runtime import cli
@@ -29,7 +29,7 @@ STREAM = 1
 """First word of the seeds of all draws here, so that no other specimen equals one of them."""
 
 
-class Samples(NamedTuple):
+class SpecimenSamples(NamedTuple):
     """Holds specimens that were simulated.
 
     Attributes:
@@ -43,14 +43,14 @@ class Samples(NamedTuple):
     failures: tuple[str, ...]
 
 
-def sampled(
+def sample_specimens(
     asked: Problem,
     structure: PosedStructure,
     times: Floats,
-    held: Held | None = None,
+    held: HeldMotion | None = None,
     case: int = 0,
     threads: int = 1,
-) -> Samples:
+) -> SpecimenSamples:
     """Draws and simulates specimens of a structure.
 
     Args:
@@ -65,7 +65,7 @@ def sampled(
         SimulationError: the structure as designed cannot be simulated.
     """
     planned, vertices = structure
-    scene = _alone(planned, case) if held is None else under(planned, held)
+    scene = _single_case(planned, case) if held is None else driven_as_measured(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
     unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
@@ -85,14 +85,14 @@ def sampled(
                 courses.append(outcome.value)
             bar.update(failed=len(failures))
     shape = (len(courses), len(times))
-    return Samples(
+    return SpecimenSamples(
         np.array([motion for motion, _ in courses]).reshape(*shape, scene.lattice.n_units, 3),
         np.array([force for _, force in courses]).reshape(*shape, 2),
         tuple(failures),
     )
 
 
-def _alone(scene: Scene, case: int) -> Scene:
+def _single_case(scene: Scene, case: int) -> Scene:
     """Keeps one load case of a scene."""
     return replace(scene, motions=(scene.motions[case],), weights=np.ones(1))
 
@@ -115,7 +115,7 @@ def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
     return reduce
 
 
-def limits(values: Floats, level: float) -> Floats:
+def band_limits(values: Floats, level: float) -> Floats:
     """Computes lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
 
     The limits hold the next sample with the probability ``level``; with too few samples for that
@@ -126,7 +126,7 @@ def limits(values: Floats, level: float) -> Floats:
     return np.asarray(np.quantile(values, shares, axis=0, method="weibull"))
 
 
-def widened(band: Floats, sigma: Floats, level: float) -> Floats:
+def widen_band(band: Floats, sigma: Floats, level: float) -> Floats:
     """Widens the band (3, ...) by standard uncertainties ``sigma`` (...) of a measurement."""
     low, middle, high = band
     noise = ndtri((1 + level) / 2) * sigma

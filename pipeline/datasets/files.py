@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline.datasets import seal
 from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
-from pipeline.datasets.validation import MIGRATED, faults, migrate
+from pipeline.datasets.validation import MIGRATED, find_faults, migrate
 from pipeline.runtime import UserError, write_atomically
 
 _CHUNK = bytes(1 << 20)
@@ -44,13 +44,13 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
     """
     path = Path(path)
     described = _described(dataset, kind, provenance)
-    for fault in faults(described, kind):
+    for fault in find_faults(described, kind):
         told = "" if fault.value is None else f": {fault.value}"
         raise SchemaError(f"{kind} dataset, {fault.name}: {fault.what}{told}")
     with write_atomically(path) as aside:
         try:
             _to_netcdf(described, aside, kind)
-            seal.put(aside)
+            seal.write_seal(aside)
             read(aside, kind)
         except (OSError, RuntimeError) as error:  # netCDF4 seldom says why a write failed
             raise _probe(aside, dataset.nbytes) or error from error
@@ -66,7 +66,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     path = Path(path)
     remedy = "delete it and run the stage that makes it again"
     try:
-        sealed = seal.state(path)
+        sealed = seal.check_seal(path)
         if sealed == "broken":
             raise UserError("damaged: it is not what was written", file=path, remedy=remedy)
         dataset = _loaded(path)
@@ -79,7 +79,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
     _check_origin(dataset, path, kind, remedy)
     dataset = migrate(dataset, kind)
-    for fault in faults(dataset, kind):
+    for fault in find_faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
     if dataset.attrs.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
         raise UserError(
@@ -148,7 +148,7 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
         "schema_version": SCHEMA_VERSION,
         **dataset.attrs,
         **provenance,
-        seal.ATTRIBUTE: seal.WORDS,
+        seal.ATTRIBUTE: seal.DESCRIPTION,
     }
     return xr.Dataset(
         {name: described[name] for name in names if name not in labels},

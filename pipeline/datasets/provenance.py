@@ -25,7 +25,7 @@ PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shap
 _ROOT = Path(__file__).resolve().parents[2]
 
 
-def attributes(
+def study_attributes(
     problem: Problem,
     stage: Stage,
     *,
@@ -50,7 +50,7 @@ def attributes(
     }
 
 
-def recorded(
+def recording_attributes(
     description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
 ) -> dict[str, str]:
     """Records the provenance of what is made of a recording or of a calibration's measurements.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO, Literal
 
 ATTRIBUTE = "seal"
-WORDS = "SHA-256 of the file, in its last 32 bytes"
+DESCRIPTION = "SHA-256 of the file, in its last 32 bytes"
 _MARK = b"metacloak.sha256"
 _LENGTH = len(_MARK) + hashlib.sha256().digest_size
 _PIECE = 1 << 20
@@ -20,14 +20,14 @@ _PIECE = 1 << 20
 State = Literal["whole", "broken", "absent"]
 
 
-def put(path: Path) -> None:
+def write_seal(path: Path) -> None:
     """Seals a file."""
     with path.open("r+b") as file:
         size = file.seek(0, 2)
         file.write(_MARK + _digest(file, size))
 
 
-def state(path: Path) -> State:
+def check_seal(path: Path) -> State:
     """Checks the seal of a file against its bytes.
 
     Raises:

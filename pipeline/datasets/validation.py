@@ -27,7 +27,7 @@ class SchemaFault:
     value: object = None
 
 
-def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
+def find_faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
     """Finds faults that keep `dataset` from being one of `kind`, beside its provenance."""
     table = TABLES[kind]
     for name, variable in table.items():

@@ -15,7 +15,7 @@ from sim.structure import Parameters, parameters, shape
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 
 
-def waves(asked: Problem, wanted: Spectrum) -> Variables:
+def compute_bands(asked: Problem, wanted: Spectrum) -> Variables:
     """Computes bands of the unit cell at rest and compressed.
 
     Raises:

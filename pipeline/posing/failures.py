@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _KEYS = {"convexity": "convex"}
 
 
-def infeasible(
+def infeasible_start(
     error: InfeasibleStartError, constraints: ConstraintVector, source: Path
 ) -> UserError:
     """Explains that no design near the start can be made."""
@@ -33,7 +33,7 @@ def infeasible(
     )
 
 
-class Simulated(NamedTuple):
+class SimulatedStructure(NamedTuple):
     """Names the structure of a problem file that was simulated at solver times (n_asked,)."""
 
     source: Path
@@ -42,7 +42,9 @@ class Simulated(NamedTuple):
     asked: NDArray[np.float64]
 
 
-def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> UserError:
+def simulation_failure(
+    error: SimulationError, tried: SimulatedStructure, kept: Path | None
+) -> UserError:
     """Explains that a structure's motion could not be followed to its end.
 
     Args:

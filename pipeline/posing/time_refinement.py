@@ -17,7 +17,7 @@ from pipeline.posing.case_result import (
     times_of,
 )
 from pipeline.posing.to_scene import scene_of
-from pipeline.posing.verification import AS_RUN, Numbers
+from pipeline.posing.verification import AS_RUN, CheckResult
 from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.scene import concrete_parameters, make_plan, objective, scales
@@ -71,7 +71,7 @@ def _run(solver: Solver, values: ConcreteParameters, drive: PrescribedMotion) ->
 
 def trials(
     asked: Problem, folder: Path, design: xr.Dataset
-) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
+) -> tuple[dict[str, dict[str, CheckResult]], dict[str, str]]:
     """Numbers by check and structure, and by check whether there are any or why not.
 
     Raises:
@@ -114,7 +114,7 @@ def _halved(structure: PosedStructure, runs: list[Run]) -> list[Run]:
 
 def _numbers(
     structures: dict[str, PosedStructure], runs: Runs, as_run: Runs, times: Times
-) -> dict[str, Numbers]:
+) -> dict[str, CheckResult]:
     first = next(iter(structures.values())).scene
     aims = [run.motion[times.integrated][:, first.region] for run in next(iter(runs.values()))]
     return {
@@ -125,7 +125,7 @@ def _numbers(
 
 def _of_structure(
     structure: PosedStructure, runs: list[Run], as_run: list[Run], aims: list[Floats], times: Times
-) -> Numbers:
+) -> CheckResult:
 
     scene, vertices = structure
     values = concrete_parameters(scene, vertices)
@@ -140,7 +140,7 @@ def _of_structure(
         clearance(scene.lattice, vertices, each[::CLEARANCE_STRIDE])
         for each in motion[:, times.shown]
     ]
-    return Numbers(
+    return CheckResult(
         loss=float(scene.weights @ np.asarray(measure(motion[:, times.integrated], values))),
         departure=float(np.linalg.norm(apart[..., :2], axis=-1).max()),
         min_void_angle=min(float(each.void_angle.min()) for each in seen),

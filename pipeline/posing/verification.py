@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 AS_RUN = "as run"
 
 
-class Numbers(NamedTuple):
+class CheckResult(NamedTuple):
     """Holds the extremes of a structure's load cases under one check; fields as in the dataset."""
 
     loss: float
@@ -27,9 +27,9 @@ class Numbers(NamedTuple):
     time_step: float = np.nan
 
 
-NOTHING = Numbers(np.nan, np.nan, np.nan, np.nan, 0, 0)
+NOTHING = CheckResult(np.nan, np.nan, np.nan, np.nan, 0, 0)
 
-Rows = Mapping[str, Mapping[str, Numbers]]
+Rows = Mapping[str, Mapping[str, CheckResult]]
 
 
 def assemble_verification(found: Rows, status: Mapping[str, str]) -> xr.Dataset:
@@ -42,7 +42,7 @@ def assemble_verification(found: Rows, status: Mapping[str, str]) -> xr.Dataset:
     ]
     columns = {
         field: np.array([[getattr(numbers, field) for numbers in row] for row in rows])
-        for field in Numbers._fields
+        for field in CheckResult._fields
     }
     return xr.Dataset(
         {name: (("check", "structure"), values) for name, values in columns.items()}

@@ -24,7 +24,7 @@ def parser() -> argparse.ArgumentParser:
 
 def work(args: argparse.Namespace) -> None:
     """Simulates a part of the copies, or joins all parts."""
-    chunked.work(args, _run, "scatter", "sample")
+    chunked.run_or_gather(args, _run, "scatter", "sample")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -44,7 +44,7 @@ def _run(args: argparse.Namespace) -> None:
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}
-    origin = provenance.attributes(asked, "scatter", parents=parents)
+    origin = provenance.study_attributes(asked, "scatter", parents=parents)
     datasets.write(made, args.out, "scatter", origin)
 
 

@@ -21,7 +21,7 @@ from pipeline.fabrication.papers import manifest
 from pipeline.posing import scene_of
 from pipeline.problem import canonical_json
 from pipeline.problem.fields import csv_columns, units
-from pipeline.problem.reading import joint_figure, load, section
+from pipeline.problem.reading import joint_figure, load, load_section
 from pipeline.problem.sections import Codec
 from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
@@ -260,7 +260,7 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml(
         "calibration",
         _from_study("calibration/hinges.yaml"),
-        lambda p: [section(p, Calibration).model_dump_json()],
+        lambda p: [load_section(p, Calibration).model_dump_json()],
     ),
     _yaml(
         "points",
@@ -268,7 +268,11 @@ SUBJECTS: tuple[Subject, ...] = (
         lambda p: [dic_points.load(p).model_dump_json()],
     ),
     _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
-    _yaml("figure of several studies", _figure, lambda p: [joint_figure.load(p).model_dump_json()]),
+    _yaml(
+        "figure of several studies",
+        _figure,
+        lambda p: [joint_figure.load_joint_figure(p).model_dump_json()],
+    ),
     *_dataset_subjects(),
     Subject(
         "lattice in netCDF",

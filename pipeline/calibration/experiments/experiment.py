@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from sim.core import Floats, Ints
 
 Kind = Literal["force_displacement", "free_decay", "track"]
@@ -16,7 +16,7 @@ _UNSEEN = 1e-8
 
 LEAST_LINES = 5
 """Lines of a file of readings that any fit needs."""
-ELASTIC: tuple[Name, ...] = (
+ELASTIC: tuple[ConstantName, ...] = (
     "axial_stiffness",
     "shear_stiffness",
     "bending_stiffness",
@@ -134,7 +134,7 @@ class Experiment(Protocol):
         ...
 
     @property
-    def sees(self) -> tuple[Name, ...]:
+    def sees(self) -> tuple[ConstantName, ...]:
         """Returns the constants that the measurements depend on."""
         ...
 

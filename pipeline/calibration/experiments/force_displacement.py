@@ -16,7 +16,7 @@ from pipeline.calibration.experiments.simulated_experiment import (
     Seen,
     SpecimenSimulation,
 )
-from pipeline.calibration.inputs import Constants, ForceDisplacement, Name
+from pipeline.calibration.inputs import ConstantName, Constants, ForceDisplacement
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Numbers
@@ -48,13 +48,13 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class ForceTest:
+class ForceExperiment:
     """Holds a test of forces (``experiment.Experiment``)."""
 
     measured: MeasuredValues
     simulation: SpecimenSimulation
     tare: bool
-    sees: tuple[Name, ...] = ELASTIC
+    sees: tuple[ConstantName, ...] = ELASTIC
 
     @property
     def own_start(self) -> Floats:
@@ -75,17 +75,17 @@ class ForceTest:
         return self.simulation.pulled_back(constants, bar)
 
 
-def experiment(
+def pose_force_test(
     asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats
-) -> ForceTest:
+) -> ForceExperiment:
     """Returns the set as an experiment on equilibria."""
     sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
     known = asked.noise is not None
     measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
-    return ForceTest(measured, simulation(asked, begin, displacement), asked.tare)
+    return ForceExperiment(measured, pose_simulation(asked, begin, displacement), asked.tare)
 
 
-def simulation(
+def pose_simulation(
     asked: ForceDisplacement, begin: Constants, displacement: Floats
 ) -> SpecimenSimulation:
     """Poses the specimen at the measured displacements."""

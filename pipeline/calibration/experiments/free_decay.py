@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import detrend, find_peaks
 
 from pipeline.calibration.experiments.experiment import LEAST_LINES, MeasuredValues
-from pipeline.calibration.inputs import Constants, FreeDecay, Name
+from pipeline.calibration.inputs import ConstantName, Constants, FreeDecay
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
@@ -24,7 +24,7 @@ SAMPLES = 32
 """Least number of samples of a trace."""
 
 
-class Peaks(NamedTuple):
+class DecayPeaks(NamedTuple):
     """Holds the decay by a line through the logarithms of peaks.
 
     Attributes:
@@ -55,13 +55,13 @@ def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
     if len(time) < SAMPLES:
         remedy = f"give {SAMPLES} lines or more"
         raise UserError(f"only {len(time)} samples", file=path, remedy=remedy)
-    if by_peaks(time - time[0], angle) is None:
+    if fit_peaks(time - time[0], angle) is None:
         remedy = "cut the trace to begin after the release, with several periods above the noise"
         raise UserError("no decaying oscillation is seen", file=path, remedy=remedy)
     return time - time[0], angle
 
 
-def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
+def fit_peaks(time: Floats, angle: Floats) -> DecayPeaks | None:
     """Computes the damping ratio by the authors' method: the slope of the logarithms of peaks.
 
     A trend is taken off first. With the slope m and the frequency w of the damped oscillation, the
@@ -87,11 +87,11 @@ def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
         return None
     ratio = 1 / np.sqrt(1 + (frequency / slope) ** 2)
     error = ratio * (1 - ratio**2) * np.sqrt(scatter[0, 0]) / -slope
-    return Peaks(float(ratio), float(error), frequency)
+    return DecayPeaks(float(ratio), float(error), frequency)
 
 
 @dataclass(frozen=True)
-class Decay:
+class FreeDecayExperiment:
     """Holds a trace (``experiment.Experiment``).
 
     Its own unknowns are offset (rad), drift (rad/s), the amplitudes of cosine and sine (rad), and
@@ -99,14 +99,14 @@ class Decay:
     """
 
     measured: MeasuredValues
-    peaks: Peaks
-    sees: tuple[Name, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
+    peaks: DecayPeaks
+    sees: tuple[ConstantName, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
 
     @property
     def own_start(self) -> Floats:
         """Fits offset, drift and amplitudes at the peaks' frequency and damping."""
         frequency = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
-        shapes = terms(self.measured.abscissa, self.peaks.ratio, frequency)
+        shapes = decay_terms(self.measured.abscissa, self.peaks.ratio, frequency)
         return np.append(np.linalg.lstsq(shapes, self.measured.values)[0], np.log(frequency))
 
     @property
@@ -117,21 +117,21 @@ class Decay:
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
         """Predicts angles, see ``experiment.Experiment``."""
-        shapes = terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
+        shapes = decay_terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
         return np.asarray(shapes @ own[:-1])
 
 
-def terms(time: Floats, ratio: float, frequency: float) -> Floats:
+def decay_terms(time: Floats, ratio: float, frequency: float) -> Floats:
     """Computes the terms (n, 4) of a trace (n,): 1, t, and a decaying cosine and sine."""
     envelope, phase = np.exp(-ratio * frequency * time), frequency * np.sqrt(1 - ratio**2) * time
     oscillation = [envelope * np.cos(phase), envelope * np.sin(phase)]
     return np.stack([np.ones_like(time), time, *oscillation], axis=1)
 
 
-def experiment(asked: FreeDecay, time: Floats, angle: Floats) -> Decay:
+def pose_decay(asked: FreeDecay, time: Floats, angle: Floats) -> FreeDecayExperiment:
     """Returns the set as an experiment."""
     sigma = np.full(len(angle), 1.0 if asked.noise is None else asked.noise)
     measured = MeasuredValues(asked.name, asked.kind, time, angle, sigma, asked.noise is not None)
-    peaks = by_peaks(time, angle)
+    peaks = fit_peaks(time, angle)
     assert peaks is not None
-    return Decay(measured, peaks)
+    return FreeDecayExperiment(measured, peaks)

@@ -13,7 +13,7 @@ from pipeline.calibration.experiments.experiment import MeasuredValues
 from pipeline.calibration.experiments.force_displacement import force_on
 from pipeline.calibration.experiments.simulated_experiment import Seen
 from pipeline.calibration.experiments.tracked_specimen import TrackedSpecimen
-from pipeline.calibration.inputs import LoadCell
+from pipeline.calibration.inputs import LoadCellOptions
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
 
@@ -52,8 +52,8 @@ class LoadCellReadings(NamedTuple):
         )
 
 
-def load_of(
-    asked: LoadCell, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
+def read_load(
+    asked: LoadCellOptions, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
 ) -> LoadCellReadings:
     """Reads the load cell of a track.
 

@@ -36,7 +36,7 @@ _PART = 0.5
 """Coefficients are at most this part of the frames."""
 
 
-class Change(NamedTuple):
+class DriveChange(NamedTuple):
     """Changes one course of a drive by one standard deviation of its noise.
 
     Attributes:
@@ -50,8 +50,8 @@ class Change(NamedTuple):
     slope: Floats
 
 
-def changed(
-    motion: redrive.HermiteMotion, changes: Sequence[Change], size: Floats
+def apply_changes(
+    motion: redrive.HermiteMotion, changes: Sequence[DriveChange], size: Floats
 ) -> redrive.HermiteMotion:
     """Adds changes of a size each to a motion, in standard deviations."""
     value, slope = (np.array(part) for part in (motion.value, motion.slope))
@@ -61,7 +61,7 @@ def changed(
     return motion._replace(value=value, slope=slope)
 
 
-class Followed(NamedTuple):
+class SmoothedDrive(NamedTuple):
     """Holds the drive of a fit.
 
     Attributes:
@@ -70,13 +70,13 @@ class Followed(NamedTuple):
         coarse: whether the frames are too few for enough intervals.
     """
 
-    held: redrive.Held
-    changes: tuple[Change, ...]
+    held: redrive.HeldMotion
+    changes: tuple[DriveChange, ...]
     coarse: bool
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _HeldCourses:
     """Holds courses of the held units. At the first frame they rest: it tells the constants.
 
     Attributes:
@@ -127,7 +127,7 @@ class _Seen:
         return float(np.sum(rest[: np.count_nonzero(self.there[:, place])] ** 2))
 
 
-def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
+def smooth_drive(track: xr.Dataset, scene: Scene, bias: Floats) -> SmoothedDrive:
     """Smooths the motion of the held units of a track, which begins at rest.
 
     Args:
@@ -138,28 +138,30 @@ def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
     Raises:
         UserError: no driven unit was seen.
     """
-    held = redrive.held_motion(track, scene)
-    seen = _seen(track, held, scene, bias)
+    held = redrive.filter_held_motion(track, scene)
+    seen = _held_courses(track, held, scene, bias)
     places = np.flatnonzero(~held.assumed).tolist()
     most = max(1, int(_PART * len(seen.time)) - _DEGREE)
-    best = min(_doubled(most), key=lambda count: _criterion(seen, places, count))
+    best = min(_powers_of_two(most), key=lambda count: _criterion(seen, places, count))
     intervals = min(_FINER * best, most)
     value, slope = (np.zeros((intervals + 1, len(held.unit), 3)) for _ in range(2))
-    changes: list[Change] = []
+    changes: list[DriveChange] = []
     for place in places:
         for dof in range(3):
             values, slopes = _course(seen, intervals, place, dof)
             value[:, place, dof], slope[:, place, dof] = values[0], slopes[0]
             pairs = zip(values[1:], slopes[1:], strict=True)
-            changes.extend(Change(place, dof, *pair) for pair in pairs)
+            changes.extend(DriveChange(place, dof, *pair) for pair in pairs)
     mean, guessed = held.driven & ~held.assumed, held.driven & held.assumed
     for course in (value, slope):
         course[:, guessed] = course[:, mean].mean(axis=1, keepdims=True)
     motion = redrive.HermiteMotion(seen.time[-1] / intervals, value, slope)
-    return Followed(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
+    return SmoothedDrive(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
 
 
-def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> _Seen:
+def _held_courses(
+    track: xr.Dataset, held: redrive.HeldMotion, scene: Scene, bias: Floats
+) -> _HeldCourses:
     chosen = track.sel(unit=scene.lattice.id[held.unit])
     measured, sigma = (
         chosen[name].transpose("time", "unit", "dof").values.astype(float)
@@ -169,15 +171,15 @@ def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> 
     reach = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
     reach += np.nanmax(sigma, axis=(0, 1))
     time = track["time"].values - track["time"].values[0]
-    return _Seen(time, measured, sigma, there, bias, reach)
+    return _HeldCourses(time, measured, sigma, there, bias, reach)
 
 
-def _doubled(most: int) -> list[int]:
+def _powers_of_two(most: int) -> list[int]:
     """Lists 1, 2, 4 and so on, up to a number."""
     return [1 << k for k in range(most.bit_length())]
 
 
-def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
+def _criterion(seen: _HeldCourses, places: list[int], intervals: int) -> float:
     """Computes Akaike's criterion of all courses with so many intervals."""
     count = 3 * int(seen.there[:, places].sum())
     unknown = 3 * len(places) * (intervals + _DEGREE)
@@ -186,7 +188,7 @@ def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
     return count * float(np.log(max(misfit / count, _FLOOR))) + 2 * unknown * correction
 
 
-def _course(seen: _Seen, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
+def _course(seen: _HeldCourses, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
     """Fits values and slopes (1 + n_changes, n_knots) of a course and its independent changes."""
     rows, given = seen.equations(intervals, place, dof)
     orthogonal, factor = np.linalg.qr(rows)

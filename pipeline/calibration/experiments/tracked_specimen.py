@@ -11,8 +11,8 @@ import xarray as xr
 from pipeline import datasets
 from pipeline import problem as problems
 from pipeline.calibration.inputs import TrackedMotion
-from pipeline.comparison import measured_places, register
-from pipeline.posing import flat_vertices, scene_of, spread
+from pipeline.comparison import measure_places, register
+from pipeline.posing import flat_vertices, scene_of, spread_to_units
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from sim.core import Floats
@@ -53,8 +53,10 @@ class TrackedSpecimen(NamedTuple):
     def upright(self, track: xr.Dataset, vertices: Floats) -> xr.Dataset:
         """Turns the track into the design's frame; `vertices` (n_vertices, 2) are as built."""
         lattice = self.scene.lattice
-        centre = spread(np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"])
-        found = register(centre, measured_places(track, centre))
+        centre = spread_to_units(
+            np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"]
+        )
+        found = register(centre, measure_places(track, centre))
         seen = track["displacement"].transpose("time", "unit", "dof").values.astype(float)
         return track.assign(displacement=(("time", "unit", "dof"), found.upright(seen)))
 
@@ -64,7 +66,7 @@ class TrackedSpecimen(NamedTuple):
         return None if along is None else np.array([np.cos(along[case]), np.sin(along[case]), 0.0])
 
 
-def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
+def pose_specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
     """Poses the structure that a set is of.
 
     Raises:
@@ -85,7 +87,7 @@ def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
     )
 
 
-def read(asked: TrackedMotion, folder: Path) -> xr.Dataset:
+def read_track(asked: TrackedMotion, folder: Path) -> xr.Dataset:
     """Reads the track of a set.
 
     Raises:

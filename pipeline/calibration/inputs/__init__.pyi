@@ -1,12 +1,12 @@
-from .computed_measurements import Error as Error
+from .computed_measurements import PoseError as PoseError
 from .constants import UNITS as UNITS
 from .constants import WRITTEN as WRITTEN
 from .constants import Constants as Constants
-from .constants import start as start
+from .constants import start_constants as start_constants
 from .description import Calibration as Calibration
+from .description import ConstantName as ConstantName
 from .description import ForceDisplacement as ForceDisplacement
 from .description import FreeDecay as FreeDecay
-from .description import LoadCell as LoadCell
-from .description import Name as Name
-from .description import Set as Set
+from .description import LoadCellOptions as LoadCellOptions
+from .description import MeasurementSet as MeasurementSet
 from .description import TrackedMotion as TrackedMotion

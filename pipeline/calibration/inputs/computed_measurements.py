@@ -42,7 +42,7 @@ class VirtualDecay(Section):
     noise: Amplitude
 
 
-class Error(Section):
+class PoseError(Section):
     """Standard deviations.
 
     Attributes:
@@ -65,8 +65,8 @@ class VirtualTrack(Section):
     """
 
     rate: Frequency
-    noise: Error
-    bias: Error | None = None
+    noise: PoseError
+    bias: PoseError | None = None
     load: Force | None = None
 
 

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.calibration.inputs.description import Calibration, Name
+from pipeline.calibration.inputs.description import Calibration, ConstantName
 from pipeline.problem.sections import UNROTATED_MOMENT, Contact, MaterialConstants
 from sim.core import Floats
 
-UNITS: dict[Name, str] = {
+UNITS: dict[ConstantName, str] = {
     "axial_stiffness": "N/mm",
     "shear_stiffness": "N/mm",
     "bending_stiffness": "N mm/rad",
@@ -23,7 +23,7 @@ UNITS: dict[Name, str] = {
 }
 """Working unit of each."""
 
-WRITTEN: dict[Name, tuple[str, float]] = {
+WRITTEN: dict[ConstantName, tuple[str, float]] = {
     "axial_stiffness": ("N/mm", 1.0),
     "shear_stiffness": ("N/mm", 1.0),
     "bending_stiffness": ("N mm/rad", 1.0),
@@ -66,7 +66,7 @@ class Constants(NamedTuple):
         _, rotation = self.material.damping_coefficients(self.spacing)
         return rotation / (2 * math.sqrt(inertia * self.material.bending_stiffness))
 
-    def value(self, name: Name) -> float:
+    def value(self, name: ConstantName) -> float:
         """Computes the value of one constant in its working unit."""
         if name == "contact_cutoff":
             return self.angles[1]
@@ -85,14 +85,14 @@ class Constants(NamedTuple):
         given = self.contact.cutoff_angle
         return self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
 
-    def logs(self, names: Sequence[Name]) -> Floats:
+    def logs(self, names: Sequence[ConstantName]) -> Floats:
         """Computes logarithms of constants; of the cut-off, that of its distance to the barrier."""
         barrier = self.angles[0]
         return np.log(
             [self.value(name) - (barrier if name == "contact_cutoff" else 0.0) for name in names]
         )
 
-    def at(self, names: Sequence[Name], logs: Floats) -> Constants:
+    def at(self, names: Sequence[ConstantName], logs: Floats) -> Constants:
         """Replaces the named constants."""
         stiffness: dict[str, float] = {}
         damping: dict[str, float] = {}
@@ -109,7 +109,7 @@ class Constants(NamedTuple):
         return self._replace(material=changed, cutoff=cutoff)
 
 
-def start(asked: Calibration) -> Constants:
+def start_constants(asked: Calibration) -> Constants:
     """Returns the constants that a calibration starts from."""
     made = Constants(asked.material, asked.contact, asked.spacing)
     return made._replace(cutoff=made.angles[1]) if "contact_cutoff" in asked.fit else made

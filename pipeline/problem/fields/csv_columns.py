@@ -140,7 +140,7 @@ def _factor(title: str, dimension: units.Dimension, name: str, path: Path) -> fl
     if match is None:
         raise UserError("the unit of the column is missing", file=path, key=name, remedy=remedy)
     try:
-        return units.parse(f"1 {match['unit']}", dimension)
+        return units.parse_quantity(f"1 {match['unit']}", dimension)
     except UserError as error:
         value = match["unit"]
         raise UserError(error.what, file=path, key=name, value=value, remedy=remedy) from error

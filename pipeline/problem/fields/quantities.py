@@ -35,7 +35,7 @@ def _reader(dimension: units.Dimension, minimum: float | None, exclusive: bool) 
         if info.context == SIM_UNITS and isinstance(value, int | float):
             return float(value)
         try:
-            number = units.parse(value, dimension)
+            number = units.parse_quantity(value, dimension)
         except UserError as error:
             raise fault(error.what, str(error.remedy)) from error
         if minimum is not None and (number < minimum or (exclusive and number == minimum)):

@@ -77,13 +77,13 @@ def _registry() -> UnitRegistry:
     return UnitRegistry(_DEFINITIONS.strip().splitlines())
 
 
-def take_apart(text: str) -> tuple[float, str] | None:
+def split_quantity(text: str) -> tuple[float, str] | None:
     """Splits a quantity into number and unit ("" for none); None if the text is none."""
     match = _QUANTITY.fullmatch(text[:_LONGEST])
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
-def parse(text: object, dimension: Dimension) -> float:
+def parse_quantity(text: object, dimension: Dimension) -> float:
     """Converts the quantity `text` to a float in the working unit of `dimension`.
 
     Raises:

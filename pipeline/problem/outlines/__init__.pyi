@@ -6,6 +6,6 @@ from .plane import Point as Point
 from .plane import box_middle as box_middle
 from .plane import compile_formula as compile_formula
 from .plane import extents as extents
-from .plane import inside as inside
-from .plane import placed as placed
-from .plane import turned as turned
+from .plane import find_inside as find_inside
+from .plane import place_outline as place_outline
+from .plane import turn_outline as turn_outline

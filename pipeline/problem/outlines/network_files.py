@@ -20,14 +20,14 @@ COLUMNS = ("kind", "number", "x (mm)", "y (mm)")
 """Header of a CSV; its kinds are `unit` (one row a corner) and `ligament` (one row an end)."""
 
 
-class Content(NamedTuple):
+class NetworkContent(NamedTuple):
     """Holds corners of the units and end points of the ligaments, mm."""
 
     polygons: tuple[tuple[Point, ...], ...]
     ligaments: tuple[tuple[Point, Point], ...]
 
 
-def read_network(path: Path) -> Content:
+def read_network(path: Path) -> NetworkContent:
     """Reads the units and ligaments in a file, told by its suffix.
 
     Raises:
@@ -48,7 +48,7 @@ def read_network(path: Path) -> Content:
     return found
 
 
-def _of_csv(path: Path) -> Content:
+def _of_csv(path: Path) -> NetworkContent:
     units: dict[float, list[Point]] = {}
     ligaments: dict[float, list[Point]] = {}
     groups = {"unit": units, "ligament": ligaments}
@@ -68,13 +68,13 @@ def _of_csv(path: Path) -> Content:
             raise UserError(
                 f"ligament {ligament:g} has {len(ends)} ends", remedy="give it two rows"
             )
-    return Content(
+    return NetworkContent(
         tuple(tuple(corners) for _, corners in sorted(units.items())),
         tuple((first, second) for _, (first, second) in sorted(ligaments.items())),
     )
 
 
-def _of_netcdf(path: Path) -> Content:
+def _of_netcdf(path: Path) -> NetworkContent:
     """Reads a study's design, or any dataset with its `vertices` and `ligament_*` variables."""
     import numpy as np
     import xarray as xr
@@ -90,13 +90,13 @@ def _of_netcdf(path: Path) -> Content:
         raise UserError(f"not a readable lattice: {error}", remedy=remedy) from error
     polygons = (corners[~np.isnan(corners).any(axis=1)] for corners in vertices)
     present = ends[~np.isnan(ends).any(axis=(1, 2))]
-    return Content(
+    return NetworkContent(
         tuple(tuple(map(_point, corners.tolist())) for corners in polygons if len(corners)),
         tuple((_point(first), _point(second)) for first, second in present.tolist()),
     )
 
 
-def _of_dxf(path: Path) -> Content:
+def _of_dxf(path: Path) -> NetworkContent:
     """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm."""
     from ezdxf import recover
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -124,7 +124,7 @@ def _of_dxf(path: Path) -> Content:
         (_scaled(line.dxf.start, scale), _scaled(line.dxf.end, scale))
         for line in space.query("LINE")
     )
-    return Content(polygons, ligaments)
+    return NetworkContent(polygons, ligaments)
 
 
 def _corners(line: LWPolyline | Polyline) -> list[tuple[float, float]]:

@@ -27,7 +27,7 @@ _NAMES = {"pi": math.pi}
 _LONGEST = 500
 
 
-def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
+def find_inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
     """Finds points within an odd number of closed outlines, or within `hair` of one."""
     import numpy as np
 
@@ -47,7 +47,7 @@ def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) 
     return found
 
 
-def placed(
+def place_outline(
     outline: Outline, size: tuple[float, float], origin: Point, centre: Point, orientation: float
 ) -> Outline:
     """Scales an outline's box to `size`, moves `origin` to `centre`, and turns it about that."""
@@ -56,10 +56,10 @@ def placed(
         (centre[0] + scale_x * (x - origin[0]), centre[1] + scale_y * (y - origin[1]))
         for x, y in outline
     )
-    return turned(moved, orientation, centre)
+    return turn_outline(moved, orientation, centre)
 
 
-def turned(outline: Outline, angle: float, centre: Point) -> Outline:
+def turn_outline(outline: Outline, angle: float, centre: Point) -> Outline:
     """Turns an outline by `angle` (rad) about `centre`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     arms = ((x - centre[0], y - centre[1]) for x, y in outline)

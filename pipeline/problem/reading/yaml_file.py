@@ -83,7 +83,7 @@ def _fault(what: str, node: yaml.Node) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=what, problem_mark=node.start_mark)
 
 
-def read(path: Path) -> Document:
+def read_yaml(path: Path) -> Document:
     """Reads the mapping in a YAML file.
 
     Raises:
@@ -109,7 +109,7 @@ def read(path: Path) -> Document:
     return Document(path, data, dict(_lines(node, ())))
 
 
-def skimmed(path: Path) -> dict[str, Any]:
+def skim_yaml(path: Path) -> dict[str, Any]:
     """Reads the mapping in a YAML file fast; an empty one where `read` would refuse it."""
     try:
         text = _text(path)

@@ -11,12 +11,12 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from pipeline.problem.sections.sweep import Values
-from pipeline.problem.sections.sweep_cases import laid
+from pipeline.problem.sections.sweep_cases import apply_setting
 
 Designs = Annotated[dict[str, Values], Field(min_length=1, max_length=1)]
 
 
-def parted(name: str | None) -> tuple[str | None, int | None]:
+def split_name(name: str | None) -> tuple[str | None, int | None]:
     """Splits "quick.2", "quick" or "2" into preset and number of the design."""
     preset, _, number = (name or "").rpartition(".")
     if number.isdigit():
@@ -24,7 +24,7 @@ def parted(name: str | None) -> tuple[str | None, int | None]:
     return name, None
 
 
-def numbered(preset: str, number: int) -> str:
+def design_name(preset: str, number: int) -> str:
     """Names a design of a preset, or of none ("")."""
     return f"{preset}.{number}" if preset else str(number)
 
@@ -36,7 +36,7 @@ def design_count(data: Mapping[str, Any]) -> int:
     return len(values) if isinstance(values, list) else 0
 
 
-def chosen(data: Mapping[str, Any], number: int) -> dict[str, Any]:
+def select_design(data: Mapping[str, Any], number: int) -> dict[str, Any]:
     """Selects the content of a problem file for one of its designs.
 
     Raises:
@@ -46,4 +46,4 @@ def chosen(data: Mapping[str, Any], number: int) -> dict[str, Any]:
         raise LookupError(f"there is no design number {number}")
     ((key, values),) = data["designs"].items()
     alone = {name: value for name, value in data.items() if name != "designs"}
-    return laid(alone, {key: values[number - 1]})
+    return apply_setting(alone, {key: values[number - 1]})

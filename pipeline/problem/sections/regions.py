@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from pipeline.problem.fields import Length, Section, exactly_one
-from pipeline.problem.outlines import Outline, Point, inside
+from pipeline.problem.outlines import Outline, Point, find_inside
 from pipeline.problem.sections.shapes import (
     Centre,
     Curve,
@@ -20,7 +20,7 @@ from pipeline.problem.sections.shapes import (
     Image,
     PolygonShape,
     RingShape,
-    at,
+    resolve_centre,
 )
 
 HAIR = 1e-9  # relative; keeps points that lie on a rim on its inner side
@@ -72,7 +72,7 @@ class Region(Section):
         """
         if self.bounds is not None:
             centre, _, radius = self.bounds
-            x, y = at(centre, middle)
+            x, y = resolve_centre(centre, middle)
             steps = (2 * math.pi * k / ROUND for k in range(ROUND))
             return (tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in steps),)
         shape = self.polygon or self.curve or self.image
@@ -82,9 +82,9 @@ class Region(Section):
         """Tells which points (mm) lie in the region, or within `hair` of its outer rim."""
         if self.bounds is not None:
             named, inner, outer = self.bounds
-            centre = at(named, middle)
+            centre = resolve_centre(named, middle)
             return [inner + hair < math.dist(point, centre) <= outer + hair for point in points]
-        return inside(points, self.outlines(middle), hair)
+        return find_inside(points, self.outlines(middle), hair)
 
 
 class VoidRegion(Region):

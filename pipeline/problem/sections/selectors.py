@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pipeline.problem.fields import Section
-from pipeline.problem.outlines import inside
+from pipeline.problem.outlines import find_inside
 from pipeline.problem.sections.lattices import Lattice, Quads
 from pipeline.problem.sections.regions import HAIR, Region
 
@@ -50,7 +50,7 @@ def units_near(region: Region, distance: float, lattice: Lattice) -> tuple[int, 
     """Lists the ids of units in the region or within `distance` (mm) of its outline, ascending."""
     units, points = zip(*((unit, (x, y)) for unit, x, y in lattice.sites()), strict=True)
     reach = distance + HAIR * lattice.spacing
-    held = inside(points, region.outlines(lattice.centre_site), reach)
+    held = find_inside(points, region.outlines(lattice.centre_site), reach)
     return tuple(unit for unit, near in zip(units, held, strict=True) if near)
 
 

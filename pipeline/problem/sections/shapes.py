@@ -28,9 +28,9 @@ from pipeline.problem.outlines import (
     box_middle,
     compile_formula,
     extents,
-    placed,
+    place_outline,
     read_outlines,
-    turned,
+    turn_outline,
 )
 from pipeline.runtime import UserError
 
@@ -46,7 +46,7 @@ Centre = Annotated[
 ]
 
 
-def at(centre: Centre, middle: Point) -> Point:
+def resolve_centre(centre: Centre, middle: Point) -> Point:
     """Returns a centre by its coordinates, mm."""
     return middle if isinstance(centre, str) else centre
 
@@ -92,7 +92,7 @@ class PolygonShape(Section):
         """Draws the polygon in the specimen frame, mm."""
         del middle
         centre = box_middle(self.vertices)
-        return (turned(self.vertices, self.orientation, centre),)
+        return (turn_outline(self.vertices, self.orientation, centre),)
 
 
 class Heart(Section):
@@ -116,7 +116,11 @@ class Heart(Section):
         """Draws the curve in the specimen frame, mm."""
         turns = [2 * math.pi * k / (self.points - 1) for k in range(self.points)]
         curve = tuple((16 * math.sin(t) ** 3, _heart_height(t)) for t in turns)
-        return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
+        return (
+            place_outline(
+                curve, self.size, (0.0, 0.0), resolve_centre(self.centre, middle), self.orientation
+            ),
+        )
 
 
 def _heart_height(t: float) -> float:
@@ -153,9 +157,9 @@ class Smile(Section):
             *((x, y + self.inner_rise) for x, y in inner),
             *((x, y + self.outer_rise) for x, y in outer),
         )
-        x0, y0 = at(self.centre, middle)
+        x0, y0 = resolve_centre(self.centre, middle)
         moved = tuple((x0 + x, y0 + y) for x, y in curve)
-        return (turned(moved, self.orientation, (x0, y0)),)
+        return (turn_outline(moved, self.orientation, (x0, y0)),)
 
 
 def _on_circle(radius: float, angle: float) -> Point:
@@ -201,7 +205,11 @@ class Formula(Section):
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
         """Draws the curve in the specimen frame, mm."""
         curve = tuple(zip(self._along(self.x), self._along(self.y), strict=True))
-        return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
+        return (
+            place_outline(
+                curve, self.size, (0.0, 0.0), resolve_centre(self.centre, middle), self.orientation
+            ),
+        )
 
 
 Curve = Annotated[Heart | Smile | Formula, Field(discriminator="kind")]
@@ -248,8 +256,8 @@ class Image(Section):
         whole = tuple(point for outline in self.read for point in outline)
         width, height = extents(whole)
         size = self.size or (self.width or width, height * (self.width or width) / width)
-        origin, centre = box_middle(whole), at(self.centre, middle)
-        scaled = placed(whole, size, origin, centre, self.orientation)
+        origin, centre = box_middle(whole), resolve_centre(self.centre, middle)
+        scaled = place_outline(whole, size, origin, centre, self.orientation)
         ends = accumulate(len(outline) for outline in self.read)
         return tuple(
             scaled[end - len(outline) : end] for outline, end in zip(self.read, ends, strict=True)

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.problem.sections.sweep import Sweep, Word, taken_apart
+from pipeline.problem.sections.sweep import SettingValue, Sweep, split_value
 
-Setting = Mapping[str, Word | list[Word]]
+Setting = Mapping[str, SettingValue | list[SettingValue]]
 """Values by the dotted keys that they are set at."""
 
 DIRECTIONS = "drive.directions"
@@ -27,7 +27,7 @@ def case_count(sweep: Sweep) -> int:
     return math.prod(sizes) if sweep.grid is not None else sizes[0]
 
 
-def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
+def list_settings(sweep: Sweep) -> Iterator[dict[str, SettingValue]]:
     """Lists the settings of the cases, one after the other."""
     if sweep.random is not None:
         yield from (_drawn(sweep, number) for number in range(case_count(sweep)))
@@ -39,7 +39,7 @@ def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
             yield dict(zip(sweep.keys, reversed(values), strict=True))
 
 
-def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
+def _drawn(sweep: Sweep, number: int) -> dict[str, SettingValue]:
     """Draws a random case: the same whatever other cases there are."""
     assert sweep.random is not None
     random = np.random.default_rng((sweep.seed, number))
@@ -54,10 +54,10 @@ class DirectionGroup:
     """
 
     numbers: range
-    settings: tuple[dict[str, Word], ...]
+    settings: tuple[dict[str, SettingValue], ...]
 
     @property
-    def cases(self) -> list[tuple[int, dict[str, Word]]]:
+    def cases(self) -> list[tuple[int, dict[str, SettingValue]]]:
         """Number and setting of each."""
         return list(zip(self.numbers, self.settings, strict=True))
 
@@ -81,24 +81,24 @@ def group_count(sweep: Sweep) -> int:
     return case_count(sweep) // group_size(sweep)
 
 
-def part(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
+def select_groups(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
     """Selects the groups of one of several parts of a sweep, none empty or much larger."""
     size, total = group_size(sweep), group_count(sweep)
     first, last = (size * (total * (number + edge) // parts) for edge in (0, 1))
-    cases = islice(settings(sweep), first, last)
+    cases = islice(list_settings(sweep), first, last)
     return [
         DirectionGroup(range(start, start + size), tuple(islice(cases, size)))
         for start in range(first, last, size)
     ]
 
 
-def unit_of(sweep: Sweep, key: str) -> str:
+def parameter_unit(sweep: Sweep, key: str) -> str:
     """Finds the unit of a parameter's values; "1" for plain numbers and for words."""
-    first = taken_apart(next(islice(settings(sweep), 1))[key])
+    first = split_value(next(islice(list_settings(sweep), 1))[key])
     return (first and first[1]) or "1"
 
 
-def laid(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
+def apply_setting(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
     """Lays a setting over the content of a problem file.
 
     A single value at a key that holds a list is a list of one; new directions weigh equally.

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pipeline.datasets.tables import TABLES
 from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
 from pipeline.tracking.output.track_dataset import absent, labelled, spread
@@ -88,7 +88,7 @@ def load(path: Path) -> Points:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Points)
+    return load_section(path, Points)
 
 
 def cloud(path: Path, asked: Points) -> Cloud:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.calibration.inputs import Calibration
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.stages import calibrate
 
 TRUTH = {
@@ -75,7 +75,7 @@ def written(folder: Path, described: dict[str, Any]) -> Path:
 
 def loaded(folder: Path, described: dict[str, Any]) -> Calibration:
     """The calibration as it is read."""
-    return section(written(folder, described), Calibration)
+    return load_section(written(folder, described), Calibration)
 
 
 def synthesised(folder: Path, text: dict[str, object]) -> Path:

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.comparison import measurement, pixel_size
+from pipeline.comparison import pixel_size, prepare_measurement
 from pipeline.stages import compare, simulate
 from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
@@ -146,7 +146,7 @@ def test_a_turned_camera_is_told_and_taken_out_and_a_scale_is_left_in(
         displacement=(film["displacement"].dims, motion),
         camera_residual=(("unit", "xy"), missed),
     )
-    found = measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
+    found = prepare_measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
     assert found.registration.rotation == pytest.approx(turn, abs=1e-4)
     assert found.registration.scale == pytest.approx(scale, abs=1e-4)
     assert pixel_size(tilted, middle) == pytest.approx(PIXEL)

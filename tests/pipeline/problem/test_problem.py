@@ -20,7 +20,7 @@ from pipeline.problem import (
     interest_units,
     section_hash,
 )
-from pipeline.problem.reading import load, overlaid, preset_names
+from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Quads
 from pipeline.runtime import UserError
 
@@ -119,20 +119,20 @@ mappings = st.recursive(
 
 @given(mappings)
 def test_nothing_laid_over_changes_nothing(base: dict[str, object]) -> None:
-    assert overlaid(base, {}) == base
+    assert overlay_keys(base, {}) == base
 
 
 @given(mappings, mappings)
 def test_an_overlay_wins_and_is_idempotent(
     base: dict[str, object], overlay: dict[str, object]
 ) -> None:
-    once = overlaid(base, overlay)
-    assert overlaid(once, overlay) == once
+    once = overlay_keys(base, overlay)
+    assert overlay_keys(once, overlay) == once
     assert set(once) == set(base) | set(overlay)
 
 
 def test_null_removes_a_key() -> None:
-    assert overlaid({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
+    assert overlay_keys({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
 
 
 SERIES = """drive:

@@ -33,7 +33,7 @@ def test_only_plain_data_are_read_of_yaml(text: str, tmp_path: Path) -> None:
     path = tmp_path / "problem.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as caught:
-        yaml_file.read(path)
+        yaml_file.read_yaml(path)
     assert caught.value.file == str(path)
     assert not Path("pwned").exists()
 
@@ -57,7 +57,7 @@ def test_the_fast_reader_takes_nothing_else_either(name: str, tmp_path: Path) ->
 def test_devices_are_not_read() -> None:
     endless = Path("/dev/zero")
     with pytest.raises(UserError, match="not a plain file"):
-        yaml_file.read(endless)
+        yaml_file.read_yaml(endless)
     with pytest.raises(UserError, match="not a plain file"):
         csv_columns.read_columns(endless, ["time"])
     with pytest.raises(UserError, match="not a plain file"):
