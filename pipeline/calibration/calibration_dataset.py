@@ -14,7 +14,7 @@ from pipeline.calibration.estimates import (
     list_warnings,
     measure_quality,
 )
-from pipeline.calibration.experiments import Experiment, FreeDecayExperiment
+from pipeline.calibration.experiments import DecayTest, Experiment
 from pipeline.calibration.fit_uncertainty import estimate_errors
 from pipeline.calibration.inputs import UNITS, WRITTEN, ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
@@ -64,11 +64,7 @@ def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
 
 
 def _by_peaks(each: Experiment) -> tuple[float, float]:
-    return (
-        (each.peaks.ratio, each.peaks.error)
-        if isinstance(each, FreeDecayExperiment)
-        else (np.nan, np.nan)
-    )
+    return (each.peaks.ratio, each.peaks.error) if isinstance(each, DecayTest) else (np.nan, np.nan)
 
 
 def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:

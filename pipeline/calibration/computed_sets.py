@@ -105,7 +105,7 @@ def _write_set(
         columns = (f"{each.columns.time} (s)", f"{each.columns.angle} (rad)")
         _write_csv(folder / name, columns, *simulate_decay(each, true, random))
         return name
-    origin = provenance.recording_attributes(each.model_dump_json(), {}, synthetic=True)
+    origin = provenance.of_recording(each.model_dump_json(), {}, synthetic=True)
     track = computed_track.simulate_track(each, path.parent, true, random)
     datasets.write(track, folder / f"{each.name}.nc", "track", origin)
     return f"{each.name}.nc"

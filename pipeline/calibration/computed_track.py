@@ -10,7 +10,7 @@ import xarray as xr
 
 from pipeline.calibration.experiments import TrackedSpecimen, per_dof, pose_specimen
 from pipeline.calibration.inputs import Constants, TrackedMotion
-from pipeline.posing import lattice_of, network_variables, spread_to_units, unit_coordinates
+from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
 from pipeline.runtime import UserError
 from pipeline.tracking.output import absent, labelled
 from sim.core import Floats
@@ -94,14 +94,13 @@ def _dataset(
 ) -> xr.Dataset:
     intact, lattice = lattice_of(made.problem), made.scene.lattice
     network = network_variables(made.problem, made.scene)
-    vertices = spread_to_units(lattice.padded(lattice.vertices), lattice, intact.n_units)
+    vertices = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
     design = xr.Dataset(
         {"support": network["support"], "vertices": (("unit", "vertex", "xy"), vertices)},
         unit_coordinates(intact),
     )
     moved, told = (
-        spread_to_units(part, lattice, intact.n_units, axis=1).astype(np.float32)
-        for part in (motion, sigma)
+        spread(part, lattice, intact.n_units, axis=1).astype(np.float32) for part in (motion, sigma)
     )
     there = np.isin(intact.id, lattice.id)
     quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.calibration.experiments import ForceExperiment, FullFieldExperiment
+from pipeline.calibration.experiments import ForceTest, FullFieldExperiment
 from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats
@@ -121,7 +121,7 @@ def adjoint_gradient(fit: Fit) -> Floats:
     for k, each in enumerate(model.experiments):
         mine = model.set_of_row == k
         column = fit.jacobian[mine, : len(total)].T @ fit.residual[mine]
-        if not isinstance(each, ForceExperiment | FullFieldExperiment):
+        if not isinstance(each, ForceTest | FullFieldExperiment):
             total += column
             continue
         bar = each.measured.transposed(fit.residual[mine]) / fit.level[k]

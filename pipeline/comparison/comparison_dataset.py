@@ -9,9 +9,9 @@ import xarray as xr
 
 from pipeline.comparison import curves
 from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
-from pipeline.comparison.curves import ComparedSides
+from pipeline.comparison.curves import Sides
 from pipeline.comparison.measured_side import Measurement
-from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, ComparedPair, estimate_metrics
+from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimate_metrics
 from pipeline.comparison.nominal_side import ComparisonAxis, NominalSide
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
@@ -65,13 +65,11 @@ class Compared(NamedTuple):
     pixel: tuple[float, float]
 
     @property
-    def sides(self) -> ComparedSides:
+    def sides(self) -> Sides:
         """Both simulations and what was measured, NaN where there is nothing to compare."""
         measured, sigma = self.measurement.displacement, self.measurement.sigma
         simulated, copies = self.simulation.displacement, self.simulation.copies
-        return ComparedSides(
-            measured, sigma, simulated, self.nominal.displacement, copies, self.level
-        )
+        return Sides(measured, sigma, simulated, self.nominal.displacement, copies, self.level)
 
 
 def assemble_comparison(made: Compared) -> xr.Dataset:
@@ -142,7 +140,7 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
     sides, inside = made.sides, made.measurement.compared
     time = None if made.axis.lag is None else made.measurement.time
     pairs = [
-        ComparedPair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
+        Pair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
         for motion in sides.motions[1:]
     ]
     found = np.stack([estimate_metrics(pair, time, random) for pair in pairs])
@@ -165,7 +163,7 @@ def _forces(made: Compared, random: np.random.Generator) -> Variables:
     measured = made.measurement.force[:, None, None]
     still = np.zeros_like(measured)
     sides = (made.simulation.force, made.nominal.force)
-    pairs = [ComparedPair(measured, force[:, None, None], still) for force in sides]
+    pairs = [Pair(measured, force[:, None, None], still) for force in sides]
     found = np.stack([estimate_metrics(pair, None, random)[..., 0] for pair in pairs])
     names = {"force_rmse": "rmse", "force_nrmse": "nrmse"}
     return {

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from pipeline.comparison import tolerance_band as bands
 from pipeline.comparison.compared_quantities import Quantity
 from pipeline.comparison.metrics import COPIES, LEVEL, interval_ends
-from pipeline.comparison.redrive import fit_smoothing_spline
+from pipeline.comparison.redrive import fit_spline
 from sim.core import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
@@ -19,7 +19,7 @@ _TRIALS = 50
 _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
-class ComparedSides(NamedTuple):
+class Sides(NamedTuple):
     """Holds the sides of a comparison at its frames.
 
     Attributes:
@@ -48,7 +48,7 @@ class ComparedSides(NamedTuple):
         return bands.band_limits(copies, self.level)
 
 
-def quantity_curve(sides: ComparedSides, quantity: Quantity, random: np.random.Generator) -> Floats:
+def quantity_curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
     """Computes a quantity along the frames (3 sides, frames, 3 estimates).
 
     Args:
@@ -65,9 +65,7 @@ def quantity_curve(sides: ComparedSides, quantity: Quantity, random: np.random.G
     return out
 
 
-def _measured_limits(
-    sides: ComparedSides, quantity: Quantity, random: np.random.Generator
-) -> Floats:
+def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
     """Computes an interval (2, frames) by a bootstrap over units, with the noise."""
     units, count = quantity.units, len(quantity.units)
     copies = np.empty((COPIES, len(sides.measured)))
@@ -102,7 +100,7 @@ def _highest(motion: Floats) -> Floats:
     return np.asarray(np.where(inner, top + rise, top).squeeze(axis=-3))
 
 
-def estimate_peaks(sides: ComparedSides, random: np.random.Generator) -> Floats:
+def estimate_peaks(sides: Sides, random: np.random.Generator) -> Floats:
     """Computes peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
     Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
@@ -119,7 +117,7 @@ def estimate_peaks(sides: ComparedSides, random: np.random.Generator) -> Floats:
     return out
 
 
-def _added_by_noise(sides: ComparedSides, random: np.random.Generator) -> Floats:
+def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
     """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
     smooth = _smooth(sides)
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
@@ -129,7 +127,7 @@ def _added_by_noise(sides: ComparedSides, random: np.random.Generator) -> Floats
     return added
 
 
-def _smooth(sides: ComparedSides) -> Floats:
+def _smooth(sides: Sides) -> Floats:
     """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)
@@ -137,11 +135,11 @@ def _smooth(sides: ComparedSides) -> Floats:
     for unit, dof in np.argwhere(there.mean(axis=0) >= _SEEN):
         known = there[:, unit, dof]
         course, sigma = (each[known, unit, dof] for each in (sides.measured, sides.sigma))
-        out[known, unit, dof] = fit_smoothing_spline(frames[known], course, sigma)(frames[known])
+        out[known, unit, dof] = fit_spline(frames[known], course, sigma)(frames[known])
     return out
 
 
-def band_coverage(sides: ComparedSides, band: Floats) -> Floats:
+def band_coverage(sides: Sides, band: Floats) -> Floats:
     """Computes the share (dofs,) of measurements in the band, widened by their noise.
 
     Args:

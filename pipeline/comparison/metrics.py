@@ -22,7 +22,7 @@ _LONGEST = 4  # blocks in a recording, at least
 _STEPS = 6
 
 
-class ComparedPair(NamedTuple):
+class Pair(NamedTuple):
     """Holds both sides of a comparison, NaN in either where there is nothing to compare.
 
     Attributes:
@@ -38,15 +38,13 @@ class ComparedPair(NamedTuple):
     slope: Floats | None = None
     added: bool = False
 
-    def taken(self, frames: Ints, units: Ints) -> ComparedPair:
+    def taken(self, frames: Ints, units: Ints) -> Pair:
         """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
-        return ComparedPair(
-            self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope
-        )
+        return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
 
-    def noisier(self, random: np.random.Generator) -> ComparedPair:
+    def noisier(self, random: np.random.Generator) -> Pair:
         """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)
@@ -62,7 +60,7 @@ class _Moments(NamedTuple):
     correlation: Floats
 
 
-def compute_metrics(pair: ComparedPair) -> Floats:
+def compute_metrics(pair: Pair) -> Floats:
     """Computes metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
     mean = _moments(pair)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -76,7 +74,7 @@ def compute_metrics(pair: ComparedPair) -> Floats:
     return np.where(np.isfinite(rows), rows, np.nan)
 
 
-def _moments(pair: ComparedPair) -> _Moments:
+def _moments(pair: Pair) -> _Moments:
     both = np.isfinite(pair.measured - pair.simulated)
     count = both.sum(axis=(0, 1))
 
@@ -96,7 +94,7 @@ def _moments(pair: ComparedPair) -> _Moments:
     return _Moments(residual, mean(pair.measured**2) - extra, variance, noise, alike)
 
 
-def _shift(pair: ComparedPair) -> Floats:
+def _shift(pair: Pair) -> Floats:
     """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
@@ -107,7 +105,7 @@ def _shift(pair: ComparedPair) -> Floats:
         return np.asarray(-np.where(known, ahead, 0.0).sum(axis=(0, 1)) / steep.sum(axis=(0, 1)))
 
 
-def align_in_time(pair: ComparedPair, time: Floats) -> tuple[ComparedPair, Floats]:
+def align_in_time(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
     """Delays the simulated side as much as the measured one, and tells by how much (dofs,), s.
 
     The shift is NaN where the sides are so unlike that none is found.
@@ -125,7 +123,7 @@ def align_in_time(pair: ComparedPair, time: Floats) -> tuple[ComparedPair, Float
     return moved, np.where(np.abs(total) < most, total, np.nan)
 
 
-def _delay(pair: ComparedPair, time: Floats, lag: Floats) -> ComparedPair:
+def _delay(pair: Pair, time: Floats, lag: Floats) -> Pair:
     """Delays the simulated side by ``lag`` (dofs,) s; NaN where that is not known."""
     made = np.full_like(pair.simulated, np.nan)
     for dof, late in enumerate(lag):
@@ -139,9 +137,7 @@ def _delay(pair: ComparedPair, time: Floats, lag: Floats) -> ComparedPair:
     return pair._replace(simulated=made, slope=np.gradient(made, time, axis=0))
 
 
-def estimate_metrics(
-    pair: ComparedPair, time: Floats | None, random: np.random.Generator
-) -> Floats:
+def estimate_metrics(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
     """Computes value and ends of the interval (3, len(METRICS), dofs) of every metric.
 
     Args:
@@ -159,13 +155,13 @@ def estimate_metrics(
 
 
 def bootstrap(
-    pair: ComparedPair, statistic: Callable[[ComparedPair], Floats], random: np.random.Generator
+    pair: Pair, statistic: Callable[[Pair], Floats], random: np.random.Generator
 ) -> Floats:
     """Computes a statistic's value and the ends of its interval, stacked (3, ...)."""
     frames, units = pair.measured.shape[:2]
     length = block_length(pair.measured - pair.simulated)
 
-    def copy() -> ComparedPair:
+    def copy() -> Pair:
         drawn = np.asarray(random.integers(units, size=units))
         return pair.taken(_blocks(frames, length, random), drawn).noisier(random)
 

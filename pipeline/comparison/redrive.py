@@ -123,9 +123,7 @@ def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
     for place, dof in np.ndindex(noise.shape):
         if not assumed[place]:
             kept = there[:, place]
-            spline = fit_smoothing_spline(
-                time[kept], measured[kept, place, dof], sigma[kept, place, dof]
-            )
+            spline = fit_spline(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
             value[:, place, dof] = spline(instants)
             slope[:, place, dof] = spline(instants, 1)
             rest = measured[kept, place, dof] - spline(time[kept])
@@ -145,12 +143,12 @@ def held_units(scene: Scene) -> tuple[Ints, Mask]:
     return unit, np.isin(unit, scene.driven)
 
 
-def fit_smoothing_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
+def fit_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
     """Fits the smoothing spline of a course (n,) with standard uncertainties (n,); n >= 8."""
     return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
 
 
-def driven_as_measured(scene: Scene, held: HeldMotion) -> Scene:
+def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
     """Drives all held units as measured; the scene's end is that of the measurement."""
     followed = (3 * held.unit[:, None] + np.arange(3)).ravel()
     return replace(
@@ -174,7 +172,7 @@ def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats
         times: (n_times,) on the track's clock, ascending, s.
     """
     scene, vertices = structure
-    driven = driven_as_measured(scene, held)
+    driven = drive_as_measured(scene, held)
     values = concrete_parameters(driven, vertices)
     shape = (len(times), scene.lattice.n_units, 3)
     displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)

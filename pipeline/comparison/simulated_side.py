@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import redrive, tolerance_band
-from pipeline.posing import PosedStructure, spread_to_units
+from pipeline.posing import PosedStructure, spread
 from pipeline.problem import Problem
 from sim.core import Floats
 
@@ -59,7 +59,7 @@ def simulate_specimen(
     clock = times - track["time"].values[0]
     made = redrive.simulate_redriven(structure, held, clock)
     lattice, size = structure.scene.lattice, track.sizes["unit"]
-    displacement = spread_to_units(made.displacement, lattice, size, axis=1)
+    displacement = spread(made.displacement, lattice, size, axis=1)
     if made.failure is not None:
         LOG.warning("warning: the simulation ended early: %s", made.failure)
         nothing = np.empty((0, *displacement.shape))
@@ -70,7 +70,7 @@ def simulate_specimen(
     return SimulatedSide(
         displacement,
         made.drive_force @ way,
-        spread_to_units(copies.displacement, lattice, size, axis=2),
+        spread(copies.displacement, lattice, size, axis=2),
         copies.drive_force @ way,
         copies.failures,
     )

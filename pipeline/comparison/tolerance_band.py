@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.comparison.redrive import HeldMotion, driven_as_measured
+from pipeline.comparison.redrive import HeldMotion, drive_as_measured
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem import Problem
 from pipeline.runtime import cli
@@ -29,7 +29,7 @@ STREAM = 1
 """First word of the seeds of all draws here, so that no other specimen equals one of them."""
 
 
-class SpecimenSamples(NamedTuple):
+class Specimens(NamedTuple):
     """Holds specimens that were simulated.
 
     Attributes:
@@ -50,7 +50,7 @@ def sample_specimens(
     held: HeldMotion | None = None,
     case: int = 0,
     threads: int = 1,
-) -> SpecimenSamples:
+) -> Specimens:
     """Draws and simulates specimens of a structure.
 
     Args:
@@ -65,7 +65,7 @@ def sample_specimens(
         SimulationError: the structure as designed cannot be simulated.
     """
     planned, vertices = structure
-    scene = _single_case(planned, case) if held is None else driven_as_measured(planned, held)
+    scene = _single_case(planned, case) if held is None else drive_as_measured(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
     unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
@@ -85,7 +85,7 @@ def sample_specimens(
                 courses.append(outcome.value)
             bar.update(failed=len(failures))
     shape = (len(courses), len(times))
-    return SpecimenSamples(
+    return Specimens(
         np.array([motion for motion, _ in courses]).reshape(*shape, scene.lattice.n_units, 3),
         np.array([force for _, force in courses]).reshape(*shape, 2),
         tuple(failures),

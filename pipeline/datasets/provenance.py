@@ -25,7 +25,7 @@ PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shap
 _ROOT = Path(__file__).resolve().parents[2]
 
 
-def study_attributes(
+def of_study(
     problem: Problem,
     stage: Stage,
     *,
@@ -50,7 +50,7 @@ def study_attributes(
     }
 
 
-def recording_attributes(
+def of_recording(
     description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
 ) -> dict[str, str]:
     """Records the provenance of what is made of a recording or of a calibration's measurements.
@@ -61,11 +61,7 @@ def recording_attributes(
         synthetic: whether it was rendered or computed.
         role: what it describes.
     """
-    return {
-        role: description,
-        "synthetic": "yes" if synthetic else "no",
-        **_made_from(parents),
-    }
+    return {role: description, "synthetic": "yes" if synthetic else "no", **_made_from(parents)}
 
 
 def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:

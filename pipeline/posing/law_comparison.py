@@ -24,11 +24,7 @@ LAWS = ("angle", "geometric")
 DIFFERENCE = 0.1
 """Relative difference of the losses under the two laws at which a design depends on the law."""
 _DIMS = ("structure", "contact_law", "case")
-_MEASURES = {
-    "loss_by_contact": "loss",
-    "overlaps_by_contact": "overlaps",
-    "gap_by_contact": "gap",
-}
+_MEASURES = {"loss_by_contact": "loss", "overlaps_by_contact": "overlaps", "gap_by_contact": "gap"}
 
 
 def by_contact(

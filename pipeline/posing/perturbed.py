@@ -76,11 +76,7 @@ def draw(
 
 
 def simulate(
-    scene: Scene,
-    vertices: Floats,
-    asked: Robustness,
-    samples: Sequence[int],
-    threads: int,
+    scene: Scene, vertices: Floats, asked: Robustness, samples: Sequence[int], threads: int
 ) -> xr.Dataset:
     """The dataset ``scatter`` of some of the copies.
 

@@ -12,7 +12,7 @@ from pipeline.posing.law_comparison import LAWS, by_contact
 from pipeline.posing.structure_variables import (
     Variables,
     network_variables,
-    spread_to_units,
+    spread,
     unit_coordinates,
 )
 from pipeline.posing.to_scene import contact_distance, lattice_of
@@ -83,18 +83,13 @@ def _over_units(
     def whole(of_case: Callable[[CaseResult], Floats]) -> Floats:
         return np.stack(
             [
-                [
-                    spread_to_units(of_case(case), structures[name].scene.lattice, size, 1)
-                    for case in cases
-                ]
+                [spread(of_case(case), structures[name].scene.lattice, size, 1) for case in cases]
                 for name, cases in measured.items()
             ]
         )
 
     lattices = [(each.scene.lattice, each.vertices) for each in structures.values()]
-    padded = [
-        spread_to_units(lattice.padded(places), lattice, size) for lattice, places in lattices
-    ]
+    padded = [spread(lattice.padded(places), lattice, size) for lattice, places in lattices]
     return {
         "vertices": (("structure", "unit", "vertex", "xy"), np.stack(padded)),
         "displacement": (_MOTION, whole(lambda case: case.displacement)),

@@ -17,16 +17,14 @@ from sim.scene import Scene
 _SAME = 1e-9  # mm
 
 
-def shipped_design_vector(design: xr.Dataset) -> Floats:
+def shipped_vector(design: xr.Dataset) -> Floats:
     """Reads the design vector (n_variables,) of a design."""
     history = design.sel({"method": design.attrs["shipped_method"]})
     best = int(history["best_evaluation"])
     return np.asarray(history["design_vector"].isel(evaluation=best).values)
 
 
-def start_design_vector(
-    asked: Problem, scene: Scene, path: Path | None, source: Path
-) -> Floats | None:
+def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) -> Floats | None:
     """Reads the design vector (n_variables,) that an optimisation starts from, if it has one.
 
     Args:
@@ -51,7 +49,7 @@ def start_design_vector(
     if path is None:
         return None
     design = datasets.read(path, "design")
-    vector, space = shipped_design_vector(design), scene.space
+    vector, space = shipped_vector(design), scene.space
     if len(vector) == space.n_variables and design["vertices"].shape[0] == scene.lattice.n_units:
         there = flat_vertices(scene.lattice, design["vertices"])
         if np.abs(np.asarray(space.vertices(vector)) - there).max() < _SAME:

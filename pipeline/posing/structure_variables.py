@@ -94,7 +94,7 @@ def read_design(asked: Problem, path: Path) -> xr.Dataset:
     return design
 
 
-def spread_to_units(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:
+def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:
     """Spreads an array over a network's units to all ``size`` units, NaN where removed."""
     inner = np.moveaxis(np.asarray(values), axis, 0)
     out = np.full((size, *inner.shape[1:]), np.nan)

@@ -74,7 +74,7 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("warning: %s", line)
     parents = {each.name: path.parent / each.file for each in asked.data if each.file is not None}
-    origin = provenance.recording_attributes(
+    origin = provenance.of_recording(
         asked.model_dump_json(), parents, synthetic=asked.synthetic, role="calibration"
     )
     datasets.write(made, args.out, "calibration", origin)

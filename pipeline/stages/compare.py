@@ -80,7 +80,7 @@ def work(args: argparse.Namespace) -> None:
         raise
     told = assemble_comparison(made)
     origin = {
-        **provenance.study_attributes(asked, "compare", parents=files, plan=_plan(made)),
+        **provenance.of_study(asked, "compare", parents=files, plan=_plan(made)),
         "recording": recording.model_dump_json(),
         "synthetic": made.measurement.track.attrs["synthetic"],
     }

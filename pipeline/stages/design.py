@@ -20,8 +20,8 @@ from pipeline.posing import (
     limits_of,
     loss_units,
     network_variables,
-    spread_to_units,
-    start_design_vector,
+    spread,
+    start_vector,
     unit_coordinates,
 )
 from pipeline.runtime import UserError, cli, source_hash
@@ -87,12 +87,12 @@ def work(args: argparse.Namespace) -> None:
     _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    start = start_design_vector(asked, scene, args.start, args.problem)
+    start = start_vector(asked, scene, args.start, args.problem)
     result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent, start)
     LOG.info("stopped: %s", result.reason)
     made = design_dataset(asked, scene, result)
     parents = {} if args.start is None else {"start": args.start}
-    origin = provenance.study_attributes(
+    origin = provenance.of_study(
         asked, "design", method=args.method, parents=parents, plan=plan.record()
     )
     datasets.write(made, args.out, "design_method", origin)
@@ -205,7 +205,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     nothing = np.full(cases, np.nan)
 
     def whole(values: Floats) -> Floats:
-        return spread_to_units(values, lattice, intact.n_units)
+        return spread(values, lattice, intact.n_units)
 
     variables = {
         **network_variables(asked, scene),

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.posing import design_scene, law_comparison, read_design, shipped_design_vector
+from pipeline.posing import design_scene, law_comparison, read_design, shipped_vector
 from pipeline.problem.sections import Method, Methods
 from pipeline.runtime import cli
 from pipeline.stages.design import design_dataset, optimise
@@ -61,12 +61,12 @@ def work(args: argparse.Namespace) -> None:
     scene = design_scene(posed, args.problem.parent)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    start = None if np.isnan(distance) else shipped_design_vector(design)
+    start = None if np.isnan(distance) else shipped_vector(design)
     result = optimise(posed, scene, plan, METHOD, args.problem, args.out.parent, start)
     LOG.info("stopped: %s", result.reason)
     made = join({METHOD: design_dataset(posed, scene, result)}, METHOD)
     parents = {"design": args.design, "response": args.response}
-    origin = provenance.study_attributes(asked, "geometric", parents=parents, plan=plan.record())
+    origin = provenance.of_study(asked, "geometric", parents=parents, plan=plan.record())
     datasets.write(made, args.out, "design", origin)
 
 

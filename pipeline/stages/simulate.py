@@ -69,9 +69,7 @@ def work(args: argparse.Namespace) -> None:
         scene = structures[stopped.name].scene
         tried = failures.SimulatedStructure(args.problem, scene, stopped.name, stopped.asked)
         raise failures.simulation_failure(stopped.error, tried, kept) from stopped
-    origin = provenance.study_attributes(
-        asked, "simulate", parents={"design": args.design}, plan=plans
-    )
+    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
 
 
@@ -104,9 +102,7 @@ def _keep(
     except StoppedError as again:
         return _keep(asked, shorter, again, args)
     out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
-    origin = provenance.study_attributes(
-        asked, "simulate", parents={"design": args.design}, plan=plans
-    )
+    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, out, "response", origin)
     return out
 

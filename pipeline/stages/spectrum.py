@@ -19,7 +19,7 @@ from pipeline.posing import (
     network_variables,
     read_design,
     scene_of,
-    spread_to_units,
+    spread,
     structures_of,
     unit_coordinates,
 )
@@ -82,7 +82,7 @@ def work(args: argparse.Namespace) -> None:
     except UserError as error:
         error.file = error.file or str(args.problem)
         raise
-    origin = provenance.study_attributes(asked, "spectrum", parents={"design": args.design})
+    origin = provenance.of_study(asked, "spectrum", parents={"design": args.design})
     datasets.write(made, args.out, "spectrum", origin)
 
 
@@ -103,7 +103,7 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
             found.append(_vibrations(each, wanted, case_directions(asked), intact.n_units))
             bar.update()
     vertices = [
-        spread_to_units(s.scene.lattice.padded(s.vertices), s.scene.lattice, intact.n_units)
+        spread(s.scene.lattice.padded(s.vertices), s.scene.lattice, intact.n_units)
         for s in structures.values()
     ]
     parts = Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
@@ -141,7 +141,7 @@ def _vibrations(
         made = linearised(scene.topology, values, state)
         frequency, shape = _modes(made, wanted.modes)
         sent = _transmission(made, structure, wanted, directions)
-        whole = spread_to_units(state, lattice, size), spread_to_units(shape, lattice, size, axis=1)
+        whole = spread(state, lattice, size), spread(shape, lattice, size, axis=1)
         found.append(Vibrations(whole[0], frequency, whole[1], sent))
     return Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
 

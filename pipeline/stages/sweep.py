@@ -63,7 +63,7 @@ def _run(args: argparse.Namespace) -> None:
         _simulate(args, asked, design["vertices"], here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
     LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
-    origin = provenance.study_attributes(asked, "sweep", parents=parents)
+    origin = provenance.of_study(asked, "sweep", parents=parents)
     datasets.write(made, args.out, "sweep", origin)
 
 

@@ -66,7 +66,7 @@ def work(args: argparse.Namespace) -> None:
         )
     design = read_design(asked, args.design)
     made = checks(asked, args.problem.parent, design, args.threads)
-    origin = provenance.study_attributes(asked, "verify", parents={"design": args.design})
+    origin = provenance.of_study(asked, "verify", parents={"design": args.design})
     datasets.write(made, args.out, "verification", origin)
 
 

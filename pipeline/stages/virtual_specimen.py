@@ -18,7 +18,7 @@ from pipeline.posing import (
     network_variables,
     read_design,
     scene_of,
-    spread_to_units,
+    spread,
     structures_of,
     times_of,
     unit_coordinates,
@@ -63,7 +63,7 @@ def work(args: argparse.Namespace) -> None:
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
-    origin = provenance.study_attributes(asked, "simulate", parents={"design": args.design})
+    origin = provenance.of_study(asked, "simulate", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 
@@ -130,12 +130,9 @@ def _described(
         **network_variables(asked, altered),
         "vertices": (
             ("unit", "vertex", "xy"),
-            spread_to_units(lattice.padded(vertices), lattice, intact.n_units),
+            spread(lattice.padded(vertices), lattice, intact.n_units),
         ),
-        "displacement": (
-            ("time", "unit", "dof"),
-            spread_to_units(motion, lattice, intact.n_units, 1),
-        ),
+        "displacement": (("time", "unit", "dof"), spread(motion, lattice, intact.n_units, 1)),
         "drive_displacement": (("time", "xy"), drive),
         "drive_force": (("time", "xy"), force),
     }

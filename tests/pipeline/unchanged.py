@@ -15,7 +15,7 @@ from pipeline.posing import (
     lattice_of,
     network_variables,
     scene_of,
-    spread_to_units,
+    spread,
     unit_coordinates,
 )
 from pipeline.posing.to_scene import altered_lattice_of
@@ -25,7 +25,7 @@ def write(path: Path) -> Path:
     """Writes design.nc beside a problem file."""
     asked = problem.load(path)
     intact, altered = lattice_of(asked), altered_lattice_of(asked)
-    vertices = spread_to_units(altered.padded(altered.vertices), altered, intact.n_units)
+    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
     labels = {
         "case": len(case_directions(asked)),
         "method": 1,
@@ -57,5 +57,5 @@ def write(path: Path) -> Path:
         {"shipped_method": "sqp"},
     )
     out = path.with_name("design.nc")
-    datasets.write(design, out, "design", provenance.study_attributes(asked, "design"))
+    datasets.write(design, out, "design", provenance.of_study(asked, "design"))
     return out

@@ -20,7 +20,7 @@ from pipeline.posing import (
     law_comparison,
     network_variables,
     scene_of,
-    spread_to_units,
+    spread,
     unit_coordinates,
 )
 from pipeline.posing.perturbed import noises
@@ -63,7 +63,7 @@ def written(folder: Path, more: str) -> StudyResults:
         stage = study_results.STAGES[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
         posed = law_comparison.geometric(chosen) if kind == "geometric_response" else chosen
-        about = provenance.study_attributes(posed, stage, plan=plan)
+        about = provenance.of_study(posed, stage, plan=plan)
         datasets.write(made[kind], files[kind], study_results.KINDS[kind], about)
     return study_results.load(path, None, files)
 
@@ -79,7 +79,7 @@ def _lattices(chosen: Problem) -> dict[str, Lattice]:
 
 def design(chosen: Problem, path: Path) -> xr.Dataset:
     intact, altered = lattice_of(chosen), altered_lattice_of(chosen)
-    vertices = spread_to_units(altered.padded(altered.vertices), altered, intact.n_units)
+    vertices = spread(altered.padded(altered.vertices), altered, intact.n_units)
     return xr.Dataset(
         network_variables(chosen, scene_of(chosen, path.parent))
         | _history()
@@ -127,9 +127,7 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     variables = network_variables(chosen, scene)
     motion = np.stack(
         [
-            spread_to_units(_motion(chosen, lattice, time, name), lattice, whole.n_units, axis=1)[
-                None
-            ]
+            spread(_motion(chosen, lattice, time, name), lattice, whole.n_units, axis=1)[None]
             for name, lattice in lattices.items()
         ]
     )
@@ -142,10 +140,7 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     drive = np.zeros((1, len(time), 2))
     drive[0, :, 0] = -_amplitude(chosen) * time
     loss = np.array([[LOSS[name]] for name in lattices])
-    shapes = [
-        spread_to_units(each.padded(each.vertices), each, whole.n_units)
-        for each in lattices.values()
-    ]
+    shapes = [spread(each.padded(each.vertices), each, whole.n_units) for each in lattices.values()]
     return xr.Dataset(
         filled
         | variables

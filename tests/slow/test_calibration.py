@@ -67,7 +67,7 @@ class Case(NamedTuple):
 def forces_case(folder: Path) -> Case:
     asked = loaded(folder, described(force_sets(points=12), STIFFNESS))
     begin, true = start_constants(asked), computed_sets.true_constants(asked)
-    clean: list[tuple[force_displacement.ForceExperiment, Floats, float]] = []
+    clean: list[tuple[force_displacement.ForceTest, Floats, float]] = []
     for each in asked.data:
         assert isinstance(each, ForceDisplacement)
         assert each.virtual is not None

@@ -3,8 +3,8 @@ from . import free_decay as free_decay
 from . import full_field as full_field
 from . import tracked_specimen as tracked_specimen
 from .experiment import Experiment as Experiment
-from .force_displacement import ForceExperiment as ForceExperiment
-from .free_decay import FreeDecayExperiment as FreeDecayExperiment
+from .force_displacement import ForceTest as ForceTest
+from .free_decay import DecayTest as DecayTest
 from .full_field import FullFieldExperiment as FullFieldExperiment
 from .full_field import per_dof as per_dof
 from .tracked_specimen import TrackedSpecimen as TrackedSpecimen

@@ -48,7 +48,7 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class ForceExperiment:
+class ForceTest:
     """Holds a test of forces (``experiment.Experiment``)."""
 
     measured: MeasuredValues
@@ -77,12 +77,12 @@ class ForceExperiment:
 
 def pose_force_test(
     asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats
-) -> ForceExperiment:
+) -> ForceTest:
     """Returns the set as an experiment on equilibria."""
     sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
     known = asked.noise is not None
     measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
-    return ForceExperiment(measured, pose_simulation(asked, begin, displacement), asked.tare)
+    return ForceTest(measured, pose_simulation(asked, begin, displacement), asked.tare)
 
 
 def pose_simulation(

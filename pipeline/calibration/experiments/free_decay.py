@@ -91,7 +91,7 @@ def fit_peaks(time: Floats, angle: Floats) -> DecayPeaks | None:
 
 
 @dataclass(frozen=True)
-class FreeDecayExperiment:
+class DecayTest:
     """Holds a trace (``experiment.Experiment``).
 
     Its own unknowns are offset (rad), drift (rad/s), the amplitudes of cosine and sine (rad), and
@@ -128,10 +128,10 @@ def decay_terms(time: Floats, ratio: float, frequency: float) -> Floats:
     return np.stack([np.ones_like(time), time, *oscillation], axis=1)
 
 
-def pose_decay(asked: FreeDecay, time: Floats, angle: Floats) -> FreeDecayExperiment:
+def pose_decay(asked: FreeDecay, time: Floats, angle: Floats) -> DecayTest:
     """Returns the set as an experiment."""
     sigma = np.full(len(angle), 1.0 if asked.noise is None else asked.noise)
     measured = MeasuredValues(asked.name, asked.kind, time, angle, sigma, asked.noise is not None)
     peaks = fit_peaks(time, angle)
     assert peaks is not None
-    return FreeDecayExperiment(measured, peaks)
+    return DecayTest(measured, peaks)

@@ -144,7 +144,7 @@ def pose_track(
     except UserError as error:
         error.file = str(path)
         raise
-    driven = redrive.driven_as_measured(made.scene, drive.held)
+    driven = redrive.drive_as_measured(made.scene, drive.held)
     frames = np.arange(0, track.sizes["time"], asked.every)
     shown = upright.isel(time=frames)
     chosen = _select_values(shown, driven)

@@ -12,7 +12,7 @@ from pipeline import datasets
 from pipeline import problem as problems
 from pipeline.calibration.inputs import TrackedMotion
 from pipeline.comparison import measure_places, register
-from pipeline.posing import flat_vertices, scene_of, spread_to_units
+from pipeline.posing import flat_vertices, scene_of, spread
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from sim.core import Floats
@@ -53,9 +53,7 @@ class TrackedSpecimen(NamedTuple):
     def upright(self, track: xr.Dataset, vertices: Floats) -> xr.Dataset:
         """Turns the track into the design's frame; `vertices` (n_vertices, 2) are as built."""
         lattice = self.scene.lattice
-        centre = spread_to_units(
-            np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"]
-        )
+        centre = spread(np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"])
         found = register(centre, measure_places(track, centre))
         seen = track["displacement"].transpose("time", "unit", "dof").values.astype(float)
         return track.assign(displacement=(("time", "unit", "dof"), found.upright(seen)))

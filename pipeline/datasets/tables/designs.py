@@ -22,11 +22,7 @@ NETWORK: Table = {
         flags={"outside": 0, "inside": 1},
     ),
     "support": Variable(
-        ("unit",),
-        "1",
-        "support of the unit",
-        "int8",
-        flags={"free": 0, "clamped": 1, "driven": 2},
+        ("unit",), "1", "support of the unit", "int8", flags={"free": 0, "clamped": 1, "driven": 2}
     ),
     "ligament_unit": Variable(
         ("ligament", "end"), "1", "units that the ligament of the intact lattice joins", "int64"

@@ -68,9 +68,7 @@ UNIT: Table = {
     "xy": names("xy", "axis of the specimen frame", "x", "y"),
 }
 
-CASE: Table = {
-    "direction": label(("case",), "degree", "direction of the drive"),
-}
+CASE: Table = {"direction": label(("case",), "degree", "direction of the drive")}
 
 ENERGY = ("N mm",)
 """Unit of a loss that is an energy."""

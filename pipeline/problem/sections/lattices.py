@@ -163,12 +163,7 @@ class Kagome(_Grid):
     def network(self) -> Network:
         """Builds the lattice for sim/."""
         return kagome(
-            self.columns,
-            self.rows,
-            self.spacing,
-            self.ligament_length,
-            self.bias,
-            self.cell_angle,
+            self.columns, self.rows, self.spacing, self.ligament_length, self.bias, self.cell_angle
         )
 
 

@@ -70,10 +70,7 @@ def measured_decay(lines: list[str], folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("change", "told"),
-    [
-        ({}, "no decaying oscillation is seen"),
-        ({20: 0.005}, "the clock does not ascend"),
-    ],
+    [({}, "no decaying oscillation is seen"), ({20: 0.005}, "the clock does not ascend")],
 )
 def test_faulty_traces(
     change: dict[int, float], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -104,10 +101,7 @@ FREE = {"translation": "2.9e-2 kg/s", "rotation": "1.2e-7 kg m^2/s"}
     ],
 )
 def test_faulty_calibrations(
-    changed: dict[str, object],
-    told: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    changed: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = written(tmp_path, described(force_sets(), STIFFNESS) | changed)
     assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 2

@@ -14,13 +14,7 @@ from pipeline import datasets
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import ROOT
 from pipeline.stages import calibrate
-from tests.pipeline.calibration.specimens import (
-    TRUTH,
-    described,
-    force_sets,
-    synthesised,
-    written,
-)
+from tests.pipeline.calibration.specimens import TRUTH, described, force_sets, synthesised, written
 
 SPECIMENS = ROOT / "experiments/calibration/specimens"
 ERROR = {"displacement": "0.005 mm", "rotation": "0.02 deg"}

@@ -13,7 +13,7 @@ from pipeline.comparison.compared_quantities import (
     normalised_rms,
 )
 from pipeline.comparison.curves import (
-    ComparedSides,
+    Sides,
     estimate_peaks,
     expected_coverage,
     peak_to_peak,
@@ -26,12 +26,12 @@ PHASE = np.linspace(0, 3, 3 * UNITS).reshape(UNITS, 3)
 WAVES = np.sin(4 * np.pi * TIME[:, None, None] - PHASE)
 
 
-def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> ComparedSides:
+def sides(measured: np.ndarray, noise: float = NOISE, gain: float = 1.0) -> Sides:
     """Of waves that are seen with noise; the copies of the simulated side differ in size."""
     seen = measured + noise * np.random.default_rng(2).standard_normal(measured.shape)
     sigma = np.full(measured.shape, noise)
     copies = np.stack([share * gain * WAVES for share in np.linspace(0.9, 1.1, 64)])
-    return ComparedSides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
+    return Sides(seen, sigma, gain * WAVES, gain * WAVES, copies, 0.95)
 
 
 def test_a_peak_between_frames_is_not_missed() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline.comparison.metrics import (
     METRICS,
-    ComparedPair,
+    Pair,
     block_length,
     bootstrap,
     compute_metrics,
@@ -27,13 +27,11 @@ def waves(lag: float = 0.0) -> np.ndarray:
     return np.asarray(np.sin(4 * np.pi * (TIME[:, None, None] - lag) - phase))
 
 
-def pair(
-    noise: float, stated: float | None = None, lag: float = 0.0, seed: int = 0
-) -> ComparedPair:
+def pair(noise: float, stated: float | None = None, lag: float = 0.0, seed: int = 0) -> Pair:
     simulated = waves()
     drawn = np.random.default_rng(seed).normal(0, noise, simulated.shape)
     sigma = np.full(simulated.shape, noise if stated is None else stated)
-    return ComparedPair(waves(lag) + drawn, simulated, sigma)
+    return Pair(waves(lag) + drawn, simulated, sigma)
 
 
 def test_pure_noise_explains_all_of_the_residual() -> None:

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline import problem
-from pipeline.comparison.redrive import filter_held_motion, fit_smoothing_spline, simulate_redriven
+from pipeline.comparison.redrive import filter_held_motion, fit_spline, simulate_redriven
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.runtime import UserError
 from sim.scene import Scene, concrete_parameters, make_plan
@@ -102,7 +102,7 @@ def test_the_filter_departs_by_the_uncertainty_and_keeps_a_jump_of_speed() -> No
     time = np.linspace(0, 2, 121)
     true = np.where(time > 0.2, 4.5 * np.sin(4 * np.pi * (time - 0.2)), 0.0)
     value = true + 0.005 * np.random.default_rng(1).standard_normal(121)
-    made = fit_smoothing_spline(time, value, np.full(121, 0.005))(time)
+    made = fit_spline(time, value, np.full(121, 0.005))(time)
     assert np.sqrt(np.mean((made - value) ** 2)) == pytest.approx(0.005, rel=0.01)
     assert np.abs(made - true)[20:].max() < 0.02
 

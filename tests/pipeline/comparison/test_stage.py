@@ -143,8 +143,7 @@ def test_a_turned_camera_is_told_and_taken_out_and_a_scale_is_left_in(
     middle = np.nanmean(centre, axis=0)
     missed = (scale * (centre - middle) @ matrix + middle - centre) / PIXEL
     tilted = film.assign(
-        displacement=(film["displacement"].dims, motion),
-        camera_residual=(("unit", "xy"), missed),
+        displacement=(film["displacement"].dims, motion), camera_residual=(("unit", "xy"), missed)
     )
     found = prepare_measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
     assert found.registration.rotation == pytest.approx(turn, abs=1e-4)

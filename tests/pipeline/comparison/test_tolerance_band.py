@@ -8,12 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline import problem
-from pipeline.comparison.tolerance_band import (
-    SpecimenSamples,
-    band_limits,
-    sample_specimens,
-    widen_band,
-)
+from pipeline.comparison.tolerance_band import Specimens, band_limits, sample_specimens, widen_band
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import Tolerances
@@ -25,7 +20,7 @@ SIZES = "geometry: 0.03, ligaments: 0.1, stiffness: 0.05"
 TIMES = np.array([0.4, 0.7, 1.0])
 
 
-def draws(study: tuple[Problem, Path], **changes: object) -> SpecimenSamples:
+def draws(study: tuple[Problem, Path], **changes: object) -> Specimens:
     asked, folder = study
     changed = asked.prediction.model_copy(update=changes)
     scene = scene_of(asked, folder)
@@ -41,13 +36,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Path]:
 
 
 @pytest.fixture(scope="module")
-def samples(study: tuple[Problem, Path]) -> SpecimenSamples:
+def samples(study: tuple[Problem, Path]) -> Specimens:
     return draws(study)
 
 
-def test_the_band_holds_the_next_specimens(
-    study: tuple[Problem, Path], samples: SpecimenSamples
-) -> None:
+def test_the_band_holds_the_next_specimens(study: tuple[Problem, Path], samples: Specimens) -> None:
     """95 % of what a tracker measures of 40 others, drawn alike, at their free units."""
     others = draws(study, seed=1, samples=40)
     noise = SIGMA * np.random.default_rng(2).standard_normal(others.displacement.shape)

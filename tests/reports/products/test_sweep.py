@@ -50,7 +50,7 @@ def paths(folder: Path, text: str) -> tuple[Path, Path]:
     numbered = list(enumerate(sweep_cases.list_settings(asked.sweep)))
     results = {number: found(setting) for number, setting in numbered}  # type: ignore[arg-type]
     made = stage.dataset(asked, numbered, results)
-    datasets.write(made, folder / "sweep.nc", "sweep", provenance.study_attributes(asked, "sweep"))
+    datasets.write(made, folder / "sweep.nc", "sweep", provenance.of_study(asked, "sweep"))
     return at, folder / "sweep.nc"
 
 
