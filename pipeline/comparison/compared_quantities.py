@@ -99,9 +99,9 @@ def middle_units(problem: Problem, side: str) -> list[int]:
     return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
 
 
-def known_mean(values: Floats) -> Floats:
-    """Computes the mean over the last axis of those that are known; NaN of none."""
+def known_mean(values: Floats, axis: int = -1) -> Floats:
+    """Computes the mean over an axis of those that are known; NaN of none."""
     known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    total = np.where(known, values, 0.0).sum(axis=-1)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import curves
-from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
+from pipeline.comparison.compared_quantities import FOLLOWED, Quantity, known_mean
 from pipeline.comparison.curves import Sides
 from pipeline.comparison.measured_side import Measurement
 from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimate_metrics
@@ -16,7 +16,6 @@ from pipeline.comparison.nominal_side import ComparisonAxis, NominalSide
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
 from pipeline.problem import Problem
-from sim.core import Floats
 
 SEED = 0
 
@@ -154,7 +153,7 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
     return {
         **table,
         **_forces(made, random),
-        "rmse_map": (("side", "unit", "dof"), root_mean_square(apart, axis=1)),
+        "rmse_map": (("side", "unit", "dof"), np.sqrt(known_mean(apart**2, axis=1))),
     }
 
 
@@ -213,15 +212,6 @@ def _alignment(made: Compared) -> Variables:
         "registration_shift": (("xy",), found.shift),
         "registration_shift_sigma": (("xy",), found.shift_sigma),
     }
-
-
-def root_mean_square(values: Floats, axis: int) -> Floats:
-    """Computes the root mean square over an axis of the known values; NaN of none."""
-    known = np.isfinite(values)
-    count = known.sum(axis=axis)
-    total = np.where(known, values, 0.0) ** 2
-    mean = total.sum(axis=axis) / np.maximum(count, 1)
-    return np.where(count > 0, np.sqrt(mean), np.nan)
 
 
 def describe_comparison(asked: Problem, made: Compared) -> dict[str, str]:

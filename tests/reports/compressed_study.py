@@ -14,7 +14,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.datasets.tables import TABLES
+from pipeline.datasets.tables import TABLES, Kind
 from pipeline.posing import (
     lattice_of,
     law_comparison,
@@ -165,7 +165,7 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     )
 
 
-def _filled(kind: datasets.Kind, shape: tuple[int, ...]) -> dict[str, Any]:
+def _filled(kind: Kind, shape: tuple[int, ...]) -> dict[str, Any]:
     """Every variable of a kind on (structure, case, time, ...) with a small constant."""
     sizes = dict(zip(("structure", "case", "time", "unit", "dof"), shape, strict=True))
     sizes |= {"xy": 2, "contact_law": 2}

@@ -127,7 +127,28 @@ class Quads(_Grid):
         return quads(self.columns, self.rows, self.spacing, self.ligament_length, self.bias_angle)
 
 
-class Kagome(_Grid):
+class _WithNetwork(Section):
+    """Takes sites and bonds from the network for sim/."""
+
+    def network(self) -> Network:
+        """Builds the lattice for sim/."""
+        raise NotImplementedError
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Lists every unit's id with the x and y of its site in mm, in the order of the ids."""
+        return iter([(unit, x, y) for unit, (x, y) in enumerate(_network(self).site.tolist())])
+
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """Lists the units that each ligament joins."""
+        return iter([(one, other) for one, other in _network(self).ligament_units.tolist()])
+
+
+@lru_cache(maxsize=8)
+def _network(lattice: _WithNetwork) -> Network:
+    return lattice.network()
+
+
+class Kagome(_WithNetwork, _Grid):
     """Two triangles in every cell, (2 i, j) and (2 i + 1, j), joined at three corners.
 
     Attributes:
@@ -152,14 +173,6 @@ class Kagome(_Grid):
         along = self.columns * self.spacing / 2
         return along + up * math.cos(self.cell_angle), up * math.sin(self.cell_angle)
 
-    def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Lists every unit's id with the x and y of its site in mm, in the order of the ids."""
-        return _sites(self)
-
-    def bonds(self) -> Iterator[tuple[int, int]]:
-        """Lists the units that each ligament joins."""
-        return _bonds(self)
-
     def network(self) -> Network:
         """Builds the lattice for sim/."""
         return kagome(
@@ -167,7 +180,7 @@ class Kagome(_Grid):
         )
 
 
-class ListedNetwork(Section):
+class ListedNetwork(_WithNetwork):
     """Polygons and ligaments from a file: CSV, netCDF, or closed polylines and lines of a DXF.
 
     Units are numbered in the order of the file and listed as [number, 0].
@@ -265,14 +278,6 @@ class ListedNetwork(Section):
         _, x, y = zip(*self.sites(), strict=True)
         return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
 
-    def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Lists every unit's id with the x and y of its site in mm, in the order of the ids."""
-        return _sites(self)
-
-    def bonds(self) -> Iterator[tuple[int, int]]:
-        """Lists the units that each ligament joins."""
-        return _bonds(self)
-
     def network(self) -> Network:
         """Builds the lattice for sim/.
 
@@ -280,19 +285,6 @@ class ListedNetwork(Section):
             ValueError: a polygon without area, or a ligament that does not join two units.
         """
         return listed(self.polygons or (), self.ligaments or (), self.spacing)
-
-
-@lru_cache(maxsize=8)
-def _network(lattice: Kagome | ListedNetwork) -> Network:
-    return lattice.network()
-
-
-def _sites(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, float, float]]:
-    return iter([(unit, x, y) for unit, (x, y) in enumerate(_network(lattice).site.tolist())])
-
-
-def _bonds(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, int]]:
-    return iter([(one, other) for one, other in _network(lattice).ligament_units.tolist()])
 
 
 def _kind(value: object) -> str:

@@ -10,6 +10,7 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets
+from pipeline.datasets.tables import Kind
 from pipeline.stages import fabricate
 from tests.pipeline.fabrication import built
 
@@ -86,7 +87,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     built.design().to_netcdf(tmp_path / "design.nc")
     whole = datasets.read
 
-    def read(path: Path, kind: datasets.Kind) -> xr.Dataset:
+    def read(path: Path, kind: Kind) -> xr.Dataset:
         """The small design lacks what only the optimiser writes."""
         try:
             return xr.load_dataset(path)
