@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.posing import scene_of
 from pipeline.problem import (
     Problem,
     Stage,
@@ -171,6 +173,18 @@ def test_a_measured_motion_must_be_there_and_as_meant(fig2: Path, tmp_path: Path
     with pytest.raises(UserError, match="not the file that was meant") as caught:
         load(with_series(fig2, tmp_path, f"{SERIES}  sha256: {wrong}\n"))
     assert caught.value.key == "drive.sha256"
+
+
+def test_a_measured_motion_is_read_in_the_units_of_its_heading(fig2: Path, tmp_path: Path) -> None:
+    path = with_series(fig2, tmp_path, SERIES)
+    rows = ["time (ms);ux (cm);uy (mm);theta (deg)", "0;0;0;0", "1000;0,5;-2;180"]
+    (tmp_path / "motion.csv").write_text("\n".join(rows))
+    (drive,) = scene_of(load(path), tmp_path).motions
+    np.testing.assert_allclose(drive(np.array([1.0])), [[5.0, -2.0, math.pi]])
+    (tmp_path / "motion.csv").write_text("\n".join([*rows, "1500;1;x;0"]))
+    with pytest.raises(UserError, match="not a finite number") as caught:
+        scene_of(load(path), tmp_path)
+    assert caught.value.line == 4
 
 
 def test_loading_leaves_the_heavy_libraries_alone(fig2: Path) -> None:
