@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -36,7 +34,7 @@ from sim.optimise import (
     minimise,
 )
 from sim.quasistatics import StaticSolver
-from sim.scene import Paths, evaluator, make_plan
+from sim.scene import Evaluator, Paths, make_plan
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 if TYPE_CHECKING:
@@ -51,21 +49,6 @@ LOG = logging.getLogger(__name__)
 
 CONFIRMING = 4
 """Loads passed for each of the loss when a design's loss is confirmed."""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.design",
-        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from"
-        " which the same command resumes after any kind of end.",
-    )
-    made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    told = "the design to start from, where the problem has optimiser.start: study"
-    made.add_argument("--start", type=Path, metavar="NC", help=told)
-    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -106,7 +89,7 @@ def _check_symmetry(scene: Scene, source: Path) -> None:
             str(error),
             file=source,
             key="optimiser.symmetry",
-            value=scene.symmetry,
+            value=scene.design.symmetry,
             remedy="ask for none, or for one that lattice and cloak have",
         ) from error
 
@@ -151,7 +134,7 @@ def optimise(
             ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
-                    journal.wrap(evaluator(scene, plan, paths)),
+                    journal.wrap(Evaluator(scene, plan, paths)),
                     constraints,
                     np.zeros(scene.space.n_variables) if start is None else start,
                     options=_options(asked, method),
@@ -161,8 +144,8 @@ def optimise(
         except InfeasibleStartError as error:
             raise failures.infeasible_start(error, constraints, source) from error
         except SimulationError as error:
-            tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.asked)
-            raise failures.simulation_failure(error, tried, None) from error
+            tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
+            raise failures.unsolved(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 
@@ -174,7 +157,7 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
     """
     if not isinstance(plan.solver, StaticSolver):
         return None
-    return evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
@@ -244,12 +227,3 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     for name in ("loss", "loss_case", "best_loss"):
         made[name].attrs["units"] = loss_units(asked)
     return made
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
