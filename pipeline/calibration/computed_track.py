@@ -28,7 +28,7 @@ def simulate_track(
         UserError: the problem is wrong.
     """
     assert asked.virtual is not None
-    made = specimen(asked, folder)
+    made = pose_specimen(asked, folder)
     count = 1 + int(made.scene.loads.duration * asked.virtual.rate * (1 + 1e-9))
     time = np.arange(count) / asked.virtual.rate
     posed = _true_scene(made, true)

@@ -147,7 +147,7 @@ def fit_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
     return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
 
 
-def under(scene: Scene, held: Held) -> Scene:
+def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
     """The scene with all held units driven as measured; its end is that of the measurement."""
     return scene.updated(
         cases=(PrescribedMotion(held.unit, held.motion),),
@@ -167,7 +167,7 @@ def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats
         times: (n_times,) on the track's clock, ascending, s.
     """
     scene, vertices = structure
-    driven = under(scene, held)
+    driven = drive_as_measured(scene, held)
     shape = (len(times), scene.lattice.n_units, 3)
     displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)
     failure = None
@@ -181,4 +181,4 @@ def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats
         seen = observe(driven.topology, concrete_parameters(driven, vertices), found)
         displacement[: len(found)] = found
         force[: len(found)] = seen.force_on(scene.loads.driven)
-    return Redriven(displacement, force, failure)
+    return RedrivenMotion(displacement, force, failure)

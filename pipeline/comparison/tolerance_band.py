@@ -65,7 +65,7 @@ def sample_specimens(
         SimulationError: the structure as designed cannot be simulated.
     """
     planned, vertices = structure
-    scene = planned.alone(case) if held is None else under(planned, held)
+    scene = planned.alone(case) if held is None else drive_as_measured(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
     unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"

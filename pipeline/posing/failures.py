@@ -33,7 +33,7 @@ def infeasible_start(
     )
 
 
-class Simulated(NamedTuple):
+class SimulatedStructure(NamedTuple):
     """What was to be simulated: a structure of a problem file at solver times (n_times,)."""
 
     source: Path

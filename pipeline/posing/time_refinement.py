@@ -88,7 +88,7 @@ def _numbers(
 
 def _of_structure(
     structure: PosedStructure, run: Response, as_run: Response, aims: Floats, times: Times
-) -> Numbers:
+) -> CheckResult:
 
     scene, vertices = structure
     values, motion = run.parameters, run.displacement
@@ -102,7 +102,7 @@ def _of_structure(
         clearance(scene.lattice, vertices, each[::CLEARANCE_STRIDE])
         for each in motion[:, times.shown]
     ]
-    return Numbers(
+    return CheckResult(
         loss=float(
             scene.loads.case_weights @ np.asarray(measure(motion[:, times.integrated], values))
         ),

@@ -28,7 +28,8 @@ from sim.scene import Clamp, Design, Loads, Numerics, Objective, Scene, Structur
 from sim.solvers import PrescribedMotion, loads
 from sim.structure import ContactModel, DistanceContact, Lattice, Material, VoidAngleContact
 
-TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
+TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "theta": units.ANGLE}
+"""Columns of a measured drive, whose heading names each with its unit in brackets."""
 
 
 def lattice_of(problem: Problem) -> Lattice:

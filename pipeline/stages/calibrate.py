@@ -15,7 +15,7 @@ from pipeline.calibration import (
 )
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets import provenance
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError, write_atomically
 from sim.core import SimulationError
 

@@ -144,8 +144,8 @@ def optimise(
         except InfeasibleStartError as error:
             raise failures.infeasible_start(error, constraints, source) from error
         except SimulationError as error:
-            tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
-            raise failures.unsolved(error, tried, None) from error
+            tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)
+            raise failures.simulation_failure(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 

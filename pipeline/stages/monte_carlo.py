@@ -37,5 +37,5 @@ def _run(args: argparse.Namespace) -> None:
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}
-    origin = provenance.attributes(asked, "monte_carlo", parents=parents)
+    origin = provenance.of_study(asked, "monte_carlo", parents=parents)
     datasets.write(made, args.out, "scatter", origin)

@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.problem import Problem
-from pipeline.problem.reading import joint_figure, load, overlaid, preset_names, yaml_file
-from pipeline.problem.sections import design_count, numbered
+from pipeline.problem.reading import joint_figure, load, overlay_keys, preset_names, yaml_file
+from pipeline.problem.sections import design_count, design_name
 from pipeline.runtime import WORK, UserError
 from pipeline.workflow.movie_list import MOVIES
 from pipeline.workflow.recordings import RECORDINGS

@@ -64,8 +64,8 @@ def written(folder: Path, more: str) -> StudyResults:
         stage = REPORTED[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
         posed = law_comparison.geometric(chosen) if kind == "geometric_response" else chosen
-        about = provenance.attributes(posed, stage.name, plan=plan)
-        datasets.write(made[kind], files[kind], cast(datasets.Kind, stage.kind), about)
+        about = provenance.of_study(posed, stage.name, plan=plan)
+        datasets.write(made[kind], files[kind], cast(Kind, stage.kind), about)
     return study_results.load(path, None, files)
 
 

@@ -88,7 +88,7 @@ class Constants(NamedTuple):
             self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
         )
 
-    def logs(self, names: Sequence[Name]) -> Floats:
+    def logs(self, names: Sequence[ConstantName]) -> Floats:
         """Natural logarithms of constants; of the cut-off, that of its distance to the barrier."""
         barrier = self.law.barrier
         return np.log(

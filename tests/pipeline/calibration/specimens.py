@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.__main__ import run_stage
 from pipeline.calibration.inputs import Calibration
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 
 TRUTH = {
     "density": "6.18 kg/m^2",

@@ -11,8 +11,8 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.calibration import fitted
-from pipeline.calibration.fit_uncertainty import gradient, uncertainty
+from pipeline.calibration import fit_calibration
+from pipeline.calibration.fit_uncertainty import adjoint_gradient, estimate_errors
 from pipeline.calibration.inputs import Calibration
 from pipeline.problem.reading import load_section
 from pipeline.problem.sections import MaterialConstants

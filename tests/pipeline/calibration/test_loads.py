@@ -12,8 +12,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.calibration.inputs.csv_readings import read
-from pipeline.problem.fields.units import FORCE, LENGTH
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import ROOT
 from tests.pipeline.calibration.specimens import (
     TRUTH,

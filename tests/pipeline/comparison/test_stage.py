@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.comparison import measurement, pixel_size
+from pipeline.comparison import pixel_size, prepare_measurement
 from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
 Change = Callable[[xr.Dataset], xr.Dataset]

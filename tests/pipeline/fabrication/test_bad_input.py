@@ -11,6 +11,7 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.datasets.tables import Kind
 from tests.pipeline.fabrication import built
 
 Edit = Callable[[Path], None]

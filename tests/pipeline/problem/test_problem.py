@@ -178,7 +178,7 @@ def test_a_measured_motion_is_read_in_the_units_of_its_heading(fig2: Path, tmp_p
     path = with_series(fig2, tmp_path, SERIES)
     rows = ["time (ms);ux (cm);uy (mm);theta (deg)", "0;0;0;0", "1000;0,5;-2;180"]
     (tmp_path / "motion.csv").write_text("\n".join(rows))
-    (drive,) = scene_of(load(path), tmp_path).motions
+    (drive,) = scene_of(load(path), tmp_path).loads.motions
     np.testing.assert_allclose(drive(np.array([1.0])), [[5.0, -2.0, math.pi]])
     (tmp_path / "motion.csv").write_text("\n".join([*rows, "1500;1;x;0"]))
     with pytest.raises(UserError, match="not a finite number") as caught:
