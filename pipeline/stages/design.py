@@ -133,7 +133,7 @@ def optimise(
                 )
         except InfeasibleStartError as error:
             constraints = ConstraintVector(scene.space, limits_of(asked))
-            raise failures.infeasible(error, constraints, source) from error
+            raise failures.infeasible_start(error, constraints, source) from error
         except SimulationError as error:
             tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)
             raise failures.simulation_failure(error, tried, None) from error
