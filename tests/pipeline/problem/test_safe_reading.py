@@ -42,7 +42,7 @@ SKIM = """
 import sys
 from pathlib import Path
 from pipeline.problem.reading import yaml_file
-assert yaml_file.skimmed(Path(sys.argv[1])) == {}
+assert yaml_file.skim_yaml(Path(sys.argv[1])) == {}
 """
 
 
