@@ -1,4 +1,4 @@
-"""The measured side: which frames and units of a track are compared, in the design's frame."""
+"""Selects frames and units of a track to compare, and turns them into the design's frame."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from pipeline.comparison.alignment import LEAST_FRAMES, too_few
-from pipeline.comparison.registration import Registration, measured_places, register
+from pipeline.comparison.alignment import LEAST_FRAMES, too_few_frames
+from pipeline.comparison.registration import Registration, measure_places, register
 from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
@@ -25,7 +25,7 @@ _SAME = 0.5  # mm between a vertex of the track and of the design
 
 
 class Measurement(NamedTuple):
-    """What was measured, in the design's frame.
+    """Holds the measured side, in the design's frame.
 
     Attributes:
         frames: (n_frames,) numbers of those that are compared, in the track.
@@ -52,12 +52,12 @@ class Measurement(NamedTuple):
 
     @property
     def compared(self) -> Mask:
-        """Which units (n_units,) are compared."""
+        """Tells the units (n_units,) that are compared."""
         return np.asarray(self.use == COMPARED)
 
 
-def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
-    """The measured side of a comparison.
+def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
+    """Prepares the measured side of a comparison.
 
     Args:
         track: of the recording.
@@ -66,12 +66,12 @@ def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
     Raises:
         UserError: the track is not of this design, shows no driven units, or is too short.
     """
-    check(track, design)
+    check_track(track, design)
     centre = _centres(design)
-    found = register(centre, measured_places(track, centre))
+    found = register(centre, measure_places(track, centre))
     motion = found.upright(track["displacement"].values.astype(float))
     turned = track.assign(displacement=(track["displacement"].dims, motion))
-    frames = chosen_frames(track)
+    frames = select_frames(track)
     shown = turned.isel(time=frames)
     displacement = shown["displacement"].values
     return Measurement(
@@ -88,7 +88,7 @@ def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
     )
 
 
-def check(track: xr.Dataset, design: xr.Dataset) -> None:
+def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
     """Refuses a track that is not of a design, in which no driven unit is seen, or that is short.
 
     Raises:
@@ -109,7 +109,7 @@ def check(track: xr.Dataset, design: xr.Dataset) -> None:
             remedy="film the driven units too, or give a window that shows them",
         )
     if seen.sum() < LEAST_FRAMES:
-        raise too_few(int(seen.sum()))
+        raise too_few_frames(int(seen.sum()))
 
 
 def _another(why: str) -> UserError:
@@ -121,8 +121,8 @@ def _another(why: str) -> UserError:
     )
 
 
-def chosen_frames(track: xr.Dataset) -> Ints:
-    """Frames to compare: no duplicates, and every so many of a long track."""
+def select_frames(track: xr.Dataset) -> Ints:
+    """Selects frames to compare: no duplicates, and every so many of a long track."""
     duplicate = TABLES["track"]["timing"].flags["duplicate"]
     frames = np.flatnonzero(track["timing"].values != duplicate)
     return frames[:: -(-len(frames) // MOST_FRAMES)]

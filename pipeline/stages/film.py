@@ -96,7 +96,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
             remedy=f"name it *{virtual.codec.suffixes[0]}",
         )
     parents = {"response": response, "design": design}
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):
         film = prepared(_shown(asked, response), asked.structure, asked.specimen, virtual)
     title = asked.title or path.stem

@@ -70,7 +70,7 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     with found_in(path):
         made = dic_points.track(design, dic_points.cloud(held, asked))
     parents = {"design": source, "points": held}
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)
     track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
 
@@ -152,7 +152,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         force = load_cell.forces(log, track.start + track.time)
     made = assemble_track(design, track, force)
     synthetic = asked.synthetic or rendered(video)
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
     track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if isinstance(track.ended, KeyboardInterrupt):

@@ -47,7 +47,7 @@ def work(args: argparse.Namespace) -> None:
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
-    origin = provenance.attributes(asked, "virtual_specimen", parents={"design": args.design})
+    origin = provenance.of_study(asked, "virtual_specimen", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 

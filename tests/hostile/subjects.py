@@ -15,14 +15,13 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration.inputs import Calibration, csv_readings
+from pipeline.calibration.inputs import Calibration
 from pipeline.datasets.tables import TABLES, Kind
 from pipeline.fabrication.papers import manifest
 from pipeline.posing import scene_of
-from pipeline.posing.to_scene import TIME_SERIES_COLUMNS
 from pipeline.problem import canonical_json
-from pipeline.problem.fields import units
-from pipeline.problem.reading import joint_figure, load, section
+from pipeline.problem.fields import csv_columns, units
+from pipeline.problem.reading import joint_figure, load, load_section
 from pipeline.problem.sections import Codec
 from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
@@ -130,7 +129,7 @@ def _driven(text: str) -> str:
 
 def _motion(folder: Path) -> Path:
     rows = "\n".join(f"{k / 10},{-k / 30},0,0" for k in range(11))
-    return _text("motion.csv", ",".join(TIME_SERIES_COLUMNS) + f"\n{rows}\n", folder)
+    return _text("motion.csv", f"time (s),ux (mm),uy (mm),theta (rad)\n{rows}\n", folder)
 
 
 def _lattice(suffix: str, folder: Path) -> Path:
@@ -236,7 +235,7 @@ def _cloud(path: Path) -> Told:
 
 def _readings(path: Path) -> Told:
     wanted = {"displacement": units.LENGTH, "force": units.FORCE}
-    return list(csv_readings.read(path, wanted).tolist())
+    return list(csv_columns.read_quantities(path, wanted).tolist())
 
 
 def _from_study(name: str) -> Callable[[Path], Path]:
@@ -261,7 +260,7 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml(
         "calibration",
         _from_study("calibration/hinges.yaml"),
-        lambda p: [section(p, Calibration).model_dump_json()],
+        lambda p: [load_section(p, Calibration).model_dump_json()],
     ),
     _yaml(
         "points",
@@ -269,7 +268,11 @@ SUBJECTS: tuple[Subject, ...] = (
         lambda p: [dic_points.load(p).model_dump_json()],
     ),
     _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
-    _yaml("figure of several studies", _figure, lambda p: [joint_figure.load(p).model_dump_json()]),
+    _yaml(
+        "figure of several studies",
+        _figure,
+        lambda p: [joint_figure.load_joint_figure(p).model_dump_json()],
+    ),
     *_dataset_subjects(),
     Subject(
         "lattice in netCDF",

@@ -1,4 +1,3 @@
-from . import csv_columns as csv_columns
 from . import import_video as import_video
 from . import load_cell as load_cell
 from . import recording as recording

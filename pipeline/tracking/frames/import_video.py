@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.problem.reading import told, yaml_file
+from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
 
@@ -40,7 +40,7 @@ def description(path: Path) -> dict[str, Any]:
     Raises:
         UserError: not such a description.
     """
-    document = yaml_file.read(path)
+    document = yaml_file.read_yaml(path)
     data = document.data
     missing = sorted(_WANTED - data.keys())
     if missing:
@@ -52,7 +52,7 @@ def description(path: Path) -> dict[str, Any]:
     try:
         _Described.model_validate(data)
     except ValidationError as error:
-        raise told(error, document, data, None) from error
+        raise explain_error(error, document, data, None) from error
     return data
 
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import csv_columns
 from pipeline.tracking.frames.recording import LoadCellLog
 from sim.core import Floats
 
@@ -30,7 +30,7 @@ def read(path: Path, cell: LoadCellLog) -> Log:
     Raises:
         UserError: it cannot be read, or runs backwards.
     """
-    clock, force = csv_columns.read(path, (cell.time, cell.force)).T
+    clock, force = csv_columns.read_columns(path, (cell.time, cell.force)).T
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)

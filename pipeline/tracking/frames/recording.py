@@ -19,7 +19,7 @@ from pipeline.problem.fields import (
     exactly_one,
     fault,
 )
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.problem.sections import VirtualRecording
 
 
@@ -115,7 +115,7 @@ def load(path: Path) -> Recording:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Recording)
+    return load_section(path, Recording)
 
 
 def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:

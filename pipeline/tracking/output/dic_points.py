@@ -11,10 +11,9 @@ import xarray as xr
 from pydantic import Field
 
 from pipeline.datasets.tables import TABLES
-from pipeline.problem.fields import Angle, Coordinate, Section
-from pipeline.problem.reading import section
+from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import csv_columns as columns
 from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
 from pipeline.tracking.output.track_dataset import absent, labelled, spread
 from sim.core import Floats, Ints
@@ -89,7 +88,7 @@ def load(path: Path) -> Points:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Points)
+    return load_section(path, Points)
 
 
 def cloud(path: Path, asked: Points) -> Cloud:
@@ -99,7 +98,7 @@ def cloud(path: Path, asked: Points) -> Cloud:
         UserError: the file cannot be read, or lacks a column.
     """
     names = asked.columns
-    table = columns.read(path, (names.time, names.x, names.y, names.ux, names.uy))
+    table = csv_columns.read_columns(path, (names.time, names.x, names.y, names.ux, names.uy))
     cos, sin = np.cos(asked.rotation), np.sin(asked.rotation)
     upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
     turn = np.array([[cos, -sin], [sin, cos]])

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.comparison import nominal
+from pipeline.comparison import interpolate_response
 from pipeline.tracking.geometry import as_built
 from pipeline.tracking.output import labelled
 
@@ -31,7 +31,7 @@ def track(
         at: (frames,) time of the response that each shows, s.
     """
     shown = response.sel(structure=structure).isel(case=0)
-    true = nominal(shown, at)
+    true = interpolate_response(shown, at)
     motion = true.displacement
     random = np.random.default_rng(5)
     noise = SIGMA * random.standard_normal(motion.shape)

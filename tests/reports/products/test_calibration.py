@@ -90,7 +90,7 @@ def test_sets_and_constants_are_told() -> None:
 
 
 def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
-    origin = provenance.recorded("{}", {}, synthetic=True, role="calibration")
+    origin = provenance.of_recording("{}", {}, synthetic=True, role="calibration")
     source = tmp_path / "calibration.nc"
     datasets.write(calibration().drop_attrs(), source, "calibration", origin | {"warnings": ""})
     for name in ("one", "two"):
