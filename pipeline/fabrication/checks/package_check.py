@@ -8,28 +8,27 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.fabrication.checks import (
-    assembled_specimen,
-    bill_checks,
-    laser_folder,
-    paper_checks,
-    print_folder,
-)
-from pipeline.fabrication.checks.expected_parts import of_design
-from pipeline.fabrication.checks.package_record import PackageRecord
-from pipeline.fabrication.readback import Fault, read_meshes, stop
+from pipeline.fabrication.checks.assembled_specimen import check_assembled, unit_sections
+from pipeline.fabrication.checks.bill_checks import check_bill
+from pipeline.fabrication.checks.laser_folder import check_laser
+from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
+from pipeline.fabrication.checks.paper_checks import check_papers
+from pipeline.fabrication.checks.print_folder import check_fixtures, check_print
+from pipeline.fabrication.papers import read_manifest
+from pipeline.fabrication.readback import Fault, read_stl, stop
 from pipeline.problem.sections import Fabrication
 
-Done = Callable[[], object]
+STEPS = 6
+"""Number of calls of `done` by `check_package`."""
 
 
 def check_package(
     folder: Path,
     design: xr.Dataset,
     structure: str,
-    asked: Fabrication,
+    settings: Fabrication,
     pictures: Path,
-    done: Done = lambda: None,
+    done: Callable[[], object] = lambda: None,
 ) -> None:
     """Reads every file of a package back and stops at faults.
 
@@ -37,31 +36,28 @@ def check_package(
         folder: the package.
         design: the dataset that it was made of.
         structure: intact, altered or cloaked.
-        asked: the parameters of fabrication.
+        settings: of the fabrication.
         pictures: folder for pictures of faults; made only if there are any.
         done: called after each of the STEPS.
 
     Raises:
         UserError: the first fault, with its unit, the parameter to change and a picture.
     """
-    wanted = of_design(design, structure)
-    assembled = read_meshes.read_stl(folder / "print/assembled.stl")
-    found = assembled_specimen.shapes(assembled, wanted, asked)
-    record = PackageRecord(folder, wanted, found, asked, paper_checks.letters(folder))
+    expected = expected_parts(design, structure)
+    assembled = read_stl(folder / "print/assembled.stl")
+    shapes = unit_sections(assembled, expected, settings)
+    letters = dict(read_manifest(folder)["letters_for_ids"])
+    record = PackageRecord(folder, expected, shapes, settings, letters)
     faults: list[Fault] = []
     steps: Iterable[Iterator[Fault]] = (
-        assembled_specimen.check_assembled(assembled, found, wanted, asked),
-        print_folder.check(record),
-        laser_folder.check(record),
-        print_folder.check_fixtures(record),
-        bill_checks.check(record),
-        paper_checks.check(record),
+        check_assembled(assembled, record),
+        check_print(record),
+        check_laser(record),
+        check_fixtures(record),
+        check_bill(record),
+        check_papers(record),
     )
     for step in steps:
         faults += step
         done()
     stop([replace(fault, file=fault.file.relative_to(folder)) for fault in faults], pictures)
-
-
-STEPS = 6
-"""How often `check_package` tells of progress."""

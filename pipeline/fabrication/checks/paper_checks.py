@@ -2,50 +2,65 @@
 
 from __future__ import annotations
 
+import base64
+import re
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 from pipeline.datasets import file_hash
 from pipeline.fabrication.checks.package_record import PackageRecord
-from pipeline.fabrication.papers import manifest
-from pipeline.fabrication.readback import BUG, Fault, read_pages
+from pipeline.fabrication.papers import MANIFEST, read_manifest
+from pipeline.fabrication.readback import BUG, Fault, unreadable
+
+_STREAM = re.compile(rb"stream\r?\n(.*?)endstream", re.DOTALL)
+_SHOWN = re.compile(rb"\(((?:[^()\\]|\\.)*)\)\s*Tj")
+_ESCAPED = re.compile(r"\\(.)")
 
 
-def letters(folder: Path) -> dict[str, str]:
-    """What the manifest says that small units carry instead of their ids, by label."""
-    return dict(manifest.read(folder)["letters_for_ids"])
-
-
-def check(record: PackageRecord) -> Iterator[Fault]:
-    """Faults of a package's papers."""
-    yield from _unique(record)
-    names = {label: f"{label}={letter}" for label, letter in record.letters.items()}
-    shown = [names.get(label, label) for label in record.wanted.polygons]
-    yield from read_pages.check(record.folder / "assembly.pdf", shown)
-    yield from _manifest(record.folder)
-
-
-def _unique(record: PackageRecord) -> Iterator[Fault]:
-    """No two units carry the same id or letter."""
-    carried = Counter(record.letters.get(label, label) for label in record.wanted.polygons)
+def check_papers(record: PackageRecord) -> Iterator[Fault]:
+    """Checks papers: ids are unique and on the plan, every file is in the manifest."""
+    folder, letters = record.folder, record.letters
+    where, sheet = folder / MANIFEST, folder / "assembly.pdf"
+    carried = Counter(letters.get(label, label) for label in record.expected.polygons)
     for words, count in carried.items():
         if count > 1:
-            where = record.folder / manifest.NAME
             yield Fault(f"unit {words}", f"{count} units carry this", "labels", BUG, where)
+    shown = {text for page in page_words(sheet) for text in page}
+    for label in sorted(record.expected.polygons):
+        if (f"{label}={letters[label]}" if label in letters else label) not in shown:
+            what = "it is not on the assembly sheet"
+            yield Fault(f"unit {label}", what, "labels", BUG, sheet)
+    paths = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*")}
+    files = {n: file_hash(path) for n, path in paths.items() if path.is_file() and path != where}
+    listed = read_manifest(folder)["files"]
+    for name in sorted(files.keys() ^ listed.keys()):
+        yield Fault("the manifest", f"{name} is not in it, or not there", "laser", BUG, where)
+    for name in sorted(files.keys() & listed.keys()):
+        if files[name] != listed[name]:
+            yield Fault("the manifest", f"{name} is another file than listed", "laser", BUG, where)
 
 
-def _manifest(folder: Path) -> Iterator[Fault]:
-    """The hashes of all files, and of no others."""
-    path = folder / manifest.NAME
-    told = manifest.read(folder)
-    files = {
-        found.relative_to(folder).as_posix(): file_hash(found)
-        for found in folder.rglob("*")
-        if found.is_file() and found != path
-    }
-    for name in sorted(files.keys() ^ told["files"].keys()):
-        yield Fault("the manifest", f"{name} is not in it, or not there", "laser", BUG, path)
-    for name in sorted(files.keys() & told["files"].keys()):
-        if files[name] != told["files"][name]:
-            yield Fault("the manifest", f"{name} is another file than listed", "laser", BUG, path)
+def page_words(path: Path) -> list[list[str]]:
+    """Reads the pieces of text on each page of a PDF, in the order in which they are shown.
+
+    Raises:
+        UserError: it is no PDF, or has no text.
+    """
+    try:
+        content = path.read_bytes()
+        pages = [_texts(stream.strip()) for stream in _STREAM.findall(content)]
+    except (OSError, ValueError, zlib.error) as error:
+        raise unreadable("the assembly sheet", path, error) from error
+    if not content.startswith(b"%PDF") or b"%%EOF" not in content[-32:] or not any(pages):
+        raise unreadable("the assembly sheet", path, "it is not whole")
+    return [page for page in pages if page]
+
+
+def _texts(stream: bytes) -> list[str]:
+    """Unpacks a page's operators, which reportlab packs with Flate and then in base 85."""
+    if stream.endswith(b"~>"):
+        stream = base64.a85decode(stream.removesuffix(b"~>"))
+    shown = _SHOWN.findall(zlib.decompress(stream))
+    return [_ESCAPED.sub(r"\1", text.decode("cp1252")) for text in shown]

@@ -1,4 +1,4 @@
-"""Sheets as SVG at true scale: one unit of the drawing is one millimetre."""
+"""Writes sheets as SVG at true scale: one unit of the drawing is one millimetre."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.fabrication.parts import Circle, FlatPart
 from pipeline.fabrication.plates import LaserSheet
 from sim.core import Floats
 
@@ -23,8 +22,8 @@ COLOURS = {
 _HAIRLINE = 0.0762  # mm, 0.003 in: what cutters take for a cut
 
 
-def write(sheet: LaserSheet, path: Path) -> None:
-    """Write a sheet; y points up on the sheet and down in the file."""
+def write_svg(sheet: LaserSheet, path: Path) -> None:
+    """Writes a sheet; y points up on the sheet and down in the file."""
     width, height = sheet.size
     head = (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -54,30 +53,18 @@ def _shapes(layer: str, sheet: LaserSheet) -> Iterator[str]:
     if layer == "REFERENCE":
         yield f'<path d="M0,0H{width:g}V{height:g}H0Z"/>'
     for part in sheet.parts:
-        yield from _shapes_of(layer, part, height)
+        for stroke in {"ENGRAVE": part.engraving, "SCORE": part.scores}.get(layer, ()):
+            yield f'<path d="M{_pairs(stroke, height)}"/>'
+        for hole in part.holes if layer == "CUT_INNER" else ():
+            x, y, radius = hole.centre[0], height - hole.centre[1], hole.diameter / 2
+            yield f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius)}"/>'
+        if layer == "CUT_OUTER":
+            outline = np.asarray(part.outline.exterior.coords)[:-1]
+            yield f'<path inkscape:label="{part.id}" d="M{_pairs(outline, height)}Z"/>'
 
 
-def _shapes_of(layer: str, part: FlatPart, height: float) -> Iterator[str]:
-    if layer == "ENGRAVE":
-        yield from (_path(stroke, height) for stroke in part.engraving)
-    elif layer == "SCORE":
-        yield from (_path(stroke, height) for stroke in part.scores)
-    elif layer == "CUT_INNER":
-        yield from (_circle(hole, height) for hole in part.holes)
-    elif layer == "CUT_OUTER":
-        outline = np.asarray(part.outline.exterior.coords)[:-1]
-        yield _path(outline, height, closed=f' inkscape:label="{part.id}"')
-
-
-def _path(points: Floats, height: float, closed: str = "") -> str:
-    pairs = " ".join(f"{_number(x)},{_number(height - y)}" for x, y in points)
-    return f'<path{closed} d="M{pairs}{"Z" if closed else ""}"/>'
-
-
-def _circle(hole: Circle, height: float) -> str:
-    x, y = hole.centre
-    radius = _number(hole.diameter / 2)
-    return f'<circle cx="{_number(x)}" cy="{_number(height - y)}" r="{radius}"/>'
+def _pairs(points: Floats, height: float) -> str:
+    return " ".join(f"{_number(x)},{_number(height - y)}" for x, y in points)
 
 
 def _number(value: float) -> str:

@@ -14,11 +14,11 @@ OVERLAP = 12.0
 
 @dataclass(frozen=True)
 class Tile:
-    """One page's part of the drawing.
+    """Holds one page's part of the drawing.
 
     Attributes:
         name: row letter from the top and column number, "B2".
-        window: what it shows, in the drawing's coordinates.
+        window: its part, in the drawing's coordinates.
         row, column: from the top left, from zero.
         of: rows and columns of pages.
     """
@@ -30,7 +30,7 @@ class Tile:
     of: tuple[int, int]
 
     def joints(self) -> Iterator[tuple[str, float]]:
-        """The middle lines of the strips shared with other pages: ("x" or "y", position)."""
+        """Yields the middle lines of the strips shared with other pages: ("x" or "y", position)."""
         left, low, width, height = self.window
         half = OVERLAP / 2
         if self.column > 0:
@@ -44,7 +44,7 @@ class Tile:
 
 
 def tiles(box: Box, page: tuple[float, float]) -> list[Tile]:
-    """Equal windows, no larger than `page`, that cover `box`, row by row from the top left."""
+    """Covers `box` with equal windows, no larger than `page`, row by row from the top left."""
     left, low, width, height = box
     rows, tall = _split(height, page[1])
     columns, wide = _split(width, page[0])
@@ -67,6 +67,6 @@ def tiles(box: Box, page: tuple[float, float]) -> list[Tile]:
 
 
 def _split(length: float, most: float) -> tuple[int, float]:
-    """Number of windows along a length, and the length of each."""
+    """Counts the windows along a length, and measures each."""
     count = max(1, math.ceil((length - OVERLAP) / (most - OVERLAP)))
     return count, (length + (count - 1) * OVERLAP) / count

@@ -7,23 +7,18 @@ letter is looked for. Slots may cut through letters, so not all of a letter has 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
-from pipeline.fabrication.engraving.reading_order import in_order
-from pipeline.fabrication.engraving.stroke_font import text
+from pipeline.fabrication.engraving import text_strokes
 from sim.core import Floats
 
-LEAST = 2.0
-"""Height of letters below which they cannot be read, mm."""
-
-LEGIBLE = 0.6
-"""Share of an id's strokes that has to be there."""
-
+_LEAST = 2.0  # mm, height of letters below which they cannot be read
+_LEGIBLE = 0.6  # share of an id that has to be there
 _WHOLE = 0.98  # of the strokes, with which no better height is looked for
 _TURNED = 0.01  # rad; turns nearer to each other, or to half a turn, go together
 _NEAR = 0.02  # mm from a stroke
@@ -33,18 +28,12 @@ _HEIGHTS = (1.9, 12.0)  # mm, of letters
 _TURNS, _SIZES = 1e-3, 2e-3  # rad and mm: votes so near to each other are one
 _TURNS_KEPT, _SIZES_KEPT = 6, 3
 _SPOTS_KEPT = 8
+_AHEAD, _BELOW = 0.5, -0.9  # heights from letter to letter, at least
 _MARK = 1.8  # mm, largest mark
 
 
-class Reading(NamedTuple):
-    """How letters stand: their height in mm, and their turn in rad."""
-
-    height: float
-    turn: float
-
-
-def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
-    """How the letters of an id stand; None if the strokes do not show it and a mark beside it.
+def read(words: str, strokes: Sequence[Floats]) -> float | None:
+    """Reads the height of an id, mm; None if the strokes do not show it and a mark beside it.
 
     Args:
         words: the id.
@@ -55,18 +44,18 @@ def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
         return None
     lines = [stroke - lines[0][0] for stroke in lines]  # the same wherever the text stands
     drawn = _segments(lines)
-    glyphs = [text(letter, 1.0) for letter in words]
+    glyphs = [text_strokes(letter, 1.0) for letter in words]
     whole = shapely.MultiLineString(lines)
     shapely.prepare(whole)
-    best, most = None, LEGIBLE
+    best, most, upright = None, _LEGIBLE, 0.0
     for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
-        if best is not None and (most > _WHOLE or abs(np.sin(turn - best.turn)) > _TURNED):
+        if best is not None and (most > _WHOLE or abs(np.sin(turn - upright)) > _TURNED):
             break  # no better one is to be expected, upright or upside down
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
         found, share = _read(letters, drawn, whole, spin)
         if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
-            best, most = Reading(size, turn), share
+            best, most, upright = size, share, turn
     return best
 
 
@@ -102,7 +91,7 @@ def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
     for turn in _commonest(turns, _TURNS_KEPT):
         for size in _commonest(sizes[possible & (turns == turn)], _SIZES_KEPT):
             yield size * _SIZES, turn * _TURNS
-        yield LEAST, turn * _TURNS
+        yield _LEAST, turn * _TURNS
 
 
 def _commonest(votes: Floats, count: int) -> list[float]:
@@ -119,7 +108,7 @@ def _read(
     offers = [_spots(letter, drawn, whole) for letter in letters]
     upright = [places @ np.linalg.inv(spin) for places, _ in offers]
     weights = [there * length for (_, there), length in zip(offers, lengths, strict=True)]
-    taken, weight = in_order(upright, weights)
+    taken, weight = _in_order(upright, weights)
     lines = [
         stroke + places[at]
         for at, letter, (places, _) in zip(taken, letters, offers, strict=False)
@@ -153,3 +142,38 @@ def _spots(
 
 def _finely(stroke: Floats) -> shapely.Geometry:
     return shapely.segmentize(LineString(stroke), _SAMPLE)
+
+
+def _in_order(places: Sequence[Floats], weights: Sequence[Floats]) -> tuple[list[int], float]:
+    """The heaviest choice of one place for each letter, on a line or below each other.
+
+    Args:
+        places: (n, 2) of each letter, upright, in heights.
+        weights: (n,) of these places.
+
+    Returns:
+        The places that are taken and their weight; none with a weight of zero if no choice reads.
+    """
+    if not all(map(len, places)):
+        return [], 0.0
+    choices = [_heaviest(places, weights, below=below) for below in (False, True)]
+    return max(choices, key=lambda choice: choice[1])
+
+
+def _heaviest(
+    places: Sequence[Floats], weights: Sequence[Floats], *, below: bool
+) -> tuple[list[int], float]:
+    """From letter to letter: the best way to each place of the next one."""
+    sums, before = weights[0], []
+    for (first, second), weight in zip(pairwise(places), weights[1:], strict=True):
+        steps = second[None] - first[:, None]
+        follows = steps[..., 1] < _BELOW if below else steps[..., 0] > _AHEAD
+        ways = np.where(follows, sums[:, None], -np.inf)
+        before.append(ways.argmax(axis=0))
+        sums = ways.max(axis=0) + weight
+    if not np.isfinite(sums).any():
+        return [], 0.0
+    taken = [int(sums.argmax())]
+    for way in reversed(before):
+        taken.append(int(way[taken[-1]]))
+    return taken[::-1], float(sums.max())
