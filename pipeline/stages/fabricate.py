@@ -25,7 +25,7 @@ STRUCTURES = ("intact", "altered", "cloaked")
 
 
 def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
+    """Builds the stage's command line."""
     made = cli.parser(
         "pipeline.stages.fabricate", "Write drawings, meshes and papers of a structure."
     )
@@ -76,7 +76,7 @@ def _picture_of_fault(pictures: Path) -> Iterator[None]:
 
 @contextmanager
 def _aside(folder: Path) -> Iterator[Path]:
-    """A new folder that takes the place of ``folder`` once it is complete, and vanishes if not."""
+    """Opens a new folder that takes the place of ``folder`` once complete, and vanishes if not."""
     room = folder.with_name(f".{folder.name}.part")
     former = folder.with_name(f".{folder.name}.former")
     try:
@@ -95,7 +95,7 @@ def _aside(folder: Path) -> Iterator[Path]:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Runs the stage from the command line."""
     return cli.run(work, parser(), argv)
 
 

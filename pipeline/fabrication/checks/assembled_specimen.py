@@ -15,14 +15,7 @@ from shapely import Geometry, STRtree
 
 from pipeline.fabrication.checks.package_record import ExpectedParts, PackageRecord, Shapes
 from pipeline.fabrication.checks.slot_checks import UnitSection, check_section
-from pipeline.fabrication.readback import (
-    BUG,
-    TOLERANCE,
-    Fault,
-    MeshBody,
-    check_solid,
-    closest,
-)
+from pipeline.fabrication.readback import BUG, TOLERANCE, Fault, MeshBody, check_solid, closest
 from pipeline.problem.sections import Fabrication
 
 

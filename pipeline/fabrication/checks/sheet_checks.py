@@ -209,9 +209,7 @@ def check_compensation(
                 yield drawing.fault(what, part, (curve.line,), "laser.kerf")
 
 
-def _closed_cuts(
-    drawings: Sequence[Drawing],
-) -> dict[tuple[str, str], list[tuple[Drawing, Curve]]]:
+def _closed_cuts(drawings: Sequence[Drawing]) -> dict[tuple[str, str], list[tuple[Drawing, Curve]]]:
     """Groups closed cuts by part and layer."""
     cuts: dict[tuple[str, str], list[tuple[Drawing, Curve]]] = {}
     for drawing in drawings:

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipeline.fabrication.files.dxf import write_dxf
+from pipeline.fabrication.files.drawing_files import write_dxf, write_svg
 from pipeline.fabrication.files.mesh_files import write_3mf, write_stl
-from pipeline.fabrication.files.svg import write_svg
 from pipeline.fabrication.fixtures import (
     comb,
     coupon,

@@ -1,25 +1,20 @@
-"""Draws the specimen for its assembly: units with ids and arrows, shims, rows and columns."""
+"""Draws the specimen for its assembly, at true scale over as few pages as hold it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from pipeline.fabrication.papers.page_tiles import OVERLAP, Tile
-from pipeline.fabrication.papers.pdf_paper import (
-    BOLD,
-    GREY,
-    PALE,
-    POINT,
-    SIGNAL,
-    Box,
-    PdfDocument,
-)
+from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, PALE, POINT, SIGNAL, Box, PdfDocument
 from pipeline.fabrication.parts import BuiltSpecimen, Ligament, Unit, column_letters
 from sim.core import Floats
 
+OVERLAP = 12.0
+"""Width of the strip that two neighbouring pages share, mm."""
 BORDER = 9.0
 """Room around the specimen for the names of rows and columns, mm."""
 
@@ -32,13 +27,68 @@ _ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER = 4.5
 
 
-class AssemblyPlan:
-    """Draws one specimen in its own frame.
+@dataclass(frozen=True)
+class Tile:
+    """Holds one page's part of the drawing.
 
-    Args:
-        specimen: to be built.
-        sheet: the document to draw on.
+    Attributes:
+        name: row letter from the top and column number, "B2".
+        window: its part, in the drawing's coordinates.
+        row, column: from the top left, from zero.
+        of: rows and columns of pages.
     """
+
+    name: str
+    window: Box
+    row: int
+    column: int
+    of: tuple[int, int]
+
+    def joints(self) -> Iterator[tuple[str, float]]:
+        """Yields the middle lines of the strips shared with other pages: ("x" or "y", position)."""
+        left, low, width, height = self.window
+        half = OVERLAP / 2
+        if self.column > 0:
+            yield "x", left + half
+        if self.column < self.of[1] - 1:
+            yield "x", left + width - half
+        if self.row > 0:
+            yield "y", low + height - half
+        if self.row < self.of[0] - 1:
+            yield "y", low + half
+
+
+def tiles(box: Box, page: tuple[float, float]) -> list[Tile]:
+    """Covers `box` with equal windows, no larger than `page`, row by row from the top left."""
+    left, low, width, height = box
+    rows, tall = _split(height, page[1])
+    columns, wide = _split(width, page[0])
+    return [
+        Tile(
+            f"{chr(ord('A') + row)}{column + 1}",
+            (
+                left + column * (wide - OVERLAP),
+                low + (rows - 1 - row) * (tall - OVERLAP),
+                wide,
+                tall,
+            ),
+            row,
+            column,
+            (rows, columns),
+        )
+        for row in range(rows)
+        for column in range(columns)
+    ]
+
+
+def _split(length: float, most: float) -> tuple[int, float]:
+    """Counts the windows along a length, and measures each."""
+    count = max(1, math.ceil((length - OVERLAP) / (most - OVERLAP)))
+    return count, (length + (count - 1) * OVERLAP) / count
+
+
+class AssemblyPlan:
+    """Draws one specimen in its own frame on the pages of a document."""
 
     def __init__(self, specimen: BuiltSpecimen, sheet: PdfDocument) -> None:
         self._specimen, self._sheet = specimen, sheet
@@ -70,13 +120,7 @@ class AssemblyPlan:
         self._joints(tile, origin)
 
     def sketch(self, pages: Sequence[Tile], corner: tuple[float, float], scale: float) -> None:
-        """Draws all units in small, and over them the pages that show them.
-
-        Args:
-            pages: of the plan.
-            corner: of the plan on the page, lower left.
-            scale: of the sketch.
-        """
+        """Draws all units in small from a lower left corner, and over them the pages' frames."""
         low = np.array(self.box[:2])
         for unit in self._specimen.units:
             points = np.asarray(unit.outline.exterior.coords)[:-1]

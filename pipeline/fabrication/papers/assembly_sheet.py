@@ -6,8 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.fabrication.papers.assembly_plan import TONES, AssemblyPlan
-from pipeline.fabrication.papers.page_tiles import Tile, tiles
+from pipeline.fabrication.papers.assembly_plan import TONES, AssemblyPlan, Tile, tiles
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, PdfDocument
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.problem.sections import Fabrication

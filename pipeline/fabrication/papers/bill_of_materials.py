@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, Shim, Unit
@@ -30,14 +30,7 @@ FOIL = 1.38e-9
 """Density of polyester foil, tonne/mm^3."""
 
 _GRAMS = 1e6  # in a tonne
-_UNITS = {
-    "area": "mm2",
-    "volume": "mm3",
-    "mass": "g",
-    "length": "mm",
-    "width": "mm",
-    "height": "mm",
-}
+_HEADING = "item id count area_mm2 volume_mm3 mass_g length_mm width_mm height_mm files note"
 _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files, by their folder
 
 
@@ -87,8 +80,7 @@ def write_bill(
     """
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
-    names = [field.name for field in fields(BillRow)]
-    table.writerow(name + (f"_{_UNITS[name]}" if name in _UNITS else "") for name in names)
+    table.writerow(_HEADING.split())
     for row in bill(specimen, settings, density, contents):
         table.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
     path.write_text(stream.getvalue(), encoding="utf-8", newline="\n")

@@ -30,13 +30,7 @@ PLAIN, BOLD = "Helvetica", "Helvetica-Bold"
 
 
 class PdfDocument:
-    """Draws the pages of one document, one after the other.
-
-    Args:
-        canvas: reportlab's canvas.
-        paper: size of the pages.
-        title: at the head of each page.
-    """
+    """Draws the pages of one document, one after the other, with its title at their heads."""
 
     def __init__(self, canvas: Canvas, paper: Paper, title: str) -> None:
         self.canvas = canvas

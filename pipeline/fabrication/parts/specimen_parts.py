@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -35,10 +35,7 @@ class UnbuildableUnitError(UserError):
         what: the fault in one sentence, with the unit's label.
         around: outlines to show, mm.
         spot: where the fault is, mm.
-        file: the design.
-        key: the variable of the design or the dotted parameter.
-        remedy: what to change.
-        value: of the parameter.
+        words: file, key, value and remedy of the error.
     """
 
     def __init__(
@@ -46,13 +43,9 @@ class UnbuildableUnitError(UserError):
         what: str,
         around: tuple[Geometry, ...],
         spot: Geometry,
-        *,
-        file: Path,
-        key: str,
-        remedy: str,
-        value: object = None,
+        **words: Any,  # noqa: ANN401
     ) -> None:
-        super().__init__(what, file=file, key=key, value=value, remedy=remedy)
+        super().__init__(what, **words)
         self.around = around
         self.spot = spot
 
@@ -263,7 +256,7 @@ class BuiltSpecimen:
 
 
 def column_letters(column: int) -> str:
-    """Names columns from zero A, B, ... Z, AA, AB, ... as in a spreadsheet."""
+    """Spells columns from zero as A, B, ... Z, AA, AB, ... as in a spreadsheet."""
     letters = ""
     column += 1
     while column:

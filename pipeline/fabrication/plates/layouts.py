@@ -55,7 +55,7 @@ class Plate:
     @property
     def ids(self) -> list[str]:
         """Ids of the parts."""
-        return [solid.id for solid, _, _ in self.parts]
+        return [part.id for part, _, _ in self.parts]
 
 
 def laser_sheets(
@@ -63,11 +63,7 @@ def laser_sheets(
 ) -> Iterator[LaserSheet]:
     """Lays out one kind of parts: at nominal size, then with the kerf made good if there is one.
 
-    Args:
-        kind: of the parts; begins the names of the files.
-        parts: at nominal size.
-        settings: sheet, kerf, margin, gap.
-        file: of the problem, for messages.
+    The kind begins the names of the files; `file` is that of the problem, for messages.
 
     Raises:
         UserError: a part is larger than a sheet, or too fine for the kerf.
@@ -106,11 +102,7 @@ def print_plates(
 ) -> Iterator[Plate]:
     """Lays out one kind of parts on plates.
 
-    Args:
-        kind: of the parts; begins the names of the files.
-        solids: the parts.
-        settings: bed, margin, gap.
-        file: of the problem, for messages.
+    The kind begins the names of the files; `file` is that of the problem, for messages.
 
     Raises:
         UserError: a part is larger than the bed.

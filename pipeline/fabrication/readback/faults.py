@@ -54,11 +54,7 @@ def unreadable(kind: str, path: Path, why: object) -> UserError:
 
 
 def stop(faults: Sequence[Fault], pictures: Path) -> None:
-    """Ends an export with the first fault, naming the other parts, if there is any fault.
-
-    Args:
-        faults: of all checks.
-        pictures: folder for small pictures of the first faults.
+    """Ends an export with the first fault, if any, and draws the first ones into a folder.
 
     Raises:
         UserError: there is a fault.

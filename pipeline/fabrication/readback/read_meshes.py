@@ -151,19 +151,16 @@ def _surface_fault(solid: MeshBody) -> str | None:
         return "vertices that are no numbers"
     mesh = solid.mesh
     tests = (
-        (lambda: not mesh.is_watertight, "its surface has holes"),
-        (lambda: not mesh.is_winding_consistent, "its triangles are not wound all the same way"),
-        (lambda: mesh.volume <= 0.0, "it is inside out"),
+        (mesh.is_watertight, "its surface has holes"),
+        (mesh.is_winding_consistent, "its triangles are not wound all the same way"),
+        (mesh.volume > 0.0, "it is inside out"),
         (
-            lambda: len(mesh.faces) != len(solid.triangles),
+            len(mesh.faces) == len(solid.triangles),
             "some of its triangles have no area or are there twice",
         ),
-        (
-            lambda: not mesh.is_volume or solid.manifold.status() != Error.NoError,
-            "it bounds no volume",
-        ),
+        (mesh.is_volume and solid.manifold.status() == Error.NoError, "it bounds no volume"),
     )
-    return next((what for is_faulty, what in tests if is_faulty()), None)
+    return next((what for passed, what in tests if not passed), None)
 
 
 def check_volume(solid: MeshBody, levels: Sequence[float]) -> Iterator[Fault]:

@@ -51,8 +51,8 @@ def place_slots(
     Args:
         polygon: the unit as designed, mm, counter-clockwise.
         corners: the vertices that take a slot.
-        settings: of the fabrication.
-        room: the polygon itself, or what the unit may grow to.
+        settings: depths, directions and walls of slots.
+        room: the polygon itself, or the area that the unit may grow to.
 
     Raises:
         NoRoomError: there are no slots with thick enough walls.

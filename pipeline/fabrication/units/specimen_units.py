@@ -100,7 +100,7 @@ def build_unit(
         UnbuildableUnitError: a slot or its id has no room.
     """
     label, design = net.labels[number], net.polygons[number]
-    body, slots = _body(design, slotted, neighbours, settings, label, file)
+    body, slots = _body(net, number, slotted, neighbours, settings, file)
     outline = cut(body, slots, settings)
     for words in (label, *letters):
         placed = place_id(words, outline, body, settings.labels)
@@ -131,14 +131,15 @@ def build_unit(
 
 
 def _body(
-    design: Polygon,
+    net: UnitNetwork,
+    number: int,
     slotted: Sequence[Corner],
     neighbours: Sequence[Polygon],
     settings: Fabrication,
-    label: str,
     file: Path,
 ) -> tuple[Polygon, tuple[Slot, ...]]:
     """Grows a unit as little as its slots need, and places these; they are not cut yet."""
+    design = net.polygons[number]
     plain = filleted(design, settings.fillet_radius)
     failure = NoRoomError(None, 0.0)
     for share in _STAGES if settings.slots.thicken > 0.0 else _STAGES[:1]:
@@ -161,7 +162,7 @@ def _body(
         )
         if all(_is_held(slot, settings) for slot in slots):
             return body, slots
-    raise _no_slot(label, design, failure, settings, file)
+    raise _no_slot(net.labels[number], design, failure, settings, file)
 
 
 def _is_held(slot: Slot, settings: Fabrication) -> bool:

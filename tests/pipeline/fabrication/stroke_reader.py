@@ -33,16 +33,8 @@ _MARK = 1.8  # mm, largest mark
 
 
 def read(words: str, strokes: Sequence[Floats]) -> float | None:
-    """Reads the height of an id, mm; None if the strokes do not show it and a mark beside it.
-
-    Args:
-        words: the id.
-        strokes: polylines (n, 2), mm: the id and the mark that tells how it stands.
-    """
-    lines = [stroke for stroke in strokes if len(stroke) > 1]
-    if not lines:
-        return None
-    lines = [stroke - lines[0][0] for stroke in lines]  # the same wherever the text stands
+    """Reads the height of an id, mm; None if the strokes do not show it and a mark beside it."""
+    lines = [stroke - strokes[0][0] for stroke in strokes]  # the same wherever the text stands
     drawn = _segments(lines)
     glyphs = [text_strokes(letter, 1.0) for letter in words]
     whole = shapely.MultiLineString(lines)
@@ -60,24 +52,21 @@ def read(words: str, strokes: Sequence[Floats]) -> float | None:
 
 
 def _is_mark(rest: BaseGeometry) -> bool:
-    """Whether the strokes that belong to no letter can be one small mark."""
+    """Tests that the strokes that belong to no letter can be one small mark."""
     pieces = [piece for piece in shapely.get_parts(rest) if piece.length > _SPECK]
-    return bool(pieces) and span(pieces) < _MARK
-
-
-def span(pieces: Sequence[BaseGeometry]) -> float:
-    """Longer side of the box about some pieces."""
+    if not pieces:
+        return False
     x0, y0, x1, y1 = shapely.total_bounds(pieces)
-    return float(max(x1 - x0, y1 - y0))
+    return bool(max(x1 - x0, y1 - y0) < _MARK)
 
 
 def _segments(strokes: Sequence[Floats]) -> Floats:
-    """(n, 2, 2) starts and ends."""
+    """Lists starts and ends (n, 2, 2)."""
     return np.concatenate([np.stack([stroke[:-1], stroke[1:]], axis=1) for stroke in strokes])
 
 
 def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
-    """Heights and turns of the text, those with most votes first.
+    """Yields heights and turns of the text, those with most votes first.
 
     A stroke that a slot cuts votes for the right turn still, for the height only a whole one does:
     where all are cut, letters are small.
@@ -95,7 +84,7 @@ def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
 
 
 def _commonest(votes: Floats, count: int) -> list[float]:
-    """The values with most votes, the largest of those with as many first."""
+    """Lists the values with most votes, the largest of those with as many first."""
     kinds, counts = np.unique(votes, return_counts=True)
     return [float(kind) for kind in kinds[np.lexsort((-kinds, -counts))[:count]]]
 
@@ -103,9 +92,11 @@ def _commonest(votes: Floats, count: int) -> list[float]:
 def _read(
     letters: Sequence[Sequence[Floats]], drawn: Floats, whole: shapely.Geometry, spin: Floats
 ) -> tuple[shapely.Geometry, float]:
-    """The letters where they stand, in reading order, and the share of them that is there."""
+    """Finds the letters where they stand, in reading order, and the share of them that is there."""
     lengths = [shapely.MultiLineString(letter).length for letter in letters]
     offers = [_spots(letter, drawn, whole) for letter in letters]
+    if not all(len(places) for places, _ in offers):
+        return shapely.MultiLineString(), 0.0
     upright = [places @ np.linalg.inv(spin) for places, _ in offers]
     weights = [there * length for (_, there), length in zip(offers, lengths, strict=True)]
     taken, weight = _in_order(upright, weights)
@@ -120,7 +111,7 @@ def _read(
 def _spots(
     letter: Sequence[Floats], drawn: Floats, whole: shapely.Geometry
 ) -> tuple[Floats, Floats]:
-    """Where a letter may be (n, 2), and how much of it is there (n,); the best places.
+    """Finds where a letter may be (n, 2), and how much of it is there (n,); the best places.
 
     A stroke of the letter, or what a slot leaves of it, is drawn from its start or to its end.
     """
@@ -133,47 +124,29 @@ def _spots(
     fits = (np.abs(aside) < _NEAR * lengths) & (reach > _SAMPLE) & (reach < lengths + _NEAR)
     places = np.concatenate([(both[:, None] - own[None])[fits][:, end] for end in (0, 1)])
     places = np.unique(np.round(places, 2), axis=0)
-    points = np.concatenate([shapely.get_coordinates(_finely(one)) for one in letter])
+    points = shapely.get_coordinates(shapely.segmentize([LineString(s) for s in letter], _SAMPLE))
     near = shapely.dwithin(whole, shapely.points(places[:, None] + points[None]), 2 * _NEAR)
     there = near.mean(axis=1)
     order = np.argsort(-there, kind="stable")[:_SPOTS_KEPT]
     return places[order], there[order]
 
 
-def _finely(stroke: Floats) -> shapely.Geometry:
-    return shapely.segmentize(LineString(stroke), _SAMPLE)
-
-
 def _in_order(places: Sequence[Floats], weights: Sequence[Floats]) -> tuple[list[int], float]:
-    """The heaviest choice of one place for each letter, on a line or below each other.
+    """Finds the heaviest choice of one place for each letter, on a line or below each other.
 
-    Args:
-        places: (n, 2) of each letter, upright, in heights.
-        weights: (n,) of these places.
-
-    Returns:
-        The places that are taken and their weight; none with a weight of zero if no choice reads.
+    Places (n, 2) are upright, in heights; where no choice reads, the weight is zero.
     """
-    if not all(map(len, places)):
-        return [], 0.0
-    choices = [_heaviest(places, weights, below=below) for below in (False, True)]
+    choices: list[tuple[list[int], float]] = [([], 0.0)]
+    for below in (False, True):
+        sums, before = weights[0], []
+        for (first, second), weight in zip(pairwise(places), weights[1:], strict=True):
+            steps = second[None] - first[:, None]
+            follows = steps[..., 1] < _BELOW if below else steps[..., 0] > _AHEAD
+            ways = np.where(follows, sums[:, None], -np.inf)
+            before.append(ways.argmax(axis=0))
+            sums = ways.max(axis=0) + weight
+        taken = [int(sums.argmax())]
+        for way in reversed(before):
+            taken.append(int(way[taken[-1]]))
+        choices.append((taken[::-1], float(sums.max())))
     return max(choices, key=lambda choice: choice[1])
-
-
-def _heaviest(
-    places: Sequence[Floats], weights: Sequence[Floats], *, below: bool
-) -> tuple[list[int], float]:
-    """From letter to letter: the best way to each place of the next one."""
-    sums, before = weights[0], []
-    for (first, second), weight in zip(pairwise(places), weights[1:], strict=True):
-        steps = second[None] - first[:, None]
-        follows = steps[..., 1] < _BELOW if below else steps[..., 0] > _AHEAD
-        ways = np.where(follows, sums[:, None], -np.inf)
-        before.append(ways.argmax(axis=0))
-        sums = ways.max(axis=0) + weight
-    if not np.isfinite(sums).any():
-        return [], 0.0
-    taken = [int(sums.argmax())]
-    for way in reversed(before):
-        taken.append(int(way[taken[-1]]))
-    return taken[::-1], float(sums.max())

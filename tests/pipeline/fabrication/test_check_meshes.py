@@ -34,48 +34,35 @@ def unit() -> Unit:
     return handmade.specimen().units[1]
 
 
-def without_a_face(mesh: Mesh) -> Mesh:
-    return mesh[0], mesh[1][:-1]
-
-
-def one_face_turned(mesh: Mesh) -> Mesh:
-    faces = mesh[1].copy()
-    faces[5] = faces[5, ::-1]
-    return mesh[0], faces
-
-
-def inside_out(mesh: Mesh) -> Mesh:
-    return mesh[0], mesh[1][:, ::-1]
-
-
-def a_face_twice(mesh: Mesh) -> Mesh:
-    return mesh[0], np.vstack([mesh[1], mesh[1][:1]])
-
-
-def not_a_number(mesh: Mesh) -> Mesh:
+def changed_point(mesh: Mesh) -> Mesh:
     points = mesh[0].copy()
     points[3, 1] = np.nan
     return points, mesh[1]
 
 
-def raised(mesh: Mesh) -> Mesh:
-    return np.add(mesh[0], [0.0, 0.0, 0.3]), mesh[1]
-
-
 def two_bodies(mesh: Mesh) -> Mesh:
     points, faces = mesh
-    return np.vstack([points, np.add(points, [40.0, 0.0, 0.0])]), np.vstack(
-        [faces, faces + len(points)]
-    )
+    beside = np.add(points, [40.0, 0.0, 0.0])
+    return np.vstack([points, beside]), np.vstack([faces, faces + len(points)])
+
+
+def without_a_face(mesh: Mesh) -> Mesh:
+    return mesh[0], mesh[1][:-1]
 
 
 DAMAGES: dict[str, tuple[Callable[[Mesh], Mesh], str]] = {
     "a hole": (without_a_face, "its surface has holes"),
-    "winding": (one_face_turned, "its triangles are not wound all the same way"),
-    "inside out": (inside_out, "it is inside out"),
-    "face twice": (a_face_twice, "its surface has holes"),
-    "not a number": (not_a_number, "vertices that are no numbers"),
-    "raised": (raised, "it starts at z = 0.300 mm"),
+    "winding": (
+        lambda mesh: (mesh[0], np.vstack([mesh[1][:1, ::-1], mesh[1][1:]])),
+        "its triangles are not wound all the same way",
+    ),
+    "inside out": (lambda mesh: (mesh[0], mesh[1][:, ::-1]), "it is inside out"),
+    "face twice": (
+        lambda mesh: (mesh[0], np.vstack([mesh[1], mesh[1][:1]])),
+        "its surface has holes",
+    ),
+    "not a number": (changed_point, "vertices that are no numbers"),
+    "raised": (lambda mesh: (mesh[0] + [0.0, 0.0, 0.3], mesh[1]), "it starts at z = 0.300 mm"),
     "two bodies": (two_bodies, "it falls into 2 pieces"),
 }
 

@@ -8,12 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiLineString, Polygon, box
 
-from pipeline.fabrication.engraving import (
-    orientation_mark,
-    place_id,
-    text_strokes,
-    transformed,
-)
+from pipeline.fabrication.engraving import orientation_mark, place_id, text_strokes, transformed
 from pipeline.fabrication.parts import Strokes, unit_solid
 from pipeline.problem.sections import Fabrication, Labels
 from tests.pipeline.fabrication import slender

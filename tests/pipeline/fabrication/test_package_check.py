@@ -116,10 +116,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "svg id": (edited(f"{UNITS}.svg", 'label="C2"', 'label="C9"'), "other parts, layers"),
     "svg scale": (edited(f"{UNITS}.svg", 'width="600mm"', 'width="600cm"'), "the page does not"),
     "r12 missing": (gone(f"{UNITS}_r12.dxf"), "units_sheet1_nominal_r12.dxf"),
-    "kerf missing": (
-        all_gone(f"{KERF}*"),
-        "there is no sheet of units for a kerf of 0.15 mm",
-    ),
+    "kerf missing": (all_gone(f"{KERF}*"), "there is no sheet of units for a kerf of 0.15 mm"),
     "no kerf made good": (copied(f"{UNITS}.dxf", f"{KERF}.dxf"), "another size or place"),
     "dxf cut short": (halved(f"{UNITS}.dxf"), "cannot be read back"),
     "unit missing": (gone("print/units/B1.stl"), "unit B1: it is missing"),
