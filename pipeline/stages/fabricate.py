@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import shutil
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,17 +21,6 @@ from pipeline.runtime import cli, refusal
 LOG = logging.getLogger(__name__)
 
 STRUCTURES = ("intact", "altered", "cloaked")
-
-
-def parser() -> argparse.ArgumentParser:
-    """Builds the stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.fabricate", "Write drawings, meshes and papers of a structure."
-    )
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--structure", choices=STRUCTURES, required=True, help="what to build")
-    made.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="the package")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -92,12 +80,3 @@ def _aside(folder: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(room, ignore_errors=True)
         shutil.rmtree(former, ignore_errors=True)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the stage from the command line."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

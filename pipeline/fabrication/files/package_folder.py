@@ -65,7 +65,8 @@ class PackageFolder:
     def _write_laser(self) -> None:
         for kind, parts in self._flat_parts():
             for sheet in laser_sheets(kind, parts, self.problem.fabrication.laser, self.file):
-                write_dxf(sheet, self._path(f"laser/{sheet.name}.dxf", sheet.ids))
+                ids = [part.id for part in sheet.parts]
+                write_dxf(sheet, self._path(f"laser/{sheet.name}.dxf", ids))
                 write_dxf(sheet, self._path(f"laser/{sheet.name}_r12.dxf"), "R12")
                 write_svg(sheet, self._path(f"laser/{sheet.name}.svg"))
 
@@ -101,6 +102,7 @@ class PackageFolder:
 
     def _write_plates(self, kind: str, solids: Sequence[PrintedPart]) -> None:
         folder, _, name = kind.rpartition("/")
-        for plate in print_plates(name, solids, self.problem.fabrication.print, self.file):
-            path = self._path(f"{folder}/{plate.name}.3mf", plate.ids)
-            write_3mf([(solid.id, solid.mesh, x, y) for solid, x, y in plate.parts], path)
+        bed = self.problem.fabrication.print
+        for plate, parts in print_plates(name, solids, bed, self.file):
+            path = self._path(f"{folder}/{plate}.3mf", [solid.id for solid, _, _ in parts])
+            write_3mf([(solid.id, solid.mesh, x, y) for solid, x, y in parts], path)

@@ -34,29 +34,6 @@ class LaserSheet:
     size: tuple[float, float]
     parts: tuple[FlatPart, ...]
 
-    @property
-    def ids(self) -> list[str]:
-        """Ids of the parts."""
-        return [part.id for part in self.parts]
-
-
-@dataclass(frozen=True)
-class Plate:
-    """Holds a printer's plate with parts on it.
-
-    Attributes:
-        name: of its file.
-        parts: each with the lower left corner of its box, mm from the corner of the bed.
-    """
-
-    name: str
-    parts: tuple[tuple[PrintedPart, float, float], ...]
-
-    @property
-    def ids(self) -> list[str]:
-        """Ids of the parts."""
-        return [part.id for part, _, _ in self.parts]
-
 
 def laser_sheets(
     kind: str, parts: Sequence[FlatPart], settings: Laser, file: str
@@ -99,8 +76,8 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
 
 def print_plates(
     kind: str, solids: Sequence[PrintedPart], settings: Print, file: str
-) -> Iterator[Plate]:
-    """Lays out one kind of parts on plates.
+) -> Iterator[tuple[str, tuple[tuple[PrintedPart, float, float], ...]]]:
+    """Lays out one kind of parts on plates: their names, and the corners of the parts' boxes, mm.
 
     The kind begins the names of the files; `file` is that of the problem, for messages.
 
@@ -109,4 +86,4 @@ def print_plates(
     """
     bed = Ground("bed", "print", settings.bed, settings.margin, settings.gap)
     for number, parts in enumerate(spread(solids, bed, file), 1):
-        yield Plate(f"{kind}_plate{number}", parts)
+        yield f"{kind}_plate{number}", parts
