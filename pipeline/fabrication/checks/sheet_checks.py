@@ -176,13 +176,14 @@ def _check_letters(drawing: Drawing) -> Iterator[Fault]:
             continue
         area, written = shapely.union_all(outlines[part]), shapely.MultiLineString(strokes)
         shown, key, remedy = (area, written), "labels.height", "give smaller letters"
+        if not strokes:
+            yield drawing.fault("no id is engraved on it", part, (area,), key)
+            continue
         if not area.covers(written):
             yield drawing.fault("engraving beyond its outline", part, shown, key, remedy)
         pieces = shapely.get_parts(shapely.unary_union(written.buffer(_JOINED)))
-        height = max((rectangle_sides(piece)[1] for piece in pieces), default=0.0) - 2 * _JOINED
-        if not strokes:
-            yield drawing.fault("no id is engraved on it", part, shown, key)
-        elif height < _LEAST_LETTER - TOLERANCE and not units:
+        height = max(rectangle_sides(piece)[1] for piece in pieces) - 2 * _JOINED
+        if height < _LEAST_LETTER - TOLERANCE and not units:
             what = f"letters of {height:.2f} mm, less than {_LEAST_LETTER:g} mm"
             yield drawing.fault(what, part, shown, key, "give larger letters")
 

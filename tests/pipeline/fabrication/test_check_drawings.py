@@ -41,16 +41,8 @@ def moved(place: int, x: float, y: float = 0.0) -> Damage:
     return lambda kept: changed(place, points=np.add(kept[place].points, [x, y]))(kept)
 
 
-def added(curve: Curve) -> Damage:
-    return lambda kept: [*kept, curve]
-
-
-def bow_tie(kept: list[Curve]) -> list[Curve]:
-    return changed(OUTER, points=kept[OUTER].points[[0, 2, 1, 3]])(kept)
-
-
-def stutter(kept: list[Curve]) -> list[Curve]:
-    return changed(OUTER, points=kept[OUTER].points[[0, 0, 1, 2, 3]])(kept)
+def reordered(*order: int) -> Damage:
+    return lambda kept: changed(OUTER, points=kept[OUTER].points[list(order)])(kept)
 
 
 def outer_first(kept: list[Curve]) -> list[Curve]:
@@ -69,8 +61,8 @@ def shrunk(place: int, factor: float) -> Damage:
 
 DAMAGES: dict[str, tuple[Damage, str]] = {
     "open": (changed(OUTER, closed=False), "part A1: an open curve on layer CUT_OUTER"),
-    "bow tie": (bow_tie, "part A1: a cut that crosses or repeats itself"),
-    "zero length": (stutter, "part A1: a segment of no length"),
+    "bow tie": (reordered(0, 2, 1, 3), "part A1: a cut that crosses or repeats itself"),
+    "zero length": (reordered(0, 0, 1, 2, 3), "part A1: a segment of no length"),
     "spline": (changed(OUTER, kind="SPLINE"), "part A1: a SPLINE on layer CUT_OUTER"),
     "text": (changed(LETTER, kind="TEXT"), "part A1: a TEXT on layer ENGRAVE"),
     "layer 0": (changed(OUTER, layer="0"), "a layer of name '0'"),
@@ -92,7 +84,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "letters outside": (moved(LETTER, -3.0), "part A1: engraving beyond its outline"),
     "line twice": (
-        added(stroke([(12.0, 15.0), (12.0, 17.0)], "A1")),
+        lambda kept: [*kept, stroke([(12.0, 15.0), (12.0, 17.0)], "A1")],
         "a line twice on layer ENGRAVE",
     ),
 }
@@ -130,6 +122,20 @@ def test_text_in_an_svg_is_caught(tmp_path: Path) -> None:
     path = write_svg(tmp_path / "sheet.svg", sheet(), SIZE)
     path.write_text(path.read_text().replace("</svg>", '<text x="3" y="9">A1</text></svg>'))
     assert any("a TEXT on layer" in words for words in found(read_drawing(path)))
+
+
+def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
+    bare = [curve for curve in sheet() if curve.layer != "ENGRAVE"]
+    assert found(drawn(tmp_path / "units_1.dxf", bare)) == [
+        "part A1: no id is engraved on it",
+        "part B1: no id is engraved on it",
+    ]
+    swapped = {"A1": "B1", "B1": "A1"}
+    other = [replace(c, part=swapped[c.part]) if c.layer == "ENGRAVE" else c for c in sheet()]
+    assert found(drawn(tmp_path / "units_2.dxf", other)) == [
+        "part B1: engraving beyond its outline",
+        "part A1: engraving beyond its outline",
+    ]
 
 
 def test_wrong_units_are_caught(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from pipeline.datasets import file_hash
 from pipeline.fabrication.checks import check_package
@@ -20,6 +21,7 @@ from pipeline.fabrication.readback import read_stl
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
+from tests.pipeline.fabrication.files import write_stl
 
 UNITS = "laser/units_sheet1_nominal"
 KERF = "laser/units_sheet1_kerf0.15"
@@ -65,11 +67,7 @@ def edited(name: str, before: str, after: str, count: int = 1) -> Callable[[Path
     return damage
 
 
-def gone(name: str) -> Callable[[Path], None]:
-    return lambda package: (package / name).unlink()
-
-
-def all_gone(pattern: str) -> Callable[[Path], None]:
+def gone(pattern: str) -> Callable[[Path], None]:
     def damage(package: Path) -> None:
         for path in package.glob(pattern):
             path.unlink()
@@ -82,6 +80,13 @@ def copied(name: str, to: str) -> Callable[[Path], None]:
         shutil.copy(package / name, package / to)
 
     return damage
+
+
+def without_id(package: Path) -> None:
+    """A unit whose underside is plain."""
+    path = package / "print/units/A1.stl"
+    body = trimesh.creation.extrude_polygon(read_stl(path).section(4.0), 8.1, engine="earcut")
+    write_stl(path, np.asarray(body.vertices), np.asarray(body.faces))
 
 
 def halved(name: str) -> Callable[[Path], None]:
@@ -116,12 +121,13 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "svg id": (edited(f"{UNITS}.svg", 'label="C2"', 'label="C9"'), "other parts, layers"),
     "svg scale": (edited(f"{UNITS}.svg", 'width="600mm"', 'width="600cm"'), "the page does not"),
     "r12 missing": (gone(f"{UNITS}_r12.dxf"), "units_sheet1_nominal_r12.dxf"),
-    "kerf missing": (all_gone(f"{KERF}*"), "there is no sheet of units for a kerf of 0.15 mm"),
+    "kerf missing": (gone(f"{KERF}*"), "there is no sheet of units for a kerf of 0.15 mm"),
     "no kerf made good": (copied(f"{UNITS}.dxf", f"{KERF}.dxf"), "another size or place"),
     "dxf cut short": (halved(f"{UNITS}.dxf"), "cannot be read back"),
     "unit missing": (gone("print/units/B1.stl"), "unit B1: it is missing"),
     "another unit": (copied("print/units/A1.stl", "print/units/B1.stl"), "unit B1"),
     "one unit more": (copied("print/units/A1.stl", "print/units/D7.stl"), "unit D7"),
+    "no id below": (without_id, "part A1: its underside shows no id"),
     "stl larger": (scaled("print/units/A1.stl", 1.01), "part A1: it is 8.181 mm high"),
     "stl cut short": (halved("print/units/A1.stl"), "cannot be read back"),
     "assembled larger": (scaled("print/assembled.stl", 1.5), "unit C1 is not in its place"),
@@ -157,10 +163,11 @@ def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
     package: Path, whole: tuple[Path, Problem]
 ) -> None:
     edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
-    wanted, asked = expected_parts(built.design(), "cloaked"), whole[1].fabrication
-    found = unit_sections(read_stl(package / "print/assembled.stl"), wanted, asked)
-    told = [fault.what for fault in check_bill(PackageRecord(package, wanted, found, asked, {}))]
-    assert told == ["no shim is 8.25 mm long, from slot end to slot end"] * len(wanted.joints)
+    parts, settings = expected_parts(built.design(), "cloaked"), whole[1].fabrication
+    shapes = unit_sections(read_stl(package / "print/assembled.stl"), parts, settings)
+    faults = check_bill(PackageRecord(package, parts, shapes, settings, {}))
+    what = "no shim is 8.25 mm long, from slot end to slot end"
+    assert [fault.what for fault in faults] == [what] * len(parts.joints)
 
 
 @pytest.mark.parametrize("name", ["bom.csv", "laser/comb_sheet1_nominal.svg"])
