@@ -14,16 +14,16 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
 from pipeline.runtime import UserError, cli, found_in, write_atomically
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import SYNTHETIC_LABEL
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import of_design
+from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import (
-    encode,
+    encode_video,
     ground_truth,
     noise_planning,
-    of_case,
-    of_structure,
-    prepared,
+    prepare_film,
+    select_case,
+    select_structure,
 )
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-SYNTHETIC = f"{WORD}: rendered from a simulation, not filmed"
+SYNTHETIC = f"{SYNTHETIC_LABEL}: rendered from a simulation, not filmed"
 DESCRIPTION = """\
 Film a simulated response.
 
@@ -100,23 +100,23 @@ def _plan(args: argparse.Namespace) -> None:
 
     asked = recordings.Recording(virtual=VirtualRecording())
     if args.recording is not None:
-        asked = recordings.load(args.recording)
+        asked = recordings.load_recording(args.recording)
     response = datasets.read(args.response, "response")
     structure = args.structure or asked.structure
     case = asked.case if args.case is None else args.case
-    base = noise_planning.Choice(
+    base = noise_planning.PlannedSetup(
         "bare" if asked.specimen == "auto" else asked.specimen,
         asked.virtual or VirtualRecording(),
-        of_design(of_structure(response, structure)).pitch,
+        outlines_of_design(select_structure(response, structure)).pitch,
     )
     values = (args.specimen, args.pixels_per_pitch, args.fps, args.codec, args.marker)
-    chosen = noise_planning.choices(
-        base, noise_planning.Options(*(tuple(each or ()) for each in values))
+    chosen = noise_planning.setup_combinations(
+        base, noise_planning.SetupOptions(*(tuple(each or ()) for each in values))
     )
     rows = []
     with cli.progress(len(chosen), "planning") as bar:
         for choice in chosen:
-            found = noise_planning.expected(response, structure, case, choice, args.frames)
+            found = noise_planning.expected_noise(response, structure, case, choice, args.frames)
             rows.append({**choice.words, **found.words})
             bar.update()
     LOG.info("%s; errors of clips of %d frames", SYNTHETIC, args.frames)
@@ -144,11 +144,11 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     parents = {"response": response, "design": design}
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):
-        film = prepared(_shown(asked, response), asked.structure, asked.specimen, virtual)
+        film = prepare_film(_shown(asked, response), asked.structure, asked.specimen, virtual)
     title = asked.title or path.stem
-    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
+    labels = {"title": f"{SYNTHETIC_LABEL}: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
-        encode(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
+        encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
     made = ground_truth.assemble_truth(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
     comments = (
@@ -156,19 +156,19 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
         "Written by pipeline.stages.film; python -m pipeline.stages.track takes it.",
     )
     with write_atomically(out.with_suffix(".yaml")) as aside:
-        text = recordings.text(_described(asked, virtual, out, design), comments)
+        text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:
-    from pipeline.virtual_lab import log
+    from pipeline.virtual_lab import load_cell_log
 
     asked, virtual = _virtual(path)
     if virtual.load_cell is None:
         remedy = "describe the load cell there"
         raise UserError("no load cell", file=path, key="virtual.load_cell", remedy=remedy)
     with found_in(path):
-        lines = log(_shown(asked, response), virtual, virtual.load_cell)
+        lines = load_cell_log(_shown(asked, response), virtual, virtual.load_cell)
     with write_atomically(out) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(f"# {SYNTHETIC}\ntime,force\n")
         file.writelines(f"{time:.4f},{force:.5f}\n" for time, force in lines)
@@ -176,7 +176,7 @@ def _weigh(path: Path, response: Path, out: Path) -> None:
 
 def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     """A recording and how it is rendered."""
-    asked = recordings.load(path)
+    asked = recordings.load_recording(path)
     if asked.virtual is None:
         remedy = (
             "track it (python -m pipeline.stages.track), or say under `virtual` how to render it"
@@ -190,7 +190,7 @@ def _shown(asked: Recording, response: Path) -> xr.Dataset:
     assert asked.virtual is not None
     if asked.virtual.specimen is not None:
         return datasets.read(response, "specimen")
-    return of_case(datasets.read(response, "response"), asked.structure, asked.case)
+    return select_case(datasets.read(response, "response"), asked.structure, asked.case)
 
 
 def _described(

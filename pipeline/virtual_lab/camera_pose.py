@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.problem.sections import Viewing
+from pipeline.problem.sections import CameraView
 from pipeline.tracking.geometry import Camera
 from sim.core import Floats
 
@@ -28,7 +28,7 @@ class Viewpoint(NamedTuple):
         return foot + (points - foot) * (height / (height + depth))
 
 
-def viewpoint(asked: Viewing, middle: Floats) -> Viewpoint:
+def viewpoint(asked: CameraView, middle: Floats) -> Viewpoint:
     """The camera that looks at ``middle`` (2,) of the specimen, mm.
 
     A pinhole with radial distortion: the focal length follows from distance and pixel size. It

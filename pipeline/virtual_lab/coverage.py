@@ -31,7 +31,7 @@ class NestedPolygons(NamedTuple):
     shade: Floats
 
 
-def picture(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
+def coverage_image(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
     """Mean shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5.
 
     Args:

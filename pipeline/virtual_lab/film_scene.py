@@ -16,7 +16,7 @@ from pipeline.problem.sections import UnitAppearance
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.virtual_lab.camera_pose import Viewpoint
 from pipeline.virtual_lab.coverage import NestedPolygons
-from pipeline.virtual_lab.face_marks import Marks
+from pipeline.virtual_lab.face_marks import FaceMarks
 from sim.core import Floats, Ints
 
 _PIECE = 2.0  # longest piece of an edge, mm: the lens bends edges
@@ -36,7 +36,7 @@ class FilmScene(NamedTuple):
 
     specimen: SpecimenOutlines
     ligament: Ints
-    marks: Marks
+    marks: FaceMarks
     look: UnitAppearance
     view: Viewpoint
 
@@ -47,7 +47,7 @@ class _Layer(NamedTuple):
     shade: float
 
 
-def seen(scene: FilmScene, pose: Floats) -> NestedPolygons:
+def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
     """All polygons, in pixels, with the shades they add to the board's.
 
     Args:

@@ -30,7 +30,7 @@ class FilmedMotion(NamedTuple):
     instants: Floats
 
 
-class Clock(NamedTuple):
+class FilmClock(NamedTuple):
     """Which time of the response a video shows at which of its own.
 
     Attributes:
@@ -52,7 +52,7 @@ class Clock(NamedTuple):
         return np.clip(moved, self.start, self.end)
 
 
-def clock(given: Floats, asked: VirtualRecording) -> Clock:
+def film_clock(given: Floats, asked: VirtualRecording) -> FilmClock:
     """The clock of a video of a response with samples at the times ``given``, s.
 
     Raises:
@@ -65,10 +65,10 @@ def clock(given: Floats, asked: VirtualRecording) -> Clock:
         raise UserError(what, key="virtual.start", value=asked.start, remedy=remedy)
     pace = 1.0 if asked.duration is None else (end - asked.start) / asked.duration
     frames = 1 + int(np.floor((asked.still + (end - asked.start) / pace) * asked.rate + 1e-9))
-    return Clock(frames, asked.start, end, asked.still, pace)
+    return FilmClock(frames, asked.start, end, asked.still, pace)
 
 
-def motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMotion:
+def sample_motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMotion:
     """The motion of a structure under one load case, sampled by the frames.
 
     Between the samples of the response, a cubic spline; before the start, its first state.
@@ -83,7 +83,7 @@ def motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMot
     """
     states = one["displacement"].transpose("time", "unit", "dof").values
     given = one["time"].values
-    of_video = clock(given, asked)
+    of_video = film_clock(given, asked)
     course = CubicSpline(given, states[:, present])
     time = np.arange(of_video.frames) / asked.rate
 

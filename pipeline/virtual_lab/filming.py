@@ -11,16 +11,16 @@ import xarray as xr
 from pipeline.posing import structure_variables
 from pipeline.problem.sections import VirtualRecording
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import of_design
+from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import sensor
 from pipeline.virtual_lab.camera_pose import viewpoint
-from pipeline.virtual_lab.face_marks import marks
+from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene
-from pipeline.virtual_lab.filmed_motion import FilmedMotion, motion
+from pipeline.virtual_lab.filmed_motion import FilmedMotion, sample_motion
 from sim.core import Image, Ints, Mask
 
 
-class Filming(NamedTuple):
+class VirtualFilm(NamedTuple):
     """All that is needed to render.
 
     Attributes:
@@ -40,12 +40,16 @@ class Filming(NamedTuple):
     def images(self, tell: Callable[[], None] | None = None) -> Iterator[Image]:
         """The frames, in sequence; ``tell`` is called after each."""
         for index, time in enumerate(self.motion.time):
-            yield sensor.frame(self.scene, self.motion.instants[index], time, index, self.asked)
+            yield sensor.sensor_frame(
+                self.scene, self.motion.instants[index], time, index, self.asked
+            )
             if tell is not None:
                 tell()
 
 
-def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording) -> Filming:
+def prepare_film(
+    one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
+) -> VirtualFilm:
     """Everything for the film of a structure under one load case.
 
     Args:
@@ -57,7 +61,7 @@ def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
     Raises:
         UserError: the specimen is out of the picture, or nothing is in the window of time.
     """
-    units = of_design(one)
+    units = outlines_of_design(one)
     present = np.isin(one["unit"].values, units.ids)
     view = viewpoint(asked.camera, (units.centre.min(axis=0) + units.centre.max(axis=0)) / 2)
     corners = view.camera.project(units.centre)
@@ -72,14 +76,14 @@ def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
     scene = FilmScene(
         units,
         _ligaments(one, structure, units.ids),
-        marks(units, kind, look, asked.seed),
+        draw_marks(units, kind, look, asked.seed),
         look,
         view,
     )
-    return Filming(scene, motion(one, present, asked), one, present, asked)
+    return VirtualFilm(scene, sample_motion(one, present, asked), one, present, asked)
 
 
-def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
+def select_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
     """One structure of a response.
 
     Raises:
@@ -93,7 +97,7 @@ def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
     return response.sel(structure=structure)
 
 
-def of_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
+def select_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
     """One structure of a response under one of its load cases.
 
     Raises:
@@ -103,7 +107,7 @@ def of_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
     if not 0 <= case < cases:
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError("the response has no such case", key="case", value=case, remedy=remedy)
-    return of_structure(response, structure).isel(case=case)
+    return select_structure(response, structure).isel(case=case)
 
 
 def _ligaments(response: xr.Dataset, structure: str, ids: Ints) -> Ints:

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from pipeline.posing import PosedStructure, drawn
-from pipeline.problem.sections import Making, Shaking
+from pipeline.problem.sections import DriveFaults, SpecimenFaults
 from pipeline.runtime import UserError
 from sim.core import Numbers
 from sim.scene import Scene
@@ -22,7 +22,7 @@ SAMPLES = 1001
 """Of the planned motion, to find its largest displacement."""
 
 
-class Shaken(NamedTuple):
+class ImperfectDrive(NamedTuple):
     """A drive that is not quite the planned one (``sim.solvers.loads.MotionLaw``).
 
     Attributes:
@@ -74,7 +74,9 @@ def _turned(angle: float) -> Array:
     return jnp.array([[cos, -sin], [sin, cos]])
 
 
-def specimen(structure: PosedStructure, case: int, asked: Making, end: float) -> PosedStructure:
+def make_specimen(
+    structure: PosedStructure, case: int, asked: SpecimenFaults, end: float
+) -> PosedStructure:
     """A specimen of a structure under one of its load cases.
 
     Args:
@@ -93,7 +95,7 @@ def specimen(structure: PosedStructure, case: int, asked: Making, end: float) ->
     made = replace(
         scene,
         lattice=replace(scene.lattice, vertices=copy.vertices),
-        motions=(shaken(scene, case, asked.drive, end, asked.unload),),
+        motions=(imperfect_drive(scene, case, asked.drive, end, asked.unload),),
         weights=np.ones(1),
         duration=end,
         frequency=None,
@@ -103,7 +105,9 @@ def specimen(structure: PosedStructure, case: int, asked: Making, end: float) ->
     return PosedStructure(made, copy.vertices)
 
 
-def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) -> Shaken:
+def imperfect_drive(
+    scene: Scene, case: int, asked: DriveFaults, end: float, unload: bool
+) -> ImperfectDrive:
     """The drive of a load case as the specimen has it.
 
     Args:
@@ -116,7 +120,7 @@ def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) ->
     planned = scene.motions[case]
     path = np.asarray(planned(np.linspace(0, scene.duration, SAMPLES)))[:, :2]
     site = scene.lattice.site[scene.driven]
-    return Shaken(
+    return ImperfectDrive(
         planned,
         site - site.mean(axis=0),
         path[np.hypot(*path.T).argmax()],

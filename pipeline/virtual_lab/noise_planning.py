@@ -13,11 +13,11 @@ import xarray as xr
 
 from pipeline.problem.sections import Codec, VirtualRecording
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import frames
-from pipeline.tracking.motion import follow
-from pipeline.tracking.reference_frame import Setup
-from pipeline.virtual_lab.filming import Filming, of_case, prepared
-from pipeline.virtual_lab.video_writer import encode
+from pipeline.tracking.frames import read_frames
+from pipeline.tracking.motion import track_video
+from pipeline.tracking.reference_frame import RecordingSetup
+from pipeline.virtual_lab.filming import VirtualFilm, prepare_film, select_case
+from pipeline.virtual_lab.video_writer import encode_video
 from sim.core import Floats, Reals
 
 LEAST = 16
@@ -25,7 +25,7 @@ RESTING = 6  # frames before the motion
 _DEG = 180 / np.pi
 
 
-class Choice(NamedTuple):
+class PlannedSetup(NamedTuple):
     """One set-up: what is filmed and how."""
 
     specimen: str
@@ -49,7 +49,7 @@ class Choice(NamedTuple):
         }
 
 
-class Expected(NamedTuple):
+class ExpectedNoise(NamedTuple):
     """What a set-up gives: errors and stated uncertainties (3,) in px, px and deg.
 
     Attributes:
@@ -76,7 +76,7 @@ class Expected(NamedTuple):
         return told | {"lost_percent": f"{100 * self.lost:.3g}"}
 
 
-class Options(NamedTuple):
+class SetupOptions(NamedTuple):
     """Values to try in every combination; none leaves the base's own.
 
     Attributes:
@@ -94,7 +94,7 @@ class Options(NamedTuple):
     markers: tuple[float, ...]
 
 
-def choices(base: Choice, tried: Options) -> list[Choice]:
+def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:
     """Every combination of the options.
 
     Raises:
@@ -129,8 +129,13 @@ def codec(name: str) -> Codec:
 
 
 def _chosen(
-    base: Choice, specimen: str, scale: float, rate: float, chosen: Codec, marker: float | None
-) -> Choice:
+    base: PlannedSetup,
+    specimen: str,
+    scale: float,
+    rate: float,
+    chosen: Codec,
+    marker: float | None,
+) -> PlannedSetup:
     camera, look = base.setup.camera, base.setup.look
     pixel = base.pitch / scale
     image = tuple(2 * round(side * camera.pixel_size / pixel / 2) for side in camera.image)
@@ -147,12 +152,12 @@ def _chosen(
         "codec": chosen,
         "look": look,
     }
-    return Choice(specimen, base.setup.model_copy(update=update), base.pitch)
+    return PlannedSetup(specimen, base.setup.model_copy(update=update), base.pitch)
 
 
-def expected(
-    response: xr.Dataset, structure: str, case: int, choice: Choice, count: int
-) -> Expected:
+def expected_noise(
+    response: xr.Dataset, structure: str, case: int, choice: PlannedSetup, count: int
+) -> ExpectedNoise:
     """Renders a clip of so many frames, tracks it, and compares with its truth.
 
     Raises:
@@ -160,15 +165,15 @@ def expected(
     """
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
-    one = of_case(response, structure, case)
-    film = prepared(one, structure, choice.specimen, _clip(choice.setup, count))
+    one = select_case(response, structure, case)
+    film = prepare_film(one, structure, choice.specimen, _clip(choice.setup, count))
     camera = choice.setup.camera
-    known = Setup(choice.setup.look.thickness, camera.distance)
+    known = RecordingSetup(choice.setup.look.thickness, camera.distance)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"clip{choice.setup.codec.suffixes[0]}"
-        encode(path, film.images(), choice.setup.rate, choice.setup.codec, {})
+        encode_video(path, film.images(), choice.setup.rate, choice.setup.codec, {})
         units = film.scene.specimen
-        track = follow(frames(path), units, 1 / camera.pixel_size, setup=known)
+        track = track_video(read_frames(path), units, 1 / camera.pixel_size, setup=known)
     return _compared(film, track.displacement, track.sigma)
 
 
@@ -182,11 +187,11 @@ def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
     return setup.model_copy(update={"still": resting / setup.rate, "duration": length})
 
 
-def _compared(film: Filming, found: Reals, sigma: Reals) -> Expected:
+def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
     pixel = film.asked.camera.pixel_size
     scale = np.array([1 / pixel, 1 / pixel, _DEG])
     error = (found - film.motion.pose[: len(found)]) * scale
-    return Expected(
+    return ExpectedNoise(
         np.sqrt(np.nanmean(error**2, axis=(0, 1))),
         np.nanmedian(sigma * scale, axis=(0, 1)),
         float(np.isnan(error[..., 0]).mean()),

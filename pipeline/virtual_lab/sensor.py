@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.problem.sections import Lighting, VirtualRecording
 from pipeline.virtual_lab import coverage
-from pipeline.virtual_lab.film_scene import FilmScene, seen
+from pipeline.virtual_lab.film_scene import FilmScene, nested_polygons
 from sim.core import Floats, Image
 
 FINER = 3
@@ -16,7 +16,7 @@ FINER = 3
 _MAINS = 100.0  # Hz
 
 
-def frame(
+def sensor_frame(
     scene: FilmScene, instants: Floats, time: float, index: int, asked: VirtualRecording
 ) -> Image:
     """The picture (rows, columns) that the sensor gives, 8 bit.
@@ -28,18 +28,18 @@ def frame(
         index: of the frame: the noise of each is its own.
         asked: light, sensor and seed.
     """
-    shades = np.mean([shade(scene, pose, asked.sensor.blur) for pose in instants], axis=0)
+    shades = np.mean([shade_image(scene, pose, asked.sensor.blur) for pose in instants], axis=0)
     light = _light(asked.light, shades.shape)
     flicker = 1 + asked.light.flicker * np.sin(2 * np.pi * _MAINS * time)
     return _noisy(np.clip(shades, 0, 1) * light * flicker, index, asked)
 
 
-def shade(scene: FilmScene, pose: Floats, blur: float) -> Floats:
+def shade_image(scene: FilmScene, pose: Floats, blur: float) -> Floats:
     """Mean shade (rows, columns) of every pixel behind the optics, without light and noise."""
     columns, rows = scene.view.camera.size
-    rings = seen(scene, pose)
+    rings = nested_polygons(scene, pose)
     fine = rings._replace(points=(rings.points + 0.5) * FINER - 0.5)
-    picture = scene.look.board + coverage.picture(fine, (rows * FINER, columns * FINER))
+    picture = scene.look.board + coverage.coverage_image(fine, (rows * FINER, columns * FINER))
     if blur > 0:
         edge = cv2.BORDER_REPLICATE
         picture = np.asarray(

@@ -30,7 +30,7 @@ _DOT = 0.25
 
 
 @dataclass(frozen=True)
-class Sighting:
+class LatticeDetection:
     """The specimen as it was found.
 
     Attributes:
@@ -48,22 +48,22 @@ class Sighting:
     bright: bool
 
 
-def lies(camera: Camera) -> tuple[float, bool]:
+def specimen_orientation(camera: Camera) -> tuple[float, bool]:
     """How far the specimen is turned in the image, counter-clockwise, and if seen from behind."""
     upward = camera.homography[:2, 1]
     turn = float(np.arctan2(-upward[0], -upward[1]))
     return turn, bool(np.linalg.det(camera.homography[:2, :2]) > 0)
 
 
-def placed(camera: Camera) -> str:
+def orientation_text(camera: Camera) -> str:
     """The same in words: upright, turned, seen from behind."""
-    turn, behind = lies(camera)
+    turn, behind = specimen_orientation(camera)
     degrees = round(float(np.rad2deg(turn)))
     words = f"turned by {degrees} deg" if abs(degrees) > _UPRIGHT else "upright"
     return f"{words} and mirrored, as from behind" if behind else words
 
 
-def told(found: Sighting, specimen: SpecimenOutlines) -> str:
+def detection_summary(found: LatticeDetection, specimen: SpecimenOutlines) -> str:
     """How many units were found, and where."""
     seen = f"{found.blobs} units found, {len(found.unit)} of {specimen.count} in their places"
     if not len(found.unit):
@@ -72,7 +72,9 @@ def told(found: Sighting, specimen: SpecimenOutlines) -> str:
     return f"{seen}, from ({low[0]:.0f}, {low[1]:.0f}) to ({high[0]:.0f}, {high[1]:.0f}) px"
 
 
-def sight(image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None) -> list[Sighting]:
+def detect_lattice(
+    image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None
+) -> list[LatticeDetection]:
     """Finds the specimen, of either polarity, whichever way it is turned, mirrored or not.
 
     Args:
@@ -92,7 +94,9 @@ def sight(image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None) -
     return [one for one in found if len(one.unit) >= _NEARLY * _most(found)]
 
 
-def _best(image: Picture, specimen: SpecimenOutlines, scales: list[float]) -> list[Sighting]:
+def _best(
+    image: Picture, specimen: SpecimenOutlines, scales: list[float]
+) -> list[LatticeDetection]:
     """The ways to see it at the scale, and of the polarity, that match the most units."""
     ways = [_ways(image, specimen, scale, bright) for scale in scales for bright in (True, False)]
     return max(ways, key=_most)
@@ -104,27 +108,29 @@ def _unmarked(image: Picture, pitch: float) -> Image:
     return np.asarray(cv2.medianBlur(np.clip(image, 0, 255).astype(np.uint8), width), np.uint8)
 
 
-def _ways(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> list[Sighting]:
-    centroids = blobs(image, specimen, scale, bright)
+def _ways(
+    image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
+) -> list[LatticeDetection]:
+    centroids = find_blobs(image, specimen, scale, bright)
     size = (image.shape[1], image.shape[0])
     camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
-    nothing = Sighting(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
+    nothing = LatticeDetection(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
     found = [
         _matched(specimen, centroids, matrix, scale, nothing)
-        for matrix in orientation.starts(specimen.centre, centroids)
+        for matrix in orientation.initial_homographies(specimen.centre, centroids)
     ]
     return found or [nothing]
 
 
-def _most(ways: list[Sighting]) -> int:
+def _most(ways: list[LatticeDetection]) -> int:
     return max(len(one.unit) for one in ways)
 
 
-def refined(specimen: SpecimenOutlines, sighting: Sighting) -> Sighting:
+def with_distortion(specimen: SpecimenOutlines, sighting: LatticeDetection) -> LatticeDetection:
     """The same with distortion in its camera."""
     first = sighting.camera
     seen = specimen.centre[sighting.unit]
-    camera = cameras.fit(seen, sighting.blob, first.size, _BLOB_SIGMA)
+    camera = cameras.fit_camera(seen, sighting.blob, first.size, _BLOB_SIGMA)
     return replace(sighting, camera=camera)
 
 
@@ -134,7 +140,7 @@ def _likely_scales(image: Picture, specimen: SpecimenOutlines) -> list[float]:
     return [float(most * share) for share in (0.95, 0.8, 0.67, 0.56)]
 
 
-def blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
+def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
     """Centroids (n, 2) in px of patches of a unit's size."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
@@ -165,17 +171,21 @@ def _filled(mask: Image, largest: float) -> Image:
 
 
 def _matched(
-    specimen: SpecimenOutlines, centroids: Floats, matrix: Floats, scale: float, nothing: Sighting
-) -> Sighting:
+    specimen: SpecimenOutlines,
+    centroids: Floats,
+    matrix: Floats,
+    scale: float,
+    nothing: LatticeDetection,
+) -> LatticeDetection:
     """One to one, from a first guess of the homography, by turns with a better one."""
     for turn in range(_ROUNDS):
         gate = specimen.pitch * scale * (0.5 if turn else 0.8)
-        unit, place = one_to_one(_seen(matrix, specimen.centre), centroids, gate)
+        unit, place = match_one_to_one(_seen(matrix, specimen.centre), centroids, gate)
         if len(unit) < _LEAST:
             return nothing
-        found = _affine if turn < _AFFINE_ROUNDS else cameras.homography
+        found = _affine if turn < _AFFINE_ROUNDS else cameras.fit_homography
         matrix = found(specimen.centre[unit], centroids[place])
-    unit, place = one_to_one(
+    unit, place = match_one_to_one(
         _seen(matrix, specimen.centre), centroids, _GATE * specimen.pitch * scale
     )
     camera = replace(nothing.camera, homography=matrix / matrix[2, 2])
@@ -196,7 +206,7 @@ def _seen(matrix: Floats, points: Floats) -> Floats:
     return mapped / (points @ matrix[2, :2] + matrix[2, 2])[:, None]
 
 
-def one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
+def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
     """The assignment of least total distance (capped at ``gate``), pairs beyond it left out."""
     distance = cdist(expected, found)
     rows, columns = linear_sum_assignment(np.minimum(distance, gate))

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect.blobs import Sighting
+from pipeline.tracking.detect.blobs import LatticeDetection
 from pipeline.tracking.geometry import SpecimenOutlines
 
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
@@ -14,8 +14,8 @@ _MARKED = 0.02  # of a face
 _DOTS = 4
 
 
-def shown_on(
-    image: Picture, specimen: SpecimenOutlines, sighting: Sighting, px_per_mm: float
+def classify_markings(
+    image: Picture, specimen: SpecimenOutlines, sighting: LatticeDetection, px_per_mm: float
 ) -> str:
     """What most faces bear: dots, speckle, or nothing ("bare").
 
@@ -31,7 +31,11 @@ def shown_on(
 
 
 def _marks(
-    image: Picture, specimen: SpecimenOutlines, sighting: Sighting, unit: int, contrast: float
+    image: Picture,
+    specimen: SpecimenOutlines,
+    sighting: LatticeDetection,
+    unit: int,
+    contrast: float,
 ) -> int:
     """Number of patches on a face, its rim left out."""
     shrunk = specimen.centre[unit] + 0.75 * specimen.polygon(unit)

@@ -12,7 +12,7 @@ _FLAT = 0.5
 """Sides of the box, of the lattice or of the blobs, may differ by so much between the two."""
 
 
-def starts(points: Floats, pixels: Floats) -> list[Floats]:
+def initial_homographies(points: Floats, pixels: Floats) -> list[Floats]:
     """Homographies without perspective that lay the points' box over that of the pixels.
 
     The upright one comes first, then turned, then mirrored; lists none if there are few pixels.

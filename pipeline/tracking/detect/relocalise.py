@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect.blobs import blobs, one_to_one
+from pipeline.tracking.detect.blobs import find_blobs, match_one_to_one
 from pipeline.tracking.geometry import Camera, SpecimenOutlines
 from sim.core import Floats
 
@@ -25,7 +25,7 @@ _ENOUGH = 0.5
 _Laid = tuple[Floats, float]
 
 
-class Recovery(NamedTuple):
+class Relocaliser(NamedTuple):
     """Looks for a specimen whose units are nowhere near where they were.
 
     Attributes:
@@ -47,7 +47,7 @@ class Recovery(NamedTuple):
         """
         jacobian = self.camera.jacobian(self.specimen.centre.mean(axis=0))
         scale = float(np.sqrt(np.abs(np.linalg.det(jacobian))))
-        seen = self.camera.unproject(blobs(image, self.specimen, scale, self.bright))
+        seen = self.camera.unproject(find_blobs(image, self.specimen, scale, self.bright))
         before = self.specimen.centre + pose[:, :2]
         if len(seen) < _ENOUGH * len(before):
             return
@@ -73,7 +73,7 @@ class Recovery(NamedTuple):
         pitch, turn = self.specimen.pitch, 0.0
         now = np.full_like(before, np.nan)
         for _ in range(_ROUNDS):
-            unit, place = one_to_one(expected, seen, _GATE * pitch)
+            unit, place = match_one_to_one(expected, seen, _GATE * pitch)
             if len(unit) < _ENOUGH * len(before):
                 return now, turn
             rows = np.column_stack([before, np.ones(len(before))])

@@ -6,16 +6,16 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
-from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, room
-from pipeline.tracking.fit.patch_correlation import Fits, FitStart, Templates
-from pipeline.tracking.fit.template import plane_of
+from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, workspace
+from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
+from pipeline.tracking.fit.template import pixel_plane
 from pipeline.tracking.geometry import Camera
 from sim.core import Floats, Mask, Singles
 
 FULL_STEPS = 8
 
 
-class Fitter:
+class PoseFitter:
     """A camera and what it should see.
 
     Attributes:
@@ -26,7 +26,7 @@ class Fitter:
 
     def __init__(self, camera: Camera, templates: Templates, plane: Singles | None = None) -> None:
         self.camera, self.templates = camera, templates
-        self.plane = plane_of(camera) if plane is None else plane
+        self.plane = pixel_plane(camera) if plane is None else plane
         self.full = np.zeros(len(templates.centre))
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
@@ -42,7 +42,7 @@ class Fitter:
         chosen: Mask | None = None,
         tight: Floats | None = None,
         noise: Floats | None = None,
-    ) -> Fits:
+    ) -> PoseFits:
         """Poses of the chosen units, NaN for the others and for those that cannot be fitted.
 
         Args:
@@ -72,8 +72,8 @@ class Fitter:
         if wanted.any():
             across = int(2 * start.radius[wanted].max()) // SIZE + 3
             scene = FramePixels(self._padded(image), self.plane)
-            patch_correlation.fit(
-                scene, self.templates, start, wanted, FULL_STEPS, room(across**2), out
+            patch_correlation.fit_patches(
+                scene, self.templates, start, wanted, FULL_STEPS, workspace(across**2), out
             )
         return patch_correlation.unpack(out)
 

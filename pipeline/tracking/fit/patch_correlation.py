@@ -18,9 +18,9 @@ from pipeline.tracking.fit.normal_equations import (
     SIZE,
     UNKNOWNS,
     FramePixels,
-    Room,
     TemplateArrays,
-    gather,
+    Workspace,
+    gather_equations,
 )
 from pipeline.tracking.fit.small_cholesky import invert
 from pipeline.tracking.fit.template_cells import TemplateCells, unfold
@@ -85,7 +85,7 @@ class FitStart(NamedTuple):
     tight: Floats
 
 
-class Aim(NamedTuple):
+class FitTarget(NamedTuple):
     """One unit of a `FitStart`, with its contrast and the largest number of full steps."""
 
     contrast: float
@@ -96,7 +96,7 @@ class Aim(NamedTuple):
     most: int
 
 
-class Fits(NamedTuple):
+class PoseFits(NamedTuple):
     """Poses found in a frame.
 
     Attributes:
@@ -154,7 +154,7 @@ def _hold_pose(matrix: Floats) -> None:
 
 
 @inlined
-def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -> float:
+def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: Workspace) -> float:
     """The scale of the robust weights: wide until the unit has found its place."""
     if aim.tight > 0.0:
         return max(0.5 * scale, aim.tight)
@@ -174,11 +174,11 @@ def _stride(sums: Floats) -> float:
 def _descend(
     scene: FramePixels,
     look: TemplateArrays,
-    aim: Aim,
+    aim: FitTarget,
     box: Floats,
     state: Floats,
     inverse: Floats,
-    room: Room,
+    room: Workspace,
 ) -> tuple[float, int]:
     """Improves the state of one unit.
 
@@ -191,7 +191,7 @@ def _descend(
     scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
     for turn in range(0 if new else 1, aim.most + 1):
         every = 4 if turn == 0 else (2 if turn == 1 and blind else 1)
-        count = gather(scene, look, state, box, every, 1 / (scale * scale), room)
+        count = gather_equations(scene, look, state, box, every, 1 / (scale * scale), room)
         if turn == 0:
             _hold_pose(room.matrix)
         if not (room.sums[3] > 20 / every and invert(room.matrix, factor, inverse)):
@@ -209,7 +209,13 @@ def _descend(
 
 @inlined
 def _summarise(
-    state: Floats, inverse: Floats, room: Room, count: int, full: float, moved: float, out: Floats
+    state: Floats,
+    inverse: Floats,
+    room: Workspace,
+    count: int,
+    full: float,
+    moved: float,
+    out: Floats,
 ) -> None:
     """Writes a unit's row as `unpack` reads it."""
     out[:] = 0.0
@@ -235,13 +241,13 @@ def _summarise(
 
 
 @compiled
-def fit(
+def fit_patches(
     scene: FramePixels,
     templates: Templates,
     start: FitStart,
     chosen: Mask,
     most: int,
-    room: Room,
+    room: Workspace,
     out: Floats,
 ) -> None:
     """Fits all chosen units; fills out (units, 30) in the order of `unpack`.
@@ -277,7 +283,7 @@ def fit(
             templates.reach[unit] + 0.71 * SIZE / start.scale[unit],
         )
         state[:] = start.state[unit]
-        aim = Aim(
+        aim = FitTarget(
             templates.contrast[unit],
             start.scale[unit],
             start.radius[unit],
@@ -290,9 +296,9 @@ def fit(
             _summarise(state, inverse, room, count, start.full[unit], moved, out[unit])
 
 
-def unpack(out: Floats) -> Fits:
+def unpack(out: Floats) -> PoseFits:
     """The columns of `fit`'s output by name."""
-    return Fits(
+    return PoseFits(
         out[:, :POSE],
         out[:, POSE:UNKNOWNS],
         out[:, UNKNOWNS : UNKNOWNS + 9].reshape(-1, 3, 3),

@@ -11,13 +11,13 @@ from sim.core import Floats, Singles
 TAPS = 4
 
 
-def coefficients(values: Floats) -> Singles:
+def spline_coefficients(values: Floats) -> Singles:
     """Coefficients of the cubic spline through an image or grid (rows, columns)."""
     return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
 
 
 @inlined
-def weights(offset: float, value: Floats, slope: Floats) -> None:
+def spline_weights(offset: float, value: Floats, slope: Floats) -> None:
     """Fills the four basis values and slopes at ``offset`` in [0, 1) behind the second knot."""
     rest = 1.0 - offset
     square, rest_square = offset * offset, rest * rest
@@ -32,7 +32,7 @@ def weights(offset: float, value: Floats, slope: Floats) -> None:
 
 
 @compiled
-def sample(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
+def sample_spline(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
     """Values at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
     rows, columns = coefs.shape
     wx, wy, slope = np.empty(TAPS), np.empty(TAPS), np.empty(TAPS)
@@ -41,8 +41,8 @@ def sample(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
         if column < 1 or row < 1 or column > columns - 3 or row > rows - 3:
             out[k] = np.nan
             continue
-        weights(x[k] - column, wx, slope)
-        weights(y[k] - row, wy, slope)
+        spline_weights(x[k] - column, wx, slope)
+        spline_weights(y[k] - row, wy, slope)
         total = 0.0
         for a in range(TAPS):
             line = 0.0

@@ -14,8 +14,8 @@ import numpy as np
 from pipeline.runtime import Picture
 from pipeline.tracking.fit.normal_equations import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
-from pipeline.tracking.fit.spline import coefficients, sample
-from pipeline.tracking.fit.template_cells import cells_of
+from pipeline.tracking.fit.spline import sample_spline, spline_coefficients
+from pipeline.tracking.fit.template_cells import classify_templates
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines
 from sim.core import Floats, Ints, Singles
 
@@ -109,18 +109,20 @@ def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Temp
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max() for mask in weight])
     contrast = np.sqrt(square)
-    cells = cells_of(brightness, weight, contrast)
+    cells = classify_templates(brightness, weight, contrast)
     return Templates(brightness, weight, grid.half, grid.step, grid.centre, contrast, reach, cells)
 
 
-def blurred(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
+def blurred_silhouette(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
     """What is inside, one, against what is not, zero, as the camera blurs it."""
     sharp = np.clip(inside / grid.step + 0.5, 0, 1).astype(np.float32)
     spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
     return np.asarray(cv2.GaussianBlur(sharp, (0, 0), float(spread)), np.float32)
 
 
-def shown(inside: Singles, joint: Singles, blur: float, pixel: float, kind: str) -> Singles:
+def template_weight(
+    inside: Singles, joint: Singles, blur: float, pixel: float, kind: str
+) -> Singles:
     """Weight of nodes in templates that are learned: what is inside, and the blurred edge.
 
     Outside, what is near a joint moves otherwise. Bare units are followed by their edges alone,
@@ -137,7 +139,7 @@ def shown(inside: Singles, joint: Singles, blur: float, pixel: float, kind: str)
     return np.asarray(weight, np.float32)
 
 
-def outlines(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
+def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
     """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
 
     Args:
@@ -145,7 +147,7 @@ def outlines(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
     """
-    faces = np.stack([blurred(grid, inside, blur) for inside in grid.inside])
+    faces = np.stack([blurred_silhouette(grid, inside, blur) for inside in grid.inside])
     outside = _REACH * blur + 0.5 * pixel
     weight = _smooth(grid.inside, -outside - pixel, -outside)
     weight *= 1 - _smooth(grid.inside, outside, outside + pixel)
@@ -153,7 +155,7 @@ def outlines(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
     return _templates(grid, faces, weight.astype(np.float32))
 
 
-class Learner:
+class TemplateLearner:
     """Averages what frames show of the units, each seen from the unit's own frame.
 
     Args:
@@ -165,7 +167,7 @@ class Learner:
 
     def __init__(self, grid: TemplateGrid, blur: float, pixel: float, kind: str) -> None:
         self._grid = grid
-        self._weight = shown(grid.inside, grid.joint, blur, pixel, kind)
+        self._weight = template_weight(grid.inside, grid.joint, blur, pixel, kind)
         outside = _REACH * blur + 0.5 * pixel
         self._wanted = [
             np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))
@@ -185,7 +187,7 @@ class Learner:
             photometry: (units, 4) gain, offset and slopes that the frame has over the template.
             share: (units,) weight of the units.
         """
-        coefs = coefficients(image.astype(np.float64))
+        coefs = spline_coefficients(image.astype(np.float64))
         grid = self._grid
         for unit in np.nonzero(np.isfinite(pose[:, 0]) & (share > 0))[0]:
             rows, columns = self._wanted[unit]
@@ -195,7 +197,9 @@ class Learner:
             points = place + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
             seen = camera.project(points)
             value = np.empty(len(x))
-            sample(coefs, np.ascontiguousarray(seen[:, 0]), np.ascontiguousarray(seen[:, 1]), value)
+            sample_spline(
+                coefs, np.ascontiguousarray(seen[:, 0]), np.ascontiguousarray(seen[:, 1]), value
+            )
             gain, offset, sx, sy = photometry[unit]
             value = (value - offset - (sx * x + sy * y) / grid.half) / gain
             good = np.isfinite(value)
@@ -212,7 +216,7 @@ class Learner:
         return _templates(self._grid, face.astype(np.float32), weight)
 
 
-def plane_of(camera: Camera) -> Singles:
+def pixel_plane(camera: Camera) -> Singles:
     """Place (rows, columns, 2) in the specimen's plane of every pixel, mm.
 
     Rows and columns are filled up to whole blocks, with places far from everything.

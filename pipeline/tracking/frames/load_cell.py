@@ -13,14 +13,14 @@ from pipeline.tracking.frames.recording import LoadCellLog
 from sim.core import Floats
 
 
-class Log(NamedTuple):
+class ForceLog(NamedTuple):
     """A load cell's log on the clock of the video's file: times (lines,) in s, forces in N."""
 
     clock: Floats
     force: Floats
 
 
-def read(path: Path, cell: LoadCellLog) -> Log:
+def read(path: Path, cell: LoadCellLog) -> ForceLog:
     """The log of a load cell.
 
     Args:
@@ -34,10 +34,10 @@ def read(path: Path, cell: LoadCellLog) -> Log:
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
-    return Log(clock - cell.offset, force)
+    return ForceLog(clock - cell.offset, force)
 
 
-def forces(log: Log, time: Floats) -> Floats:
+def forces(log: ForceLog, time: Floats) -> Floats:
     """The force (frames,) in N at the frames, linear between the log's lines, NaN beyond them.
 
     Where the log is finer than the video, it is averaged over the frame's interval first, so that
@@ -51,7 +51,7 @@ def forces(log: Log, time: Floats) -> Floats:
     return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
 
 
-def check(log: Log, time: Floats, path: Path, cell: LoadCellLog) -> None:
+def check(log: ForceLog, time: Floats, path: Path, cell: LoadCellLog) -> None:
     """Refuses a log that holds nothing of the video.
 
     Raises:

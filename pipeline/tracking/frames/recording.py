@@ -109,7 +109,7 @@ class Recording(Section):
         return self
 
 
-def load(path: Path) -> Recording:
+def load_recording(path: Path) -> Recording:
     """The recording in a YAML file.
 
     Raises:
@@ -118,7 +118,7 @@ def load(path: Path) -> Recording:
     return section(path, Recording)
 
 
-def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
+def recording_yaml(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
     """The YAML of a recording, after lines of comment.
 
     Args:

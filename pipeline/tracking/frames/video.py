@@ -64,7 +64,7 @@ class Frame:
     image: Picture
 
 
-def frames(
+def read_frames(
     path: Path, start: float = 0.0, end: float = float("inf"), rate: float | None = None
 ) -> Iterator[Frame]:
     """Decodes the video once, in sequence; nothing but the present frame is held.
@@ -89,7 +89,7 @@ def frames(
     yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
 
 
-def length(path: Path) -> int:
+def frame_count(path: Path) -> int:
     """Number of frames as the file has it, at least one; the window and faults may make it less."""
     if path.is_dir():
         return len(pictures(path))
@@ -101,7 +101,7 @@ def length(path: Path) -> int:
         return 1
 
 
-def uneven(time: Floats) -> bool:
+def has_uneven_intervals(time: Floats) -> bool:
     """Whether frames (frames,) s come at intervals that differ by more than stamps are rounded."""
     interval = np.diff(time)
     return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))

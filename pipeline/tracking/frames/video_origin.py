@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-WORD = "SYNTHETIC"
+SYNTHETIC_LABEL = "SYNTHETIC"
 """Stands in the title or comment of a video that was rendered."""
 
 
@@ -19,6 +19,6 @@ def rendered(video: Path) -> bool:
         return False
     try:
         with av.open(str(video)) as container:
-            return any(WORD in text for text in container.metadata.values())
+            return any(SYNTHETIC_LABEL in text for text in container.metadata.values())
     except av.FFmpegError:
         return False

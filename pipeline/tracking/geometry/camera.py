@@ -82,7 +82,7 @@ class Camera:
         return np.stack(ends, axis=-1)
 
 
-def fit(
+def fit_camera(
     points: Floats, pixels: Floats, size: tuple[int, int], sigma: float, start: Camera | None = None
 ) -> Camera:
     """The camera that sees the points at the pixels, by robust least squares.
@@ -96,7 +96,7 @@ def fit(
         start: a camera near the solution; by default the best homography.
     """
     if start is None:
-        start = Camera(homography(points, pixels), (np.array(size) - 1) / 2, np.zeros(2), size)
+        start = Camera(fit_homography(points, pixels), (np.array(size) - 1) / 2, np.zeros(2), size)
     span = np.abs(points - points.mean(axis=0)).max()
     scaling = np.array([1, 1, span, 1, 1, span, 1 / span, 1 / span]) / span
     unit = np.concatenate([scaling * start.scale, np.full(2, start.scale), np.ones(2)])
@@ -120,7 +120,7 @@ def fit(
     return camera(found.x)
 
 
-def homography(points: Floats, pixels: Floats) -> Floats:
+def fit_homography(points: Floats, pixels: Floats) -> Floats:
     """The homography (3, 3) between points and pixels (n, 2), n >= 4, linear least squares."""
     to_points, to_pixels = _normaliser(points), _normaliser(pixels)
     x, y = _apply(to_points, points).T

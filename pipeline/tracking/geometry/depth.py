@@ -63,7 +63,7 @@ class Depth(NamedTuple):
         return np.asarray(ring[:-1])
 
 
-def depth_of(camera: Camera, middle: Floats, thickness: float, distance: float) -> Depth:
+def estimate_depth(camera: Camera, middle: Floats, thickness: float, distance: float) -> Depth:
     """Where a camera at a known distance from the middle (2,) of the specimen stands.
 
     The homography alone tells the focal length badly when the camera looks straight on; with the

@@ -11,7 +11,7 @@ _TUKEY = 4.685
 _LEAST = 1e-9
 
 
-def swung(angle: Reals, arm: Reals) -> Reals:
+def arm_swing(angle: Reals, arm: Reals) -> Reals:
     """How far (..., 2) the ends of arms (..., 2) go when these turn by angles (...) in rad."""
     cos, sin = np.cos(angle) - 1, np.sin(angle)
     x, y = arm[..., 0], arm[..., 1]

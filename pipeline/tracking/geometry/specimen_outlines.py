@@ -75,7 +75,7 @@ def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
     return design.assign(vertices=vertices)
 
 
-def of_design(design: xr.Dataset) -> SpecimenOutlines:
+def outlines_of_design(design: xr.Dataset) -> SpecimenOutlines:
     """The specimen of a design dataset; units without vertices are absent."""
     vertices = design["vertices"].transpose("unit", "vertex", "xy").values
     present = ~np.isnan(vertices[:, 0, 0])

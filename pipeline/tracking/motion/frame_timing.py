@@ -29,7 +29,7 @@ _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
 
-def faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
+def timing_faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
     """The timing (frames,) of every frame.
 
     A frame that repeats the one before has no step where those about it have one. After a gap the

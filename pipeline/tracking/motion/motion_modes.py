@@ -28,7 +28,7 @@ _LITTLE_MORE = 1.3
 _JOLT = 3.0
 
 
-class Shapes(NamedTuple):
+class MotionModes(NamedTuple):
     """Motions taken apart.
 
     Attributes:
@@ -42,7 +42,7 @@ class Shapes(NamedTuple):
     rest: Floats
 
 
-def apart(motion: Floats, near: Ints, noise: float) -> Shapes:
+def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """The shapes of one degree of freedom.
 
     What is missing is filled in time first, then by the shapes themselves, until it stays.
@@ -61,7 +61,7 @@ def apart(motion: Floats, near: Ints, noise: float) -> Shapes:
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
         full = np.where(known, motion, low)
-    return Shapes(amplitude, shape, full - low)
+    return MotionModes(amplitude, shape, full - low)
 
 
 def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
@@ -94,13 +94,13 @@ def leverage(columns: Floats) -> Floats:
     return np.sum(np.linalg.qr(columns)[0] ** 2, axis=1)
 
 
-def steadiness(amplitude: Floats) -> float:
+def constant_share(amplitude: Floats) -> float:
     """Share of what stays the same in all frames that the amplitudes (frames, n) can take up."""
     basis = np.linalg.qr(amplitude)[0]
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def rough(amplitude: Floats, steady: Mask) -> Floats:
+def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
     """What amplitudes (frames, n) are off polynomials through those beside, in one frame's noise.
 
     The order is the lowest that leaves little more than the next ones: more is motion. A jolt is

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import Recovery
-from pipeline.tracking.fit import Fits, Fitter, Walls
+from pipeline.tracking.detect import Relocaliser
+from pipeline.tracking.fit import PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.prediction import Neighbourhood
 from sim.core import Floats, Ints, Mask
@@ -45,7 +45,7 @@ class TrackedFrame(NamedTuple):
         quality: (units,) GOOD or the reason.
     """
 
-    fits: Fits
+    fits: PoseFits
     quality: Ints
 
 
@@ -62,9 +62,9 @@ class Tracker:
     def __init__(
         self,
         specimen: SpecimenOutlines,
-        fitter: Fitter,
-        recovery: Recovery,
-        walls: Walls | None = None,
+        fitter: PoseFitter,
+        recovery: Relocaliser,
+        walls: SideWalls | None = None,
     ) -> None:
         self._fitter, self._recovery, self._walls = fitter, recovery, walls
         self._pitch = specimen.pitch
@@ -84,7 +84,7 @@ class Tracker:
         if self._walls is not None:
             self._walls.follow(ahead)
         found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
-        fits = Fits(*(values.copy() for values in found))
+        fits = PoseFits(*(values.copy() for values in found))
         first = not len(self._gain)
         if first:
             self._refer(fits)
@@ -100,7 +100,7 @@ class Tracker:
         self._remember(fits, good, first or jumped)
         return TrackedFrame(fits, quality)
 
-    def _refer(self, fits: Fits) -> None:
+    def _refer(self, fits: PoseFits) -> None:
         """Takes the first frame as what a unit seen whole looks like."""
         gain = np.abs(fits.photometry[:, 0])
         relative = fits.noise / gain
@@ -111,7 +111,7 @@ class Tracker:
         self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
         self._fitter.full = np.nan_to_num(fits.information)
 
-    def _judged(self, fits: Fits, share: float) -> Mask:
+    def _judged(self, fits: PoseFits, share: float) -> Mask:
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -119,21 +119,21 @@ class Tracker:
         seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
 
-    def _completed(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _completed(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
         if not good.any():
             return good
         return self._uncover(image, fits, self._spread(image, fits, good))
 
-    def _recovered(self, image: Picture, fits: Fits, good: Mask) -> tuple[Fits, Mask]:
+    def _recovered(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
-        again, new = Fits(*(values.copy() for values in fits)), np.zeros_like(good)
+        again, new = PoseFits(*(values.copy() for values in fits)), np.zeros_like(good)
         for guess in self._recovery.guesses(image, self._pose):
             new = self._tried(image, again, new, (guess, self._photometry, None, _SHARE))
         new = self._completed(image, again, new)
         return (again, new) if new.sum() > good.sum() else (fits, good)
 
-    def _spread(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _spread(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries the units that were not found where their neighbours would have carried them."""
         for _ in range(_ROUNDS):
             good &= ~self._neighbours.strayed(fits.pose, good, _STRAY * self._pitch)
@@ -150,7 +150,7 @@ class Tracker:
             good |= new
         return good
 
-    def _uncover(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _uncover(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries those again that may be hidden in part: place and brightness are known."""
         photometry = self._photometry * self._brighter(fits, good)
         tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
@@ -168,7 +168,7 @@ class Tracker:
     def _tried(
         self,
         image: Picture,
-        fits: Fits,
+        fits: PoseFits,
         good: Mask,
         trial: tuple[Floats, Floats, Floats | None, float],
     ) -> Mask:
@@ -179,13 +179,13 @@ class Tracker:
             return good
         again = self._fitter.fit(image, guess, photometry, wanted, tight)
         new = self._judged(again, least) & wanted
-        both = Fits(*(values.copy() for values in fits))
+        both = PoseFits(*(values.copy() for values in fits))
         _take(both, again, new)
         new &= ~self._neighbours.strayed(both.pose, good | new, _STRAY * self._pitch)
         _take(fits, again, new)
         return good | new
 
-    def _guesses(self, fits: Fits, good: Mask) -> Iterator[Floats]:
+    def _guesses(self, fits: PoseFits, good: Mask) -> Iterator[Floats]:
         """Poses that hidden units may have: carried on, or stretched with those that are seen.
 
         Units of these lattices turn with or against their neighbours, so both are tried.
@@ -201,13 +201,13 @@ class Tracker:
         for angle in (turn, -turn, np.zeros_like(turn)):
             yield np.column_stack([place, angle])
 
-    def _brighter(self, fits: Fits, good: Mask) -> float:
+    def _brighter(self, fits: PoseFits, good: Mask) -> float:
         """How much brighter the frame is than the one before."""
         if not good.any():
             return 1.0
         return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
 
-    def _reasons(self, fits: Fits, good: Mask) -> Ints:
+    def _reasons(self, fits: PoseFits, good: Mask) -> Ints:
         place = self._centre + self._pose[:, :2]
         middle = self._fitter.camera.project(place)
         width, height = self._fitter.camera.size
@@ -220,7 +220,7 @@ class Tracker:
         reasons[good] = GOOD
         return reasons
 
-    def _remember(self, fits: Fits, good: Mask, still: bool) -> None:
+    def _remember(self, fits: PoseFits, good: Mask, still: bool) -> None:
         carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
         lost = np.where(np.isfinite(carried), carried, self._pose)
         pose = np.where(good[:, None], fits.pose, lost)
@@ -234,6 +234,6 @@ class Tracker:
         self._pose = pose
 
 
-def _take(fits: Fits, other: Fits, chosen: Mask) -> None:
+def _take(fits: PoseFits, other: PoseFits, chosen: Mask) -> None:
     for values, new in zip(fits, other, strict=True):
         values[chosen] = new[chosen]

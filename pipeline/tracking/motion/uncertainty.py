@@ -41,7 +41,7 @@ def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
     return np.sqrt(variance)
 
 
-def calibrated(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
+def calibrate_sigma(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
     """The standard uncertainties, scaled so that they tell the scatter of the motions.
 
     Args:
@@ -82,7 +82,7 @@ def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
     usual = np.full(motion.shape, np.sqrt(_USUAL))
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
         return usual
-    found = motion_modes.apart(motion, near, float(np.nanmedian(sigma)))
+    found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
     ratio = _ratio(np.isfinite(motion), sigma, found, steady)
     if not np.isfinite(ratio).any():
         return usual
@@ -90,15 +90,15 @@ def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
     by_frame = _shrunk(ratio, level, 1)
     by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
     belief = (level * len(ratio) + _USUAL * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
-    reference = motion_modes.steadiness(found.amplitude)
+    reference = motion_modes.constant_share(found.amplitude)
     return np.sqrt(by_frame[:, None] * by_unit[None, :] * belief / level + reference)
 
 
-def _ratio(known: Mask, sigma: Floats, found: motion_modes.Shapes, steady: Mask) -> Floats:
+def _ratio(known: Mask, sigma: Floats, found: motion_modes.MotionModes, steady: Mask) -> Floats:
     """Squared noise over the image's variance (frames, units), NaN where there is none to see."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
-    jitter = motion_modes.rough(found.amplitude, steady) @ found.shape
+    jitter = motion_modes.amplitude_jitter(found.amplitude, steady) @ found.shape
     spread = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM) + jitter**2
     ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
     if not np.isfinite(ratio).any():

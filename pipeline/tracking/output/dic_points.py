@@ -15,17 +15,17 @@ from pipeline.problem.fields import Angle, Coordinate, Section
 from pipeline.problem.reading import section
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import csv_columns as columns
-from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
-from pipeline.tracking.output.track_dataset import absent, labelled, spread
+from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design, robust_motion
+from pipeline.tracking.output.track_dataset import absent_flag, label_track, over_all_units
 from sim.core import Floats, Ints
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
 _LEAST = 3  # points of a unit
 
-Name = Annotated[str, Field(min_length=1)]
+ColumnName = Annotated[str, Field(min_length=1)]
 
 
-class Columns(Section):
+class DicColumns(Section):
     """Names of the columns.
 
     Attributes:
@@ -36,14 +36,14 @@ class Columns(Section):
         uy: likewise.
     """
 
-    time: Name = "time"
-    x: Name = "x"
-    y: Name = "y"
-    ux: Name = "u"
-    uy: Name = "v"
+    time: ColumnName = "time"
+    x: ColumnName = "x"
+    y: ColumnName = "y"
+    ux: ColumnName = "u"
+    uy: ColumnName = "v"
 
 
-class Points(Section):
+class DicExport(Section):
     """A file of points, and how its axes lie on the specimen.
 
     Attributes:
@@ -59,17 +59,17 @@ class Points(Section):
     """
 
     title: str = ""
-    points: Name
-    columns: Columns = Columns()
+    points: ColumnName
+    columns: DicColumns = DicColumns()
     origin: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     rotation: Angle = 0.0
     flipped: bool = False
-    design: Name | None = None
+    design: ColumnName | None = None
     structure: Literal["intact", "altered", "cloaked"] = "cloaked"
     synthetic: bool = False
 
 
-class Cloud(NamedTuple):
+class DicPoints(NamedTuple):
     """Points in the specimen's frame, one row a point and time.
 
     Attributes:
@@ -83,16 +83,16 @@ class Cloud(NamedTuple):
     moved: Floats
 
 
-def load(path: Path) -> Points:
+def load(path: Path) -> DicExport:
     """The description in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Points)
+    return section(path, DicExport)
 
 
-def cloud(path: Path, asked: Points) -> Cloud:
+def read_points(path: Path, asked: DicExport) -> DicPoints:
     """The points of a file in the specimen's frame.
 
     Raises:
@@ -104,10 +104,10 @@ def cloud(path: Path, asked: Points) -> Cloud:
     upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
     turn = np.array([[cos, -sin], [sin, cos]])
     place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn
-    return Cloud(table[:, 0], place, table[:, 3:5] * upright @ turn)
+    return DicPoints(table[:, 0], place, table[:, 3:5] * upright @ turn)
 
 
-def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
+def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
     """The dataset ``track`` of points: a robust rigid fit for each unit and time.
 
     A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
@@ -120,7 +120,7 @@ def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
     Raises:
         UserError: hardly a unit bears points.
     """
-    specimen = of_design(design)
+    specimen = outlines_of_design(design)
     unit = _bearer(specimen, seen.place)
     bearing = len(np.unique(unit[unit >= 0]))
     if bearing < max(3, specimen.count // 10):
@@ -179,9 +179,9 @@ def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) ->
     pose, frames = ("time", "unit", "dof"), ("time",)
     unknown = np.full(len(time), np.nan)
     variables = {
-        "displacement": (pose, spread(motion, present, np.nan)),
-        "sigma": (pose, spread(sigma, present, np.nan)),
-        "quality": (pose[:2], spread(quality, present, absent())),
+        "displacement": (pose, over_all_units(motion, present, np.nan)),
+        "sigma": (pose, over_all_units(sigma, present, np.nan)),
+        "quality": (pose[:2], over_all_units(quality, present, absent_flag())),
         "timing": (frames, np.zeros(len(time), np.int8)),
         "frame": (frames, np.arange(len(time))),
         "load_force": (frames, unknown),
@@ -192,4 +192,4 @@ def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) ->
         "image_size": (("xy",), np.zeros(2, int)),
         "blur": ((), np.nan),
     }
-    return labelled(design, time, variables)
+    return label_track(design, time, variables)

@@ -27,9 +27,9 @@ def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None
     residual = np.full((design.sizes["unit"], 2), np.nan)
     residual[present] = track.calibration.residual
     variables = {
-        "displacement": (_MOTION, spread(track.displacement, present, np.nan)),
-        "sigma": (_MOTION, spread(track.sigma, present, np.nan)),
-        "quality": (_MOTION[:2], spread(track.quality, present, absent())),
+        "displacement": (_MOTION, over_all_units(track.displacement, present, np.nan)),
+        "sigma": (_MOTION, over_all_units(track.sigma, present, np.nan)),
+        "quality": (_MOTION[:2], over_all_units(track.quality, present, absent_flag())),
         "timing": (("time",), track.timing.astype(np.int8)),
         "frame": (("time",), track.frame),
         "load_force": (("time",), np.full(len(track.time), np.nan) if force is None else force),
@@ -40,10 +40,10 @@ def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None
         "image_size": (("xy",), np.array(camera.size)),
         "blur": ((), track.calibration.blur / pixel),
     }
-    return labelled(design, track.time, variables)
+    return label_track(design, track.time, variables)
 
 
-def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
+def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
     """Variables of a track with the labels of the design's units, and how far these are driven."""
     coordinates = {
         **{name: design[name] for name in ("unit", "i", "j", "xy")},
@@ -51,24 +51,24 @@ def labelled(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) 
         "dof": (("dof",), ["ux", "uy", "theta"]),
     }
     made = xr.Dataset({"vertices": design["vertices"], **variables}, coordinates)
-    driven = made["displacement"].values[:, is_driven(design), :2]
-    return made.assign_coords(drive_displacement=(("time", "xy"), mean_seen(driven)))
+    driven = made["displacement"].values[:, driven_units(design), :2]
+    return made.assign_coords(drive_displacement=(("time", "xy"), mean_over_seen(driven)))
 
 
-def is_driven(design: xr.Dataset) -> Mask:
+def driven_units(design: xr.Dataset) -> Mask:
     """Which units (units,) of the design are driven."""
     flag = TABLES["design"]["support"].flags["driven"]
     return np.asarray(design["support"].values == flag)
 
 
-def mean_seen(motion: Floats) -> Floats:
+def mean_over_seen(motion: Floats) -> Floats:
     """Mean (frames, 2) over those of the units (frames, units, 2) that are seen; NaN without."""
     seen = np.isfinite(motion[..., :1])
     total = np.where(seen, motion, 0.0).sum(axis=1)
     return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
 
 
-def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
+def over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
     """Values (frames, present units, ...) over all units."""
     if present.all():
         return values
@@ -77,6 +77,6 @@ def spread(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
     return out
 
 
-def absent() -> int:
+def absent_flag() -> int:
     """The quality of a unit that the structure does not have."""
     return TABLES["track"]["quality"].flags["absent"]

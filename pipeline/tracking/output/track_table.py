@@ -15,7 +15,7 @@ _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_
 _LOADS = ("load_N", "drive_x_mm", "drive_y_mm")
 
 
-def write(track: xr.Dataset, path: Path) -> None:
+def write_track_table(track: xr.Dataset, path: Path) -> None:
     """One line a frame and unit, absent units left out; empty where there is no value.
 
     Raises:

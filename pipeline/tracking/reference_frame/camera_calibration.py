@@ -8,9 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import Sighting, refined
-from pipeline.tracking.fit import Fits, Fitter, TemplateGrid, Templates, outlines, plane_of
-from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, depth_of
+from pipeline.tracking.detect import LatticeDetection, with_distortion
+from pipeline.tracking.fit import (
+    PoseFits,
+    PoseFitter,
+    TemplateGrid,
+    Templates,
+    outline_templates,
+    pixel_plane,
+)
+from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, estimate_depth
 from pipeline.tracking.geometry import camera as cameras
 from sim.core import Floats, Ints
 
@@ -49,10 +56,10 @@ class CameraCalibration(NamedTuple):
     residual: Floats
     depth: Depth | None
     bright: bool
-    outlines: Fits
+    outlines: PoseFits
 
 
-class Setup(NamedTuple):
+class RecordingSetup(NamedTuple):
     """What is known of the set-up.
 
     Attributes:
@@ -70,8 +77,8 @@ class Setup(NamedTuple):
     mirrored: bool | None = None
 
 
-def calibrate(
-    image: Picture, specimen: SpecimenOutlines, sighting: Sighting, setup: Setup
+def calibrate_camera(
+    image: Picture, specimen: SpecimenOutlines, sighting: LatticeDetection, setup: RecordingSetup
 ) -> CameraCalibration:
     """Refines the camera of a sighting on the outlines of all units.
 
@@ -79,9 +86,9 @@ def calibrate(
     is their own tolerance and stays in the residual. Where the set-up tells of thick units, their
     outlines are those of faces and walls together, if that is what the frame shows.
     """
-    sighting = refined(specimen, sighting)
+    sighting = with_distortion(specimen, sighting)
     pixel, gain = _pixel(specimen, sighting.camera), _gain(image, sighting)
-    plane, some = plane_of(sighting.camera), _few(specimen)
+    plane, some = pixel_plane(sighting.camera), _few(specimen)
 
     def fitted(depth: Depth | None) -> tuple[float, float, TemplateGrid]:
         reach = (3 * max(BLURS) + 2) * pixel + _furthest(specimen, depth)
@@ -89,7 +96,7 @@ def calibrate(
         few = grid.of(some)
 
         def misfit(blur: float) -> float:
-            fitter = Fitter(sighting.camera, outlines(few, blur * pixel, pixel), plane)
+            fitter = PoseFitter(sighting.camera, outline_templates(few, blur * pixel, pixel), plane)
             return _misfit(image, fitter, gain)
 
         return *_lowest(misfit, BLURS), grid
@@ -99,11 +106,11 @@ def calibrate(
     if setup.thickness > 0:
         middle, told = specimen.centre.mean(axis=0), setup.distance
         for distance in _DISTANCES if told is None else (told,):
-            thick = depth_of(sighting.camera, middle, setup.thickness, distance)
+            thick = estimate_depth(sighting.camera, middle, setup.thickness, distance)
             with_walls = fitted(thick)
             if with_walls[0] < least:
                 depth, (least, blur, grid) = thick, with_walls
-    templates = outlines(grid, blur * pixel, pixel)
+    templates = outline_templates(grid, blur * pixel, pixel)
     camera, residual, fits = _refined(image, specimen, sighting.camera, templates, gain)
     return CameraCalibration(
         camera, grid, blur * pixel, pixel, residual, depth, sighting.bright, fits
@@ -118,21 +125,23 @@ def _furthest(specimen: SpecimenOutlines, depth: Depth | None) -> float:
     return 1.5 * float(np.linalg.norm(offset, axis=1).max())
 
 
-def alike(image: Picture, specimen: SpecimenOutlines, sightings: list[Sighting]) -> list[Sighting]:
+def best_orientations(
+    image: Picture, specimen: SpecimenOutlines, sightings: list[LatticeDetection]
+) -> list[LatticeDetection]:
     """Those of several ways to see a specimen that its outlines fit as well as any."""
     if len(sightings) == 1:
         return sightings
     pixel = _pixel(specimen, sightings[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
-    templates = outlines(grid, _USUAL_BLUR * pixel, pixel)
+    templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
     wrong = [_unlikeness(image, templates, one) for one in sightings]
     least = min(wrong)
     return [one for one, found in zip(sightings, wrong, strict=True) if found <= _ALIKE * least]
 
 
-def _unlikeness(image: Picture, templates: Templates, sighting: Sighting) -> float:
+def _unlikeness(image: Picture, templates: Templates, sighting: LatticeDetection) -> float:
     """Residuals of the outlines times their rotations: outlines of others are turned to fit."""
-    fits = _outlined(image, Fitter(sighting.camera, templates), _gain(image, sighting))
+    fits = _outlined(image, PoseFitter(sighting.camera, templates), _gain(image, sighting))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
         return np.inf
@@ -144,22 +153,22 @@ def _few(specimen: SpecimenOutlines) -> Ints:
     return np.arange(0, specimen.count, -(-specimen.count // _SOME))
 
 
-def _gain(image: Picture, sighting: Sighting) -> float:
+def _gain(image: Picture, sighting: LatticeDetection) -> float:
     low, high = np.percentile(image, [5, 95])
     return float(high - low) * (1 if sighting.bright else -1)
 
 
-def _misfit(image: Picture, fitter: Fitter, gain: float) -> float:
+def _misfit(image: Picture, fitter: PoseFitter, gain: float) -> float:
     """Median of the residuals over the gain; infinite for units that cannot be fitted."""
     return _relative(_outlined(image, fitter, gain))
 
 
-def _relative(fits: Fits) -> float:
+def _relative(fits: PoseFits) -> float:
     ratio = fits.noise / np.abs(fits.photometry[:, 0])
     return float(np.median(np.where(np.isfinite(ratio), ratio, np.inf)))
 
 
-def _outlined(image: Picture, fitter: Fitter, gain: float) -> Fits:
+def _outlined(image: Picture, fitter: PoseFitter, gain: float) -> PoseFits:
     """Fits of all units, from where the design has them."""
     return fitter.fit(image, *fitter.start(gain))
 
@@ -171,14 +180,16 @@ def _pixel(specimen: SpecimenOutlines, camera: Camera) -> float:
 
 def _refined(
     image: Picture, specimen: SpecimenOutlines, camera: Camera, templates: Templates, gain: float
-) -> tuple[Camera, Floats, Fits]:
+) -> tuple[Camera, Floats, PoseFits]:
     """The camera that sees the outlines where they are, what is left (units, 2), px, and fits."""
-    fits = _outlined(image, Fitter(camera, templates), gain)
+    fits = _outlined(image, PoseFitter(camera, templates), gain)
     for _ in range(_ROUNDS):
         good = np.isfinite(fits.pose[:, 0])
         seen = camera.project(specimen.centre + fits.pose[:, :2])
-        camera = cameras.fit(specimen.centre[good], seen[good], camera.size, _EDGE_SIGMA, camera)
-        fits = _outlined(image, Fitter(camera, templates), gain)
+        camera = cameras.fit_camera(
+            specimen.centre[good], seen[good], camera.size, _EDGE_SIGMA, camera
+        )
+        fits = _outlined(image, PoseFitter(camera, templates), gain)
     seen = camera.project(specimen.centre + fits.pose[:, :2])
     return camera, seen - camera.project(specimen.centre), fits
 

@@ -11,15 +11,19 @@ import numpy as np
 import xarray as xr
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.detect import Sighting, shown_on
-from pipeline.tracking.geometry import SpecimenOutlines, as_built, of_design
-from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, calibrate
+from pipeline.tracking.detect import LatticeDetection, classify_markings
+from pipeline.tracking.geometry import SpecimenOutlines, as_built, outlines_of_design
+from pipeline.tracking.reference_frame.camera_calibration import (
+    CameraCalibration,
+    RecordingSetup,
+    calibrate_camera,
+)
 from pipeline.tracking.reference_frame.recognition import (
-    agreeing,
-    ambiguous,
-    check,
-    inside,
-    recognised,
+    agreeing_outlines,
+    ambiguity_text,
+    check_outlines,
+    recognise,
+    units_in_frame,
 )
 from sim.core import Floats, Image
 
@@ -41,7 +45,7 @@ class Proposal(NamedTuple):
 
     structure: str
     specimen: SpecimenOutlines
-    sighting: Sighting
+    sighting: LatticeDetection
     kind: str
     pixel_size: float
     doubts: tuple[str, ...]
@@ -64,9 +68,9 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
     best = max(seen, key=_share)
     specimen, calibration = best.specimen, best.calibration
     sighting = replace(best.ways[0], camera=calibration.camera)
-    check(specimen, sighting, calibration)
+    check_outlines(specimen, sighting, calibration)
     like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
-    kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
+    kind = classify_markings(image, specimen, sighting, 1 / calibration.pixel)
     doubts = tuple(_doubts(best, like))
     return Proposal(best.name, specimen, sighting, kind, calibration.pixel, doubts)
 
@@ -76,7 +80,7 @@ class _Candidate(NamedTuple):
 
     name: str
     specimen: SpecimenOutlines
-    ways: list[Sighting]
+    ways: list[LatticeDetection]
     calibration: CameraCalibration
 
 
@@ -84,7 +88,7 @@ def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
     """Every structure of the design that differs from those before."""
     tried: list[SpecimenOutlines] = []
     for name in ("cloaked", "altered", "intact"):
-        specimen = of_design(as_built(design, name))
+        specimen = outlines_of_design(as_built(design, name))
         if not any(
             np.array_equal(specimen.ids, one.ids) and _alike(specimen, one) for one in tried
         ):
@@ -95,8 +99,10 @@ def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
 def _candidate(
     image: Picture, name: str, specimen: SpecimenOutlines, px_per_mm: float | None
 ) -> _Candidate:
-    ways = recognised(image, specimen, px_per_mm, Setup())
-    return _Candidate(name, specimen, ways, calibrate(image, specimen, ways[0], Setup()))
+    ways = recognise(image, specimen, px_per_mm, RecordingSetup())
+    return _Candidate(
+        name, specimen, ways, calibrate_camera(image, specimen, ways[0], RecordingSetup())
+    )
 
 
 def _alike(one: SpecimenOutlines, other: SpecimenOutlines) -> bool:
@@ -105,8 +111,8 @@ def _alike(one: SpecimenOutlines, other: SpecimenOutlines) -> bool:
 
 def _share(one: _Candidate) -> float:
     """Part of the units that are as this structure has them, less what it does not have."""
-    there = inside(one.specimen, one.calibration)
-    fitting = agreeing(one.specimen, one.calibration.outlines) & there
+    there = units_in_frame(one.specimen, one.calibration)
+    fitting = agreeing_outlines(one.specimen, one.calibration.outlines) & there
     return float(fitting.sum() / max(there.sum(), 1)) - _more(one) / one.specimen.count
 
 
@@ -123,14 +129,14 @@ def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
     if missing := best.specimen.count - len(best.ways[0].unit):
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
-    if doubt := ambiguous(best.ways):
+    if doubt := ambiguity_text(best.ways):
         yield f"turned, mirrored: {doubt}"
     yield "window: whether the specimen is at rest in the first frame"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"
 
 
-def picture(image: Picture, found: Proposal, note: str = "") -> Image:
+def draw_proposal(image: Picture, found: Proposal, note: str = "") -> Image:
     """The frame with the outlines of all units and their ids; orange where none was found.
 
     Args:

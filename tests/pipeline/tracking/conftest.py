@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import frames, import_video
-from pipeline.tracking.geometry import SpecimenOutlines, of_design
-from pipeline.tracking.motion import Track, follow
+from pipeline.tracking.frames import import_video, read_frames
+from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
+from pipeline.tracking.motion import Track, track_video
 
 CLIPS = Path(__file__).parents[2] / "data/tracking"
 
@@ -30,9 +30,9 @@ def tracked() -> Callable[[str], Tracked]:
     @cache
     def of(name: str) -> Tracked:
         described = import_video.description(CLIPS / f"{name}.yaml")
-        specimen = of_design(import_video.design(described))
+        specimen = outlines_of_design(import_video.design(described))
         video = import_video.video_of(CLIPS / f"{name}.yaml")
-        track = follow(frames(video), specimen, described["approx_px_per_mm"])
+        track = track_video(read_frames(video), specimen, described["approx_px_per_mm"])
         truth = np.load(CLIPS / f"{name}_truth.npz")["displacement"]
         scale = np.array([1 / track.calibration.pixel] * 2 + [180 / np.pi])
         return Tracked(specimen, track, (track.displacement - truth) * scale)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import frames, import_video
+from pipeline.tracking.frames import import_video, read_frames
 from tests.pipeline.tracking.conftest import CLIPS, Tracked
 
 Clips = Callable[[str], Tracked]
@@ -48,7 +48,7 @@ def test_speckled_units_agree_with_an_independent_correlation(tracked: Clips) ->
     """OpenCV's ECC on a crop about each of some units, as a Euclidean motion of the image."""
     found = tracked("e_speckle")
     video = import_video.video_of(CLIPS / "e_speckle.yaml")
-    images = [frame.image for frame in frames(video)]
+    images = [frame.image for frame in read_frames(video)]
     camera, last = found.track.calibration.camera, len(images) - 1
     everywhere = np.full_like(images[0], 255)
     half = int(0.33 * found.specimen.pitch / found.track.calibration.pixel)

@@ -10,8 +10,8 @@ from types import ModuleType
 import pytest
 from numba.core.registry import CPUDispatcher
 
-MODULES = ("blocks", "cells", "dense", "patch", "spline")
-NAMES = [*(f"pipeline.tracking.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
+MODULES = ("normal_equations", "patch_correlation", "template", "template_cells")
+NAMES = [*(f"pipeline.tracking.fit.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
 
 
 def loops(module: ModuleType) -> Iterator[CPUDispatcher]:

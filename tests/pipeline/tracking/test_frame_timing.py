@@ -25,7 +25,7 @@ def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
 
 def faults(clock: np.ndarray, time: np.ndarray | None = None) -> dict[int, int]:
     moved = motion(clock)
-    told = frame_timing.faults(
+    told = frame_timing.timing_faults(
         np.arange(len(clock)) / 30 if time is None else time, moved, np.full(moved.shape, NOISE)
     )
     return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
@@ -53,7 +53,7 @@ def test_frames_shown_again_are_found() -> None:
     clock[25:] -= 1
     moved = motion(clock)
     moved[25] = moved[24]
-    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    told = frame_timing.timing_faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
     assert np.flatnonzero(told).tolist() == [25]
     assert told[25] == frame_timing.DUPLICATE
 
@@ -64,7 +64,7 @@ def test_the_onset_of_motion_is_no_fault(step: float) -> None:
     clock = np.maximum(np.arange(FRAMES) - 20.0, 0.02 * (np.arange(FRAMES) - 20.0))
     moved = step * clock[:, None, None] * (1 + CENTRE[:, :1] / 60) * np.array([1.0, -0.3, 0.01])
     moved += NOISE * np.random.default_rng(1).normal(size=moved.shape)
-    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    told = frame_timing.timing_faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
     assert np.flatnonzero(told).tolist() == []
 
 
@@ -80,7 +80,7 @@ def test_faults_of_a_quick_wave_are_found() -> None:
     clock[15:] += 1
     clock[40:] -= 1
     moved = wave(clock)
-    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    told = frame_timing.timing_faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
     assert {int(frame): int(told[frame]) for frame in np.flatnonzero(told)} == {
         15: frame_timing.DROPPED,
         40: frame_timing.DUPLICATE,
@@ -92,7 +92,7 @@ def test_the_turning_points_of_a_swing_are_no_faults(frames: int) -> None:
     moved = np.zeros((FRAMES, len(CENTRE), 3))
     moved[..., 0] = np.cos(2 * np.pi * (np.arange(FRAMES)[:, None] - 0.5) / frames)
     moved += NOISE * np.random.default_rng(2).normal(size=moved.shape)
-    told = frame_timing.faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
+    told = frame_timing.timing_faults(np.arange(FRAMES) / 30, moved, np.full(moved.shape, NOISE))
     assert not told.any()
 
 
@@ -100,7 +100,7 @@ def test_stated_uncertainty_is_that_of_the_noise() -> None:
     clock = np.arange(FRAMES, dtype=float)
     moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
     moved[20:30, 5] = np.nan
-    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE / 5), CENTRE, steady)
+    told = uncertainty.calibrate_sigma(moved, np.full(moved.shape, NOISE / 5), CENTRE, steady)
     assert np.median(told) == pytest.approx(NOISE, rel=0.15)
 
 
@@ -109,11 +109,11 @@ def test_units_that_are_seen_badly_say_so() -> None:
     clock = np.arange(FRAMES, dtype=float)
     moved, steady = motion(clock), np.ones(FRAMES, dtype=bool)
     moved[:, 9] += 4 * NOISE * random.normal(size=moved[:, 9].shape)
-    told = uncertainty.calibrated(moved, np.full(moved.shape, NOISE), CENTRE, steady)
+    told = uncertainty.calibrate_sigma(moved, np.full(moved.shape, NOISE), CENTRE, steady)
     assert np.median(told[:, 9]) > 2.5 * np.median(told)
 
 
 def test_a_varying_rate_is_told_from_rounded_stamps() -> None:
     steady = np.arange(FRAMES) / 30
-    assert not video.uneven(np.round(steady, 3))
-    assert video.uneven(np.delete(steady, [7, 30]))
+    assert not video.has_uneven_intervals(np.round(steady, 3))
+    assert video.has_uneven_intervals(np.delete(steady, [7, 30]))

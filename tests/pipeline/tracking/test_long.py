@@ -7,9 +7,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from pipeline.tracking.frames import Frame, frames, import_video
-from pipeline.tracking.geometry import of_design
-from pipeline.tracking.motion import follow
+from pipeline.tracking.frames import Frame, import_video, read_frames
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.motion import track_video
 from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
 from tests.pipeline.tracking.conftest import CLIPS
 
@@ -19,7 +19,7 @@ _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:
     """Bytes that the frames of a clip take at most, which is looped; each is fitted once."""
     described = import_video.description(CLIPS / "f_silhouette.yaml")
-    images = [frame.image for frame in frames(CLIPS / "f_silhouette.mp4")][:3]
+    images = [frame.image for frame in read_frames(CLIPS / "f_silhouette.mp4")][:3]
     fitted: list[TrackedFrame] = []
     step, count = Tracker.step, iter(range(length))
 
@@ -36,7 +36,7 @@ def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:
         if not tracemalloc.is_tracing():
             tracemalloc.start()
 
-    made = follow(shown, of_design(import_video.design(described)), 2.7, tell)
+    made = track_video(shown, outlines_of_design(import_video.design(described)), 2.7, tell)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     monkeypatch.undo()

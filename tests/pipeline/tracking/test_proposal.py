@@ -10,14 +10,14 @@ import pytest
 
 from pipeline import datasets
 from pipeline.stages import track
-from pipeline.tracking.detect import placed
-from pipeline.tracking.frames import frames, import_video, recording
+from pipeline.tracking.detect import orientation_text
+from pipeline.tracking.frames import import_video, read_frames, recording
 from pipeline.tracking.reference_frame import proposal
 from tests.pipeline.tracking.conftest import CLIPS
 
 
 def first(name: str) -> np.ndarray:
-    return next(frames(import_video.video_of(CLIPS / f"{name}.yaml"))).image
+    return next(read_frames(import_video.video_of(CLIPS / f"{name}.yaml"))).image
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
 def test_a_mirrored_video_is_seen_as_such() -> None:
     design = import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))
     found = proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
-    assert "mirrored" in placed(found.sighting.camera)
+    assert "mirrored" in orientation_text(found.sighting.camera)
 
 
 def test_a_proposal_is_a_recording_and_a_picture(
@@ -48,7 +48,7 @@ def test_a_proposal_is_a_recording_and_a_picture(
     words += ["--design", str(tmp_path / "f_silhouette_design.nc")]
     assert track.main(words) == 0
     assert "not told: case" in capsys.readouterr().err
-    made = recording.load(tmp_path / "f_silhouette.yaml")
+    made = recording.load_recording(tmp_path / "f_silhouette.yaml")
     assert (tmp_path / str(made.video)).resolve() == (CLIPS / "f_silhouette.mp4").resolve()
     datasets.read(tmp_path / str(made.design), "design")
     drawn = cv2.imread(str(tmp_path / "f_silhouette_units.png"))
@@ -73,4 +73,4 @@ def test_a_turned_video_is_seen_as_such() -> None:
     assert len(proposal.propose(below, cut, 2.74).sighting.unit) == 210
     turned = proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74).sighting
     assert len(turned.unit) == 210
-    assert "90 deg" in placed(turned.camera)
+    assert "90 deg" in orientation_text(turned.camera)

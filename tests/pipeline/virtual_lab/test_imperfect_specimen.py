@@ -12,12 +12,12 @@ import yaml
 from pipeline import datasets, problem
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.problem import Problem
-from pipeline.problem.sections import Shaking
+from pipeline.problem.sections import DriveFaults
 from pipeline.runtime import UserError
 from pipeline.stages import film, track, virtual_specimen
 from pipeline.tracking.frames import Recording, load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
-from pipeline.virtual_lab.imperfect_specimen import Shaken, shaken
+from pipeline.virtual_lab.imperfect_specimen import ImperfectDrive, imperfect_drive
 from sim.scene import Scene
 from tests.pipeline import static
 from tests.pipeline.virtual_lab.conftest import SETUP
@@ -41,8 +41,8 @@ def made(study: tuple[Problem, Scene], **asked: object) -> xr.Dataset:
     return virtual_specimen.dataset(study[0], held, Recording.model_validate(described))
 
 
-def drive(scene: Scene, **asked: object) -> Shaken:
-    return shaken(scene, 0, Shaking.model_validate(asked), 1.0, unload=False)
+def drive(scene: Scene, **asked: object) -> ImperfectDrive:
+    return imperfect_drive(scene, 0, DriveFaults.model_validate(asked), 1.0, unload=False)
 
 
 def test_a_drive_without_faults_is_the_planned_one(study: tuple[Problem, Scene]) -> None:

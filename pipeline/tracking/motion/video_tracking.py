@@ -11,26 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.detect import Recovery, Sighting, placed, shown_on
-from pipeline.tracking.fit import Fitter, Learner, Walls
+from pipeline.tracking.detect import (
+    LatticeDetection,
+    Relocaliser,
+    classify_markings,
+    orientation_text,
+)
+from pipeline.tracking.fit import PoseFitter, SideWalls, TemplateLearner
 from pipeline.tracking.frames import BrokenOffError, Frame
-from pipeline.tracking.geometry import SpecimenOutlines, swung
+from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import frame_timing as timing
 from pipeline.tracking.motion import uncertainty
 from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
-    Setup,
-    ambiguous,
-    calibrate,
-    check,
-    recognised,
+    RecordingSetup,
+    ambiguity_text,
+    calibrate_camera,
+    check_outlines,
+    recognise,
 )
 from sim.core import Floats, Ints, Reals, Singles
 
 LOG = logging.getLogger(__name__)
 
-_USUAL = Setup()
+_USUAL = RecordingSetup()
 _End = BrokenOffError | KeyboardInterrupt
 
 
@@ -60,12 +65,12 @@ class Track(NamedTuple):
     ended: _End | None
 
 
-def follow(
+def track_video(
     frames: Iterator[Frame],
     specimen: SpecimenOutlines,
     px_per_mm: float | None = None,
     tell: Callable[[], None] | None = None,
-    setup: Setup = _USUAL,
+    setup: RecordingSetup = _USUAL,
 ) -> Track:
     """Tracks the specimen; what is kept of a frame are its poses, so memory hardly grows.
 
@@ -82,13 +87,13 @@ def follow(
     first = next(frames, None)
     if first is None:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
-    ways = recognised(first.image, specimen, px_per_mm, setup)
-    if doubt := ambiguous(ways):
+    ways = recognise(first.image, specimen, px_per_mm, setup)
+    if doubt := ambiguity_text(ways):
         LOG.info(doubt)
     sighting = ways[0]
-    calibration = calibrate(first.image, specimen, sighting, setup)
-    check(specimen, sighting, calibration)
-    if (lies := placed(calibration.camera)) != "upright":
+    calibration = calibrate_camera(first.image, specimen, sighting, setup)
+    check_outlines(specimen, sighting, calibration)
+    if (lies := orientation_text(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", lies)
     off_place = _off_place(first.image, specimen, sighting, calibration, setup.kind)
     tracker = tracker_of(first.image, specimen, calibration, setup.kind)
@@ -98,10 +103,10 @@ def follow(
     )
     del rows, tracker
     motion -= np.where(np.isfinite(motion[0]), motion[0], 0)
-    motion[..., :2] += swung(motion[..., 2], off_place)
+    motion[..., :2] += arm_swing(motion[..., 2], off_place)
     time = times - times[0]
-    faults = timing.faults(time, motion, sigmas)
-    sigma = uncertainty.calibrated(motion, sigmas, specimen.centre, faults == timing.STEADY)
+    faults = timing.timing_faults(time, motion, sigmas)
+    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, faults == timing.STEADY)
     sigma[~np.isfinite(motion)] = np.nan
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
@@ -110,7 +115,7 @@ def follow(
 def _off_place(
     image: Picture,
     specimen: SpecimenOutlines,
-    sighting: Sighting,
+    sighting: LatticeDetection,
     calibration: CameraCalibration,
     kind: str,
 ) -> Singles:
@@ -123,7 +128,7 @@ def _off_place(
     camera = calibration.camera
     if kind == "auto":
         sighting = replace(sighting, camera=camera)
-        kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
+        kind = classify_markings(image, specimen, sighting, 1 / calibration.pixel)
     if kind != "bare":
         return np.zeros((specimen.count, 2), np.float32)
     seen = camera.beside(specimen.centre, calibration.residual)
@@ -165,15 +170,15 @@ def tracker_of(
 ) -> Tracker:
     """Templates as a first frame shows the units, at rest, and what follows them."""
     grid, blur, pixel = calibration.grid, calibration.blur, calibration.pixel
-    learner = Learner(grid, blur, pixel, kind)
+    learner = TemplateLearner(grid, blur, pixel, kind)
     rest, photometry = np.zeros((specimen.count, 3)), np.tile([1.0, 0, 0, 0], (specimen.count, 1))
     learner.add(image, calibration.camera, rest, photometry, np.ones(specimen.count))
     templates = learner.templates()
     depth, walls = calibration.depth, None
     if depth is not None:
-        walls = Walls(specimen, depth, grid, templates, blur, pixel, kind)
-    recovery = Recovery(specimen, calibration.camera, calibration.bright)
-    return Tracker(specimen, Fitter(calibration.camera, templates), recovery, walls)
+        walls = SideWalls(specimen, depth, grid, templates, blur, pixel, kind)
+    recovery = Relocaliser(specimen, calibration.camera, calibration.bright)
+    return Tracker(specimen, PoseFitter(calibration.camera, templates), recovery, walls)
 
 
 def _all(first: Frame, others: Iterator[Frame]) -> Iterator[Frame]:
