@@ -1,4 +1,4 @@
-"""Normal equations of one unit against a frame, gathered block by block of 8 x 8 pixels.
+"""Gathers the normal equations of one unit against a frame, by blocks of 8 x 8 pixels.
 
 A block is what a codec quantises at once, so errors are alike within; and what a processor's cache
 holds, so pixels are sampled first and summed after, many at a time.
@@ -265,3 +265,46 @@ def gather_equations(
                 _add(room, room.scores[count], pixels)
                 count += 1
     return count
+
+
+@inlined
+def _factor(matrix: Floats, factor: Floats) -> bool:
+    """Cholesky factor from the lower triangle; False if it is singular."""
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i != j:
+                factor[i, j] = total / factor[j, j]
+            elif total > 1e-10 * matrix[i, i]:
+                factor[i, i] = math.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@inlined
+def invert(matrix: Floats, factor: Floats, inverse: Floats) -> bool:
+    """Fills the inverse of a symmetric positive definite matrix; False if it is singular.
+
+    Args:
+        matrix: (n, n); its lower triangle is read.
+        factor: (n, n) room for the Cholesky factor.
+        inverse: (n, n) filled.
+    """
+    size = len(matrix)
+    if not _factor(matrix, factor):
+        return False
+    for column in range(size):
+        for i in range(size):
+            total = 1.0 if i == column else 0.0
+            for k in range(i):
+                total -= factor[i, k] * inverse[k, column]
+            inverse[i, column] = total / factor[i, i]
+        for i in range(size - 1, -1, -1):
+            total = inverse[i, column]
+            for k in range(i + 1, size):
+                total -= factor[k, i] * inverse[k, column]
+            inverse[i, column] = total / factor[i, i]
+    return True

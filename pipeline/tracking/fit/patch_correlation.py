@@ -21,8 +21,8 @@ from pipeline.tracking.fit.normal_equations import (
     TemplateArrays,
     Workspace,
     gather_equations,
+    invert,
 )
-from pipeline.tracking.fit.small_cholesky import invert
 from pipeline.tracking.fit.template_cells import TemplateCells, unfold
 from sim.core import Floats, Mask, Singles
 
@@ -121,6 +121,15 @@ class PoseFits(NamedTuple):
     blocks: Floats
     last: Floats
     information: Floats
+
+    def copy(self) -> PoseFits:
+        """Copies all arrays."""
+        return PoseFits(*(values.copy() for values in self))
+
+    def take(self, other: PoseFits, chosen: Mask) -> None:
+        """Replaces the chosen units (units,) by those of another fit."""
+        for values, new in zip(self, other, strict=True):
+            values[chosen] = new[chosen]
 
 
 @inlined

@@ -46,7 +46,7 @@ class SideWalls:
         self._contrast = _contrasts(rest, templates)
         self._board = templates.brightness - self._contrast[:, None, None] * rest
 
-    def follow(self, pose: Floats) -> None:
+    def redraw(self, pose: Floats) -> None:
         """Draws the silhouettes of units (units, 3) whose backs have moved against the faces."""
         offset = self._depth.offset(self._specimen.centre, pose)
         moved = np.linalg.norm(offset - self._offset, axis=1) > _MOVED * self._pixel

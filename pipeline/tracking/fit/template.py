@@ -10,11 +10,11 @@ from copy import copy
 
 import cv2
 import numpy as np
+from scipy.ndimage import spline_filter
 
-from pipeline.runtime import Picture
+from pipeline.runtime import Picture, compiled, inlined
 from pipeline.tracking.fit.normal_equations import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
-from pipeline.tracking.fit.spline import sample_spline, spline_coefficients
 from pipeline.tracking.fit.template_cells import classify_templates
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines
 from sim.core import Floats, Ints, Singles
@@ -25,6 +25,7 @@ _REACH = 2.5
 
 
 _FAR = 1e6
+_TAPS = 4
 
 
 class TemplateGrid:
@@ -155,65 +156,36 @@ def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Template
     return _templates(grid, faces, weight.astype(np.float32))
 
 
-class TemplateLearner:
-    """Averages what frames show of the units, each seen from the unit's own frame.
+def learn_templates(
+    image: Picture, camera: Camera, grid: TemplateGrid, blur: float, pixel: float, kind: str
+) -> Templates:
+    """Learns the templates of units at rest from what a frame shows of them.
 
     Args:
+        image: the frame.
+        camera: the camera.
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
         kind: auto, dots, speckle or bare.
     """
-
-    def __init__(self, grid: TemplateGrid, blur: float, pixel: float, kind: str) -> None:
-        self._grid = grid
-        self._weight = template_weight(grid.inside, grid.joint, blur, pixel, kind)
-        outside = _REACH * blur + 0.5 * pixel
-        self._wanted = [
-            np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))
-        ]
-        self._sum = np.zeros(grid.inside.shape)
-        self._count = np.zeros(grid.inside.shape)
-
-    def add(
-        self, image: Picture, camera: Camera, pose: Floats, photometry: Floats, share: Floats
-    ) -> None:
-        """Adds a frame.
-
-        Args:
-            image: the frame.
-            camera: the camera.
-            pose: (units, 3) where the units are; NaN for those to leave out.
-            photometry: (units, 4) gain, offset and slopes that the frame has over the template.
-            share: (units,) weight of the units.
-        """
-        coefs = spline_coefficients(image.astype(np.float64))
-        grid = self._grid
-        for unit in np.nonzero(np.isfinite(pose[:, 0]) & (share > 0))[0]:
-            rows, columns = self._wanted[unit]
-            x, y = grid.x[rows, columns], grid.y[rows, columns]
-            cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
-            place = grid.centre[unit] + pose[unit, :2]
-            points = place + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
-            seen = camera.project(points)
-            value = np.empty(len(x))
-            sample_spline(
-                coefs, np.ascontiguousarray(seen[:, 0]), np.ascontiguousarray(seen[:, 1]), value
-            )
-            gain, offset, sx, sy = photometry[unit]
-            value = (value - offset - (sx * x + sy * y) / grid.half) / gain
-            good = np.isfinite(value)
-            self._sum[unit, rows[good], columns[good]] += share[unit] * value[good]
-            self._count[unit, rows[good], columns[good]] += share[unit]
-
-    def templates(self) -> Templates:
-        """The mean of what was added."""
-        seen = self._count > 0
-        face = np.divide(self._sum, self._count, out=np.zeros_like(self._sum), where=seen)
-        weight = np.where(seen, self._weight, np.float32(0))
-        level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
-        face = np.where(seen, face, level[:, None, None])
-        return _templates(self._grid, face.astype(np.float32), weight)
+    coefs = spline_coefficients(image.astype(np.float64))
+    wanted = grid.inside > -(_REACH * blur + 0.5 * pixel) - 4 * pixel
+    face = np.full(grid.inside.shape, np.nan)
+    for unit in range(len(grid.centre)):
+        points = grid.centre[unit] + np.stack([grid.x[wanted[unit]], grid.y[wanted[unit]]], axis=1)
+        x, y = camera.project(points).T
+        value = np.empty(len(points))
+        sample_spline(coefs, np.ascontiguousarray(x), np.ascontiguousarray(y), value)
+        face[unit, wanted[unit]] = value
+    seen = np.isfinite(face)
+    weight = np.where(
+        seen, template_weight(grid.inside, grid.joint, blur, pixel, kind), np.float32(0)
+    )
+    face[~seen] = 0.0
+    level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
+    face = np.where(seen, face, level[:, None, None])
+    return _templates(grid, face.astype(np.float32), weight)
 
 
 def pixel_plane(camera: Camera) -> Singles:
@@ -228,3 +200,44 @@ def pixel_plane(camera: Camera) -> Singles:
         strip = slice(row, min(row + 64, rows))
         out[strip, :columns] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
     return out
+
+
+def spline_coefficients(values: Floats) -> Singles:
+    """Coefficients of the cubic spline through an image or grid (rows, columns)."""
+    return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
+
+
+@inlined
+def spline_weights(offset: float, value: Floats, slope: Floats) -> None:
+    """Fills the four basis values and slopes at ``offset`` in [0, 1) behind the second knot."""
+    rest = 1.0 - offset
+    square, rest_square = offset * offset, rest * rest
+    value[0] = rest_square * rest / 6
+    value[1] = 2 / 3 - 0.5 * square * (2 - offset)
+    value[2] = 2 / 3 - 0.5 * rest_square * (2 - rest)
+    value[3] = square * offset / 6
+    slope[0] = -0.5 * rest_square
+    slope[1] = 1.5 * square - 2 * offset
+    slope[2] = 2 * rest - 1.5 * rest_square
+    slope[3] = 0.5 * square
+
+
+@compiled
+def sample_spline(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
+    """Values at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
+    rows, columns = coefs.shape
+    wx, wy, slope = np.empty(_TAPS), np.empty(_TAPS), np.empty(_TAPS)
+    for k in range(x.size):
+        column, row = int(np.floor(x[k])), int(np.floor(y[k]))
+        if column < 1 or row < 1 or column > columns - 3 or row > rows - 3:
+            out[k] = np.nan
+            continue
+        spline_weights(x[k] - column, wx, slope)
+        spline_weights(y[k] - row, wy, slope)
+        total = 0.0
+        for a in range(_TAPS):
+            line = 0.0
+            for b in range(_TAPS):
+                line += wx[b] * coefs[row - 1 + a, column - 1 + b]
+            total += wy[a] * line
+        out[k] = total

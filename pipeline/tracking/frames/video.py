@@ -1,19 +1,23 @@
-"""Frames of a video, or of a folder of pictures, one after the other, with their times."""
+"""Reads frames of a video, or of a folder of numbered pictures (PNG, TIFF), with their times."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 import av
+import cv2
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.frames.image_folder import brightness, images, pictures
 from sim.core import Floats
+
+SYNTHETIC_LABEL = "SYNTHETIC"
+"""Stands in the title or comment of a video that was rendered."""
 
 _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
 """Formats whose first plane is the brightness in 8 bit, as it is."""
@@ -27,6 +31,8 @@ _ALONE = {
 }
 """Kinds of files that hold what they show: playlists name others, and may wait for more."""
 
+_SUFFIXES = {".png", ".tif", ".tiff"}
+_WHITE = 255.0
 _LARGEST = 1 << 27
 """Pixels of a frame."""
 
@@ -208,3 +214,62 @@ def _brightness(frame: av.VideoFrame) -> Picture:
     plane = frame.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
     return np.ascontiguousarray(rows[:, : plane.width])
+
+
+def pictures(folder: Path) -> list[Path]:
+    """The folder's pictures in the order of the numbers in their names.
+
+    Raises:
+        UserError: there are none.
+    """
+    found = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+    if not found:
+        remedy = "give a video file, or a folder of numbered .png or .tif files"
+        raise UserError("the folder holds no pictures", file=folder, remedy=remedy)
+    return sorted(found, key=_numbers)
+
+
+def _numbers(path: Path) -> tuple[list[int], str]:
+    return [int(digits) for digits in re.findall(r"\d+", path.stem)], path.name
+
+
+def images(folder: Path) -> Iterator[Picture]:
+    """Their brightness, one after the other.
+
+    Raises:
+        UserError: one cannot be read.
+    """
+    for path in pictures(folder):
+        if (image := _read(path)) is None:
+            raise UserError("not a readable picture", file=path, remedy="write the file again")
+        yield image
+
+
+def _read(path: Path) -> Picture | None:
+    try:
+        values = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    except cv2.error:  # too many pixels, among others
+        return None
+    return None if values is None else brightness(np.asarray(values))
+
+
+def brightness(values: np.ndarray) -> Picture:
+    """Brightness from 0 to 255, (rows, columns): 8 bit as they are, finer steps as fractions."""
+    if values.dtype == np.uint8:
+        return values
+    top = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1.0
+    return np.asarray(values * (_WHITE / top), np.float32)
+
+
+def rendered(video: Path) -> bool:
+    """Whether the file's own metadata call the video synthetic; a folder of pictures has none.
+
+    A file that cannot be read counts as filmed: reading its frames tells what is wrong.
+    """
+    if not video.is_file():
+        return False
+    try:
+        with av.open(str(video)) as container:
+            return any(SYNTHETIC_LABEL in text for text in container.metadata.values())
+    except av.FFmpegError:
+        return False

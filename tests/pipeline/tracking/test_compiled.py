@@ -33,4 +33,4 @@ def test_a_compiled_loop_calls_inlined_ones_only(name: str) -> None:
 
 def test_there_are_such_calls() -> None:
     patch = importlib.import_module("pipeline.tracking.fit.patch_correlation")
-    assert len(list(called(patch.fit))) > 2
+    assert len(list(called(patch.fit_patches))) > 2
