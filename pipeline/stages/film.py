@@ -18,8 +18,9 @@ from pipeline.tracking.frames import SYNTHETIC_LABEL
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import (
+    assemble_truth,
     encode_video,
-    ground_truth,
+    load_cell_log,
     noise_planning,
     prepare_film,
     select_case,
@@ -149,7 +150,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     labels = {"title": f"{SYNTHETIC_LABEL}: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
         encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
-    made = ground_truth.assemble_truth(film.response, film.present, film.motion, film.scene.view)
+    made = assemble_truth(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
     comments = (
         SYNTHETIC,
@@ -161,8 +162,6 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:
-    from pipeline.virtual_lab import load_cell_log
-
     asked, virtual = _virtual(path)
     if virtual.load_cell is None:
         remedy = "describe the load cell there"

@@ -31,7 +31,7 @@ from pipeline.tracking.frames import (
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, outlines_of_design
 from pipeline.tracking.motion import track_video
-from pipeline.tracking.output import assemble_track, dic_points, driven_units, track_table
+from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     parents = {"design": source, "points": held}
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)
-    track_table.write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
 
 
 def _init(video: Path, args: argparse.Namespace) -> None:
@@ -187,7 +187,7 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     synthetic = asked.synthetic or rendered(video)
     origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
-    track_table.write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if isinstance(track.ended, KeyboardInterrupt):
         LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended

@@ -1,4 +1,4 @@
-"""What is on the faces of the units: dots, speckle, or nothing."""
+"""Draws marks on the faces of the units: dots, speckle, or nothing."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class FaceMarks(NamedTuple):
 
 
 def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int) -> FaceMarks:
-    """The marks of all units of a kind of specimen: dots, speckle or bare."""
+    """Draws the marks of all units of a kind of specimen: dots, speckle or bare."""
     of_unit = {"dots": _dots, "speckle": _speckle}.get(kind)
     found = (
         []

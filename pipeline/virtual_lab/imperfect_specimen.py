@@ -1,4 +1,4 @@
-"""Specimens of a structure as a lab has them: off their design, and driven as shakers drive."""
+"""Draws specimens as a lab has them: off their design, and driven as shakers drive."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SAMPLES = 1001
 
 
 class ImperfectDrive(NamedTuple):
-    """A drive that is not quite the planned one (``sim.solvers.loads.MotionLaw``).
+    """Drives not quite as planned (``sim.solvers.loads.MotionLaw``).
 
     Attributes:
         planned: the motion that was asked for.
@@ -47,7 +47,7 @@ class ImperfectDrive(NamedTuple):
     delay: float
 
     def __call__(self, times: Numbers) -> Array:
-        """Motion (n_times, n_units, 3) at the given times, s."""
+        """Returns the motion (n_times, n_units, 3) at the given times, s."""
         since = jnp.maximum(jnp.asarray(times) - self.delay, 0.0)
         planned = self.planned(jnp.minimum(since, 2 * self.turning - since))
         amplitude = jnp.hypot(*self.largest)
@@ -65,7 +65,7 @@ class ImperfectDrive(NamedTuple):
 
 
 def _left(vector: Array) -> Array:
-    """Vectors (..., 2) turned by a right angle counter-clockwise."""
+    """Turns vectors (..., 2) by a right angle counter-clockwise."""
     return jnp.stack([-vector[..., 1], vector[..., 0]], axis=-1)
 
 
@@ -77,7 +77,7 @@ def _turned(angle: float) -> Array:
 def make_specimen(
     structure: PosedStructure, case: int, asked: SpecimenFaults, end: float
 ) -> PosedStructure:
-    """A specimen of a structure under one of its load cases.
+    """Draws a specimen of a structure under one of its load cases.
 
     Args:
         structure: as designed.
@@ -108,7 +108,7 @@ def make_specimen(
 def imperfect_drive(
     scene: Scene, case: int, asked: DriveFaults, end: float, unload: bool
 ) -> ImperfectDrive:
-    """The drive of a load case as the specimen has it.
+    """Makes the drive of a load case as the specimen has it.
 
     Args:
         scene: of the structure.

@@ -1,4 +1,4 @@
-"""What noise a planned set-up will have: short clips are rendered, tracked, and compared."""
+"""Predicts the noise of a planned set-up: short clips are rendered, tracked, and compared."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _DEG = 180 / np.pi
 
 
 class PlannedSetup(NamedTuple):
-    """One set-up: what is filmed and how."""
+    """Holds one set-up: what is filmed and how."""
 
     specimen: str
     setup: VirtualRecording
@@ -34,7 +34,7 @@ class PlannedSetup(NamedTuple):
 
     @property
     def words(self) -> Mapping[str, str]:
-        """The set-up in columns of a table."""
+        """Describes the set-up in columns of a table."""
         camera, codec = self.setup.camera, self.setup.codec
         look = self.setup.look
         markers = {"dots": look.dots.diameter, "speckle": look.speckle.diameter}
@@ -50,7 +50,7 @@ class PlannedSetup(NamedTuple):
 
 
 class ExpectedNoise(NamedTuple):
-    """What a set-up gives: errors and stated uncertainties (3,) in px, px and deg.
+    """Holds errors and stated uncertainties (3,) of a set-up in px, px and deg.
 
     Attributes:
         rmse: root mean square of the error of x, y and rotation.
@@ -66,7 +66,7 @@ class ExpectedNoise(NamedTuple):
 
     @property
     def words(self) -> Mapping[str, str]:
-        """The same in columns of a table."""
+        """Describes the noise in columns of a table."""
         named = {"rmse": self.rmse, "sigma": self.sigma}
         told: dict[str, str] = {}
         for name, (x, y, turn) in named.items():
@@ -77,7 +77,7 @@ class ExpectedNoise(NamedTuple):
 
 
 class SetupOptions(NamedTuple):
-    """Values to try in every combination; none leaves the base's own.
+    """Holds values to try in every combination; none leaves the base's own.
 
     Attributes:
         specimens: dots, speckle or bare.
@@ -95,7 +95,7 @@ class SetupOptions(NamedTuple):
 
 
 def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:
-    """Every combination of the options.
+    """Combines the options in every way.
 
     Raises:
         UserError: a value that makes no sense.
@@ -115,7 +115,7 @@ def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedS
 
 
 def codec(name: str) -> Codec:
-    """The codec of a name such as ffv1, h264, h264-intra or h264:28 (constant rate factor).
+    """Parses a codec such as ffv1, h264, h264-intra or h264:28 (constant rate factor).
 
     Raises:
         UserError: no such name.
@@ -178,7 +178,7 @@ def expected_noise(
 
 
 def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
-    """The set-up with a few frames at rest and then the motion's beginning."""
+    """Clips the set-up to a few frames at rest and then the motion's beginning."""
     resting = min(RESTING, count // 2)
     length = (count - resting) / setup.rate
     end = setup.start + length
@@ -200,7 +200,7 @@ def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
 
 
 def table(rows: Sequence[Mapping[str, str]]) -> Iterator[str]:
-    """Lines of a table of words, in columns."""
+    """Formats lines of a table of words, in columns."""
     names = list(rows[0])
     width = {name: max(len(name), *(len(row[name]) for row in rows)) for name in names}
     yield "  ".join(name.rjust(width[name]) for name in names)

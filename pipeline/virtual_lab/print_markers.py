@@ -1,4 +1,4 @@
-"""Stage: sheets of marks for the tracking, to print at true size and stick on the units."""
+"""Prints sheets of marks for the tracking, at true size, to stick on the units."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOG = logging.getLogger(__name__)
 
 
 def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
+    """Makes the stage's command line."""
     made = cli.parser("pipeline.virtual_lab.print_markers", str(__doc__), study=False)
     made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
     made.add_argument("--structure", choices=("intact", "altered", "cloaked"), default="cloaked")
@@ -71,7 +71,7 @@ def _look(args: argparse.Namespace) -> UnitAppearance:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Runs the command line."""
     return cli.run(work, parser(), argv)
 
 

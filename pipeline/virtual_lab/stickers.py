@@ -1,4 +1,4 @@
-"""Faces of the units to print at true size, cut out and stick on: dots or speckle, with ids."""
+"""Draws faces of the units at true size, to cut out and stick on: dots or speckle, with ids."""
 
 from __future__ import annotations
 

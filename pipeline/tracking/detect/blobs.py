@@ -36,7 +36,7 @@ _DOTS = 4
 
 @dataclass(frozen=True)
 class LatticeDetection:
-    """Units of a specimen, matched with blobs of a frame.
+    """Holds units of a specimen, matched with blobs of a frame.
 
     Attributes:
         camera: what sees the blobs where they are.

@@ -16,7 +16,7 @@ FULL_STEPS = 8
 
 
 class PoseFitter:
-    """A camera and what it should see.
+    """Fits poses of units to frames of a camera.
 
     Attributes:
         camera: the camera.
@@ -30,7 +30,7 @@ class PoseFitter:
         self.full = np.zeros(len(templates.centre))
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
-        """Pose and photometry to start from: at rest, all with the same gain."""
+        """Returns pose and photometry to start from: at rest, all with the same gain."""
         units = len(self.templates.centre)
         return np.zeros((units, 3)), np.tile([gain, 0.0, 0.0, 0.0], (units, 1))
 
@@ -43,7 +43,7 @@ class PoseFitter:
         tight: Floats | None = None,
         noise: Floats | None = None,
     ) -> PoseFits:
-        """Poses of the chosen units, NaN for the others and for those that cannot be fitted.
+        """Fits the chosen units; NaN for the others and for those that cannot be fitted.
 
         Args:
             image: the frame.
@@ -78,7 +78,7 @@ class PoseFitter:
         return patch_correlation.unpack(out)
 
     def _padded(self, image: Picture) -> Singles:
-        """The image on whole blocks."""
+        """Pads the image to whole blocks."""
         out = np.zeros(self.plane.shape[:2], np.float32)
         out[: image.shape[0], : image.shape[1]] = image
         return out

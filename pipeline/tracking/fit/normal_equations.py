@@ -25,7 +25,7 @@ _COUNT = np.array([[0.0] * _PIXELS, _FEW, [1.0] * _PIXELS], np.float32)
 
 
 class FramePixels(NamedTuple):
-    """A frame, and the place in the specimen's plane of each of its pixels.
+    """Holds a frame, and the place in the specimen's plane of each of its pixels.
 
     Attributes:
         image: (rows, columns) brightness.
@@ -37,7 +37,7 @@ class FramePixels(NamedTuple):
 
 
 class TemplateArrays(NamedTuple):
-    """The template of one unit, as `unfold` makes its nodes, its cells, and its place at rest.
+    """Holds the template of one unit: nodes as `unfold` makes them, cells, place at rest.
 
     Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it.
     """
@@ -78,7 +78,7 @@ class Workspace(NamedTuple):
 
 
 def workspace(blocks: int) -> Workspace:
-    """Room for units of at most so many blocks."""
+    """Allocates room for units of at most so many blocks."""
     return Workspace(
         np.zeros((UNKNOWNS, _PIXELS), np.float32),
         np.zeros(_PIXELS, np.float32),
@@ -180,7 +180,7 @@ def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Workspace) -
 
 @inlined
 def _weigh(room: Workspace, tight: float, pixels: int) -> None:
-    """Robust weights of Geman and McClure, and the sums."""
+    """Applies robust weights of Geman and McClure, and adds to the sums."""
     rows, residual, weight = room.rows, room.residual, room.weight
     full = left = curved = total = squares = np.float32(0)
     narrow = np.float32(tight)
@@ -269,7 +269,7 @@ def gather_equations(
 
 @inlined
 def _factor(matrix: Floats, factor: Floats) -> bool:
-    """Cholesky factor from the lower triangle; False if it is singular."""
+    """Factors by Cholesky from the lower triangle; returns False if it is singular."""
     for i in range(len(matrix)):
         for j in range(i + 1):
             total = matrix[i, j]

@@ -1,4 +1,4 @@
-"""Rigid-patch image correlation: Gauss-Newton on the pose of each unit in the specimen's plane.
+"""Correlates rigid patches: Gauss-Newton on the pose of each unit in the specimen's plane.
 
 The raw pixels of a frame are compared with the template of a unit, seen through the camera: no
 frame is interpolated, so its noise is not either. Four photometric unknowns (gain, offset and its
@@ -39,7 +39,7 @@ _UNKNOWN = 1e6
 
 
 class Templates(NamedTuple):
-    """What the units look like in their own frames, and where they rest.
+    """Holds the looks of the units in their own frames, and where they rest.
 
     Attributes:
         brightness: (units, rows, columns) at the nodes, y up.
@@ -63,7 +63,7 @@ class Templates(NamedTuple):
 
 
 class FitStart(NamedTuple):
-    """Where the fits of a frame start, and what is known before.
+    """Holds where the fits of a frame start, and what is known before.
 
     Attributes:
         state: (units, 7) pose and photometry.
@@ -86,7 +86,7 @@ class FitStart(NamedTuple):
 
 
 class FitTarget(NamedTuple):
-    """One unit of a `FitStart`, with its contrast and the largest number of full steps."""
+    """Holds one unit of a `FitStart`, with its contrast and the largest number of full steps."""
 
     contrast: float
     scale: float
@@ -97,7 +97,7 @@ class FitTarget(NamedTuple):
 
 
 class PoseFits(NamedTuple):
-    """Poses found in a frame.
+    """Holds poses found in a frame.
 
     Attributes:
         pose: (units, 3) displacement in mm and rotation in rad.
@@ -143,7 +143,7 @@ def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> 
 
 @inlined
 def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
-    """The Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
+    """Fills the Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
     step[:] = 0.0
     for j in range(first, UNKNOWNS):
         total = 0.0
@@ -164,7 +164,7 @@ def _hold_pose(matrix: Floats) -> None:
 
 @inlined
 def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: Workspace) -> float:
-    """The scale of the robust weights: wide until the unit has found its place."""
+    """Returns the scale of the robust weights: wide until the unit has found its place."""
     if aim.tight > 0.0:
         return max(0.5 * scale, aim.tight)
     least = _FLOOR * aim.contrast * gain
@@ -175,7 +175,7 @@ def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: W
 
 @inlined
 def _stride(sums: Floats) -> float:
-    """By how much a step of fixed robust weights is too short, for they change with it."""
+    """Returns the factor by which steps of fixed robust weights are too short."""
     return min(sums[1] / max(sums[2], 1e-9), _STRIDE)
 
 
@@ -306,7 +306,7 @@ def fit_patches(
 
 
 def unpack(out: Floats) -> PoseFits:
-    """The columns of `fit`'s output by name."""
+    """Names the columns of `fit_patches`' output."""
     return PoseFits(
         out[:, :POSE],
         out[:, POSE:UNKNOWNS],

@@ -1,4 +1,4 @@
-"""Templates of thick units follow their side walls, which do not turn with the faces."""
+"""Redraws templates of thick units for their side walls, which do not turn with the faces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Templates of the units: from their outlines alone, or learned from frames of the video.
+"""Makes templates of the units: from their outlines alone, or learned from a frame.
 
 An outline blurred as the camera blurs it finds units whose faces are unknown; what the frames show
 then takes its place, whatever it is: dots, speckle, or the bare edge.
@@ -70,7 +70,7 @@ class TemplateGrid:
         self.centre = specimen.centre
 
     def of(self, units: Ints) -> TemplateGrid:
-        """The same for some of the units."""
+        """Returns the grid of some of the units."""
         made = copy(self)
         made.inside, made.joint = self.inside[units], self.joint[units]
         made.centre = self.centre[units]
@@ -83,7 +83,7 @@ class TemplateGrid:
         return far
 
     def signed_distance(self, polygon: Floats) -> Singles:
-        """From the nodes (nodes, nodes) to a polygon about the centroid, positive inside, mm."""
+        """Measures from the nodes to a polygon about the centroid, positive inside, mm."""
         far = np.full(self.x.shape, np.inf)
         odd = np.zeros(self.x.shape, dtype=bool)
         for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
@@ -103,7 +103,7 @@ def _smooth(value: Singles, low: float, high: float) -> Singles:
 
 
 def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Templates:
-    """Templates with the contrast that each has within its weight."""
+    """Makes templates with the contrast that each has within its weight."""
     total = weight.sum(axis=(1, 2))
     mean = (brightness * weight).sum(axis=(1, 2)) / total
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
@@ -115,7 +115,7 @@ def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Temp
 
 
 def blurred_silhouette(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
-    """What is inside, one, against what is not, zero, as the camera blurs it."""
+    """Blurs a silhouette, one inside and zero outside, as the camera does."""
     sharp = np.clip(inside / grid.step + 0.5, 0, 1).astype(np.float32)
     spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
     return np.asarray(cv2.GaussianBlur(sharp, (0, 0), float(spread)), np.float32)
@@ -124,7 +124,7 @@ def blurred_silhouette(grid: TemplateGrid, inside: Singles, blur: float) -> Sing
 def template_weight(
     inside: Singles, joint: Singles, blur: float, pixel: float, kind: str
 ) -> Singles:
-    """Weight of nodes in templates that are learned: what is inside, and the blurred edge.
+    """Weighs nodes in templates that are learned: what is inside, and the blurred edge.
 
     Outside, what is near a joint moves otherwise. Bare units are followed by their edges alone,
     dots and speckle without them, where the specimen's kind is not left open ("auto").
@@ -141,7 +141,7 @@ def template_weight(
 
 
 def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
-    """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
+    """Draws bright outlines on a dark ground, blurred; only a band about the edges has weight.
 
     Args:
         grid: the nodes.
@@ -189,7 +189,7 @@ def learn_templates(
 
 
 def pixel_plane(camera: Camera) -> Singles:
-    """Place (rows, columns, 2) in the specimen's plane of every pixel, mm.
+    """Maps every pixel to its place (rows, columns, 2) in the specimen's plane, mm.
 
     Rows and columns are filled up to whole blocks, with places far from everything.
     """
@@ -203,7 +203,7 @@ def pixel_plane(camera: Camera) -> Singles:
 
 
 def spline_coefficients(values: Floats) -> Singles:
-    """Coefficients of the cubic spline through an image or grid (rows, columns)."""
+    """Fits the cubic B-spline (Unser, 1999) through an image or grid (rows, columns)."""
     return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
 
 
@@ -224,7 +224,7 @@ def spline_weights(offset: float, value: Floats, slope: Floats) -> None:
 
 @compiled
 def sample_spline(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
-    """Values at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
+    """Samples at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
     rows, columns = coefs.shape
     wx, wy, slope = np.empty(_TAPS), np.empty(_TAPS), np.empty(_TAPS)
     for k in range(x.size):

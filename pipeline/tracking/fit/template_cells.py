@@ -1,4 +1,4 @@
-"""The cells of a template's nodes: which of them pixels are compared in, and what is read there.
+"""Classifies the cells of a template's nodes: pixels are compared in some, and what is read there.
 
 Where the template is flat, a pixel tells of the brightness alone: one of four is enough.
 """
@@ -34,7 +34,7 @@ class TemplateCells(NamedTuple):
 
 
 def classify_templates(brightness: Singles, weight: Singles, contrast: Floats) -> TemplateCells:
-    """The cells of templates (units, rows, columns)."""
+    """Classifies the cells of templates (units, rows, columns)."""
     made = TemplateCells(
         np.empty(weight.shape, np.uint8), np.empty((*weight.shape[:2], 2), np.int32)
     )

@@ -1,4 +1,4 @@
-"""Columns of numbers from other programs' CSV files, whatever their separator."""
+"""Reads columns of numbers from other programs' CSV files, whatever their separator."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LARGEST = 512 << 20
 
 
 class CsvCells(NamedTuple):
-    """The cells of a CSV.
+    """Holds the cells of a CSV.
 
     Attributes:
         rows: of cells, without blanks about them.
@@ -29,7 +29,7 @@ class CsvCells(NamedTuple):
 
 
 def cells(path: Path) -> CsvCells:
-    """All cells of a file, a row a line.
+    """Reads all cells of a file, a row a line.
 
     Raises:
         UserError: no such file, too large, or no CSV.
@@ -45,7 +45,7 @@ def cells(path: Path) -> CsvCells:
 
 
 def read(path: Path, names: Sequence[str]) -> Floats:
-    """The named columns (rows, names); lines before the heading, and after it those with gaps, go.
+    """Reads columns (rows, names); lines before the heading, and after it those with gaps, go.
 
     Commas, semicolons and tabs separate; with the latter two, a comma may be the decimal sign.
 
@@ -81,7 +81,7 @@ def _at(row: list[str], column: int, separator: str) -> float | None:
 
 
 def number(text: str, separator: str) -> float | None:
-    """The number in a cell of a file with this separator; None where it holds no finite one."""
+    """Parses a cell of a file with this separator; None where it holds no finite number."""
     try:
         value = float(text if separator == "," else text.replace(",", "."))
     except ValueError:

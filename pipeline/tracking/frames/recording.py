@@ -1,4 +1,4 @@
-"""The YAML file of a recording: which video shows which design, and how to read it."""
+"""Defines the YAML file of a recording: a video, the design that it shows, how to read it."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Recording(Section):
 
 
 def load_recording(path: Path) -> Recording:
-    """The recording in a YAML file.
+    """Loads the recording in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
@@ -119,7 +119,7 @@ def load_recording(path: Path) -> Recording:
 
 
 def recording_yaml(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
-    """The YAML of a recording, after lines of comment.
+    """Writes the YAML of a recording, after lines of comment.
 
     Args:
         values: keys and their values, as they stand in the file; those that are None are left out.

@@ -41,11 +41,11 @@ _ALL = 0.95
 
 
 class BrokenOffError(UserError):
-    """A video that ends too early: the frames before are whole, and their track is kept."""
+    """Tells of a video that ends too early: the frames before are whole, their track is kept."""
 
 
 def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
-    """A file that holds no more than so many frames, the last one at a time in s."""
+    """Reports a file that holds no more than so many frames, the last one at a time in s."""
     until = math.floor(1000 * time) / 1000
     return BrokenOffError(
         f"the video breaks off after {count} frames, which are tracked: {why}",
@@ -57,7 +57,7 @@ def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture of the video.
+    """Holds a picture of the video.
 
     Attributes:
         index: from zero.
@@ -96,7 +96,7 @@ def read_frames(
 
 
 def frame_count(path: Path) -> int:
-    """Number of frames as the file has it, at least one; the window and faults may make it less."""
+    """Counts frames as the file has it, at least one; the window and faults may make it less."""
     if path.is_dir():
         return len(pictures(path))
     try:
@@ -108,13 +108,13 @@ def frame_count(path: Path) -> int:
 
 
 def has_uneven_intervals(time: Floats) -> bool:
-    """Whether frames (frames,) s come at intervals that differ by more than stamps are rounded."""
+    """Tells intervals of frames (frames,) s that differ by more than stamps are rounded."""
     interval = np.diff(time)
     return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
 
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
-    """The frames as long as they are of one size."""
+    """Yields the frames as long as they are of one size."""
     size, time = None, 0.0
     for frame in shown:
         size = frame.image.shape if size is None else size
@@ -149,7 +149,7 @@ def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
 
 
 def _opened(path: Path) -> av.container.InputContainer:
-    """The file itself: neither an address that its name may be, nor others that it may name."""
+    """Opens the file itself: neither an address that its name may be, nor others that it names."""
     if path.exists() and not path.is_file():
         raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
     return av.open(f"file:{path}", options=_ALONE)
@@ -190,7 +190,7 @@ def _decoded(
 
 
 def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:
-    """How many frames there are as the file has it; zero where it does not tell."""
+    """Returns the number of frames as the file has it; zero where it does not tell."""
     if stream.frames or len(container.streams) > 1 or not container.duration:
         return float(stream.frames)
     return rate * container.duration / av.time_base - 1
@@ -201,7 +201,7 @@ def _nominal(stream: av.VideoStream, index: int) -> float:
 
 
 def _upright(frame: av.VideoFrame) -> Picture:
-    """The brightness as players show it: a phone tells how it was held."""
+    """Turns the brightness as players show it: a phone tells how it was held."""
     image, quarters = _brightness(frame), round(frame.rotation / 90)
     return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
 
@@ -217,7 +217,7 @@ def _brightness(frame: av.VideoFrame) -> Picture:
 
 
 def pictures(folder: Path) -> list[Path]:
-    """The folder's pictures in the order of the numbers in their names.
+    """Lists the folder's pictures in the order of the numbers in their names.
 
     Raises:
         UserError: there are none.
@@ -234,7 +234,7 @@ def _numbers(path: Path) -> tuple[list[int], str]:
 
 
 def images(folder: Path) -> Iterator[Picture]:
-    """Their brightness, one after the other.
+    """Reads their brightness, one after the other.
 
     Raises:
         UserError: one cannot be read.
@@ -262,7 +262,7 @@ def brightness(values: np.ndarray) -> Picture:
 
 
 def rendered(video: Path) -> bool:
-    """Whether the file's own metadata call the video synthetic; a folder of pictures has none.
+    """Reads whether the file's metadata call it synthetic; a folder of pictures has none.
 
     A file that cannot be read counts as filmed: reading its frames tells what is wrong.
     """

@@ -21,7 +21,7 @@ _DISTORTION_PRIOR = 0.3
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that looks at a plane.
+    """Models a camera that looks at a plane.
 
     Attributes:
         homography: (3, 3) from mm in the plane to pixels without distortion, last entry one.
@@ -37,7 +37,7 @@ class Camera:
 
     @property
     def scale(self) -> float:
-        """The unit of the radius, px."""
+        """Returns the unit of the radius, px."""
         return max(self.size) / 2
 
     def project(self, points: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Standard uncertainties that hold: from the image, scaled by what the motions themselves show.
+"""Calibrates standard uncertainties of the image by what the motions themselves show.
 
 A codec moves whole units by errors that leave no trace in a frame's residuals. But it moves each by
 its own, while the specimen moves in a few shapes. What is left of the motions without these is
@@ -35,14 +35,14 @@ _OWN = 0.3
 
 
 def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
-    """Standard deviations (..., 3) from the covariance of blocks, corrected for what was fitted."""
+    """Returns standard errors (..., 3) of the covariance of blocks, corrected for the fit."""
     freedom = blocks / np.maximum(blocks - _PARAMETERS, 1)
     variance = np.einsum("...ii->...i", scatter) * freedom[..., None]
     return np.sqrt(variance)
 
 
 def calibrate_sigma(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
-    """The standard uncertainties, scaled so that they tell the scatter of the motions.
+    """Scales the standard uncertainties so that they tell the scatter of the motions.
 
     Args:
         motion: (frames, units, 3) poses, NaN where missing.
@@ -65,7 +65,7 @@ def calibrate_sigma(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -
 
 
 def _calmed(sigma: Floats) -> Floats:
-    """The image's figures, each drawn near to what is usual for its frame and its unit.
+    """Draws the image's figures near to what is usual for frame and unit.
 
     A figure comes from some tens of blocks and scatters by a fifth, most of which says nothing.
     """
@@ -78,7 +78,7 @@ def _calmed(sigma: Floats) -> Floats:
 
 
 def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
-    """By how much (frames, units) the uncertainties of one degree of freedom are too small."""
+    """Returns factors (frames, units) by which uncertainties of one dof are too small."""
     usual = np.full(motion.shape, np.sqrt(_USUAL))
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
         return usual
@@ -95,7 +95,7 @@ def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
 
 
 def _ratio(known: Mask, sigma: Floats, found: motion_modes.MotionModes, steady: Mask) -> Floats:
-    """Squared noise over the image's variance (frames, units), NaN where there is none to see."""
+    """Returns squared noise over the image's variance (frames, units), NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
     jitter = motion_modes.amplitude_jitter(found.amplitude, steady) @ found.shape

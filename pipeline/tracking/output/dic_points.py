@@ -1,4 +1,4 @@
-"""Points with displacements, as commercial DIC systems export them, to motions of the units."""
+"""Converts points with displacements, as DIC systems export them, to motions of the units."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class DicExport(Section):
 
 
 class DicPoints(NamedTuple):
-    """Points in the specimen's frame, one row a point and time.
+    """Holds points in the specimen's frame, one row a point and time.
 
     Attributes:
         time: (rows,) s.
@@ -84,7 +84,7 @@ class DicPoints(NamedTuple):
 
 
 def load(path: Path) -> DicExport:
-    """The description in a YAML file.
+    """Loads the description in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
@@ -93,7 +93,7 @@ def load(path: Path) -> DicExport:
 
 
 def read_points(path: Path, asked: DicExport) -> DicPoints:
-    """The points of a file in the specimen's frame.
+    """Reads the points of a file in the specimen's frame.
 
     Raises:
         UserError: the file cannot be read, or lacks a column.
@@ -108,7 +108,7 @@ def read_points(path: Path, asked: DicExport) -> DicPoints:
 
 
 def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
-    """The dataset ``track`` of points: a robust rigid fit for each unit and time.
+    """Makes the dataset ``track`` of points: a robust rigid fit for each unit and time.
 
     A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
     how far they are from moving rigidly.
@@ -146,7 +146,7 @@ def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
 
 
 def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
-    """The unit (rows,) on which each point lies at rest, -1 for none."""
+    """Finds the unit (rows,) on which each point lies at rest, -1 for none."""
     faces = [
         shapely.Polygon(specimen.centre[unit] + specimen.polygon(unit))
         for unit in range(specimen.count)
@@ -158,7 +158,7 @@ def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
 
 
 def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Pose and its standard uncertainty (3,), from points relative to the centroid at rest."""
+    """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest."""
     turn, shift, weight = robust_motion(before, after, _FINEST)
     cos, sin = np.cos(turn), np.sin(turn)
     rest = after - before @ np.array([[cos, sin], [-sin, cos]]) - shift

@@ -1,21 +1,25 @@
-"""A track as a dataset with the names and shapes of a response."""
+"""Writes a track as a dataset with the names and shapes of a response, and as a plain table."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from pipeline.datasets.tables import TABLES
+from pipeline.runtime import write_atomically
 from pipeline.tracking.motion import Track
 from sim.core import Floats, Mask
 
 _MOTION = ("time", "unit", "dof")
+_NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
+_LOADS = ("load_N", "drive_x_mm", "drive_y_mm")
 
 
 def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None) -> xr.Dataset:
-    """The dataset ``track``: units as in the design, those that are absent without motion.
+    """Makes the dataset ``track``: units as in the design, absent ones without motion.
 
     Args:
         design: as built.
@@ -56,20 +60,20 @@ def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object
 
 
 def driven_units(design: xr.Dataset) -> Mask:
-    """Which units (units,) of the design are driven."""
+    """Marks the units (units,) of the design that are driven."""
     flag = TABLES["design"]["support"].flags["driven"]
     return np.asarray(design["support"].values == flag)
 
 
 def mean_over_seen(motion: Floats) -> Floats:
-    """Mean (frames, 2) over those of the units (frames, units, 2) that are seen; NaN without."""
+    """Averages (frames, 2) over units (frames, units, 2) that are seen; NaN without."""
     seen = np.isfinite(motion[..., :1])
     total = np.where(seen, motion, 0.0).sum(axis=1)
     return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
 
 
 def over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
-    """Values (frames, present units, ...) over all units."""
+    """Spreads values (frames, present units, ...) over all units."""
     if present.all():
         return values
     out = np.full((values.shape[0], len(present), *values.shape[2:]), fill, values.dtype)
@@ -78,5 +82,37 @@ def over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.n
 
 
 def absent_flag() -> int:
-    """The quality of a unit that the structure does not have."""
+    """Returns the quality of a unit that the structure does not have."""
     return TABLES["track"]["quality"].flags["absent"]
+
+
+def write_track_table(track: xr.Dataset, path: Path) -> None:
+    """Writes one line a frame and unit, absent units left out; empty where there is no value.
+
+    Raises:
+        UserError: the file cannot be written.
+    """
+    flags = TABLES["track"]["quality"].flags
+    names = {value: name for name, value in flags.items()}
+    quality, drive = track["quality"].values, track["drive_displacement"].values
+    loads = np.column_stack([track["load_force"].values, drive])
+    pose, sigma = track["displacement"].values, track["sigma"].values
+    labels = [
+        f"{unit},{i},{j}"
+        for unit, i, j in zip(*(track[name].values for name in ("unit", "i", "j")), strict=True)
+    ]
+    there = np.flatnonzero((quality != flags["absent"]).any(axis=0))
+    with write_atomically(path) as aside, aside.open("w", encoding="utf-8", newline="\n") as file:
+        if track.attrs["synthetic"] == "yes":
+            file.write("# SYNTHETIC: of a rendered video\n")
+        file.write(",".join(["time_s", "unit", "i", "j", *_NUMBERS, *_LOADS, "quality"]) + "\n")
+        for frame, time in enumerate(track["time"].values):
+            load = _cells(loads[frame])
+            numbers = np.concatenate([pose[frame], sigma[frame]], axis=-1)
+            for unit in there:
+                told = f"{load},{names[int(quality[frame, unit])]}"
+                file.write(f"{time:.9g},{labels[unit]},{_cells(numbers[unit])},{told}\n")
+
+
+def _cells(values: Floats) -> str:
+    return ",".join("" if np.isnan(value) else f"{value:.7g}" for value in values)

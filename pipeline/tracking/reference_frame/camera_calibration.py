@@ -1,4 +1,4 @@
-"""The camera and its blur, from one frame that shows the specimen at rest."""
+"""Calibrates the camera and its blur by one frame that shows the specimen at rest."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _EDGE_SIGMA = 0.02
 
 
 class CameraCalibration(NamedTuple):
-    """What a reference frame tells.
+    """Holds what a reference frame tells.
 
     Attributes:
         camera: refined on the outlines of the units.
@@ -60,7 +60,7 @@ class CameraCalibration(NamedTuple):
 
 
 class RecordingSetup(NamedTuple):
-    """What is known of the set-up.
+    """Holds what is known of the set-up.
 
     Attributes:
         thickness: of the units, mm.
@@ -118,7 +118,7 @@ def calibrate_camera(
 
 
 def _furthest(specimen: SpecimenOutlines, depth: Depth | None) -> float:
-    """How far a back is seen from its face, at most, mm."""
+    """Bounds how far a back is seen from its face, mm."""
     if depth is None:
         return 0.0
     offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
@@ -128,7 +128,7 @@ def _furthest(specimen: SpecimenOutlines, depth: Depth | None) -> float:
 def best_orientations(
     image: Picture, specimen: SpecimenOutlines, sightings: list[LatticeDetection]
 ) -> list[LatticeDetection]:
-    """Those of several ways to see a specimen that its outlines fit as well as any."""
+    """Keeps those of several ways to see a specimen that its outlines fit as well as any."""
     if len(sightings) == 1:
         return sightings
     pixel = _pixel(specimen, sightings[0].camera)
@@ -159,7 +159,7 @@ def _gain(image: Picture, sighting: LatticeDetection) -> float:
 
 
 def _misfit(image: Picture, fitter: PoseFitter, gain: float) -> float:
-    """Median of the residuals over the gain; infinite for units that cannot be fitted."""
+    """Returns the median residual over the gain; infinite for units that cannot be fitted."""
     return _relative(_outlined(image, fitter, gain))
 
 
@@ -181,7 +181,7 @@ def _pixel(specimen: SpecimenOutlines, camera: Camera) -> float:
 def _refined(
     image: Picture, specimen: SpecimenOutlines, camera: Camera, templates: Templates, gain: float
 ) -> tuple[Camera, Floats, PoseFits]:
-    """The camera that sees the outlines where they are, what is left (units, 2), px, and fits."""
+    """Refines the camera on outlines; returns what is left (units, 2), px, and fits, too."""
     fits = _outlined(image, PoseFitter(camera, templates), gain)
     for _ in range(_ROUNDS):
         good = np.isfinite(fits.pose[:, 0])
@@ -195,7 +195,7 @@ def _refined(
 
 
 def _lowest(misfit: Callable[[float], float], values: tuple[float, ...]) -> tuple[float, float]:
-    """The least misfit, which has one minimum, and its value: stops when it rises."""
+    """Finds the least misfit, which has one minimum, and its value: stops when it rises."""
     least, best = np.inf, values[0]
     for value in values:
         found = misfit(value)

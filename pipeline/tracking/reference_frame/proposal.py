@@ -1,4 +1,4 @@
-"""A first look at a video: which units it shows, what is on them, and what it does not tell."""
+"""Proposes a recording by a first look at a video: units, markings, and what it does not tell."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
 
 
 class Proposal(NamedTuple):
-    """What the first frame shows.
+    """Holds what the first frame shows.
 
     Attributes:
         structure: the design's structure that fits best.
@@ -76,7 +76,7 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
 
 
 class _Candidate(NamedTuple):
-    """A structure of the design, and how it is seen."""
+    """Holds a structure of the design, and how it is seen."""
 
     name: str
     specimen: SpecimenOutlines
@@ -85,7 +85,7 @@ class _Candidate(NamedTuple):
 
 
 def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
-    """Every structure of the design that differs from those before."""
+    """Yields every structure of the design that differs from those before."""
     tried: list[SpecimenOutlines] = []
     for name in ("cloaked", "altered", "intact"):
         specimen = outlines_of_design(as_built(design, name))
@@ -110,7 +110,7 @@ def _alike(one: SpecimenOutlines, other: SpecimenOutlines) -> bool:
 
 
 def _share(one: _Candidate) -> float:
-    """Part of the units that are as this structure has them, less what it does not have."""
+    """Returns the part of the units that agree with this structure, less what it does not have."""
     there = units_in_frame(one.specimen, one.calibration)
     fitting = agreeing_outlines(one.specimen, one.calibration.outlines) & there
     return float(fitting.sum() / max(there.sum(), 1)) - _more(one) / one.specimen.count
@@ -137,7 +137,7 @@ def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
 
 
 def draw_proposal(image: Picture, found: Proposal, note: str = "") -> Image:
-    """The frame with the outlines of all units and their ids; orange where none was found.
+    """Draws outlines of all units and their ids on the frame; orange where none was found.
 
     Args:
         image: the frame.

@@ -1,4 +1,4 @@
-"""The specimen in a first frame: where its design has it, or refused with what is there instead."""
+"""Recognises the specimen in a first frame, or refuses it with what is there instead."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _QUARTER = np.pi / 4
 def recognise(
     image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None, setup: RecordingSetup
 ) -> list[LatticeDetection]:
-    """The specimen in a first frame: all ways to see it that its outlines do not tell apart.
+    """Finds all ways to see the specimen in a first frame that its outlines do not tell apart.
 
     Raises:
         UserError: it is not there, or not at this scale, or not as the set-up says.
@@ -67,7 +67,7 @@ def recognise(
 
 
 def ambiguity_text(ways: list[LatticeDetection]) -> str:
-    """What to say where there are several ways to see a specimen; nothing if there is one."""
+    """Describes several ways to see a specimen; nothing if there is one."""
     if len(ways) == 1:
         return ""
     others = "; ".join(orientation_text(way.camera) for way in ways[1:])
@@ -100,7 +100,7 @@ def check_outlines(
 
 
 def agreeing_outlines(specimen: SpecimenOutlines, outlines: PoseFits) -> Mask:
-    """Which units (units,) have the outlines that they have by design, and where it has them."""
+    """Marks units (units,) with the outlines of the design, where it has them."""
     ratio = outlines.noise / np.abs(outlines.photometry[:, 0])
     near = np.linalg.norm(outlines.pose[:, :2], axis=1) < _FAR * specimen.pitch
     upright = np.abs(outlines.pose[:, 2]) < _TURNED
@@ -109,7 +109,7 @@ def agreeing_outlines(specimen: SpecimenOutlines, outlines: PoseFits) -> Mask:
 
 
 def units_in_frame(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
-    """Which units (units,) lie whole in the picture."""
+    """Marks units (units,) that lie whole in the picture."""
     middle = calibration.camera.project(specimen.centre)
     reach = specimen.radius[:, None] / calibration.pixel
     last = np.array(calibration.camera.size) - 1
@@ -135,7 +135,7 @@ def _shown(found: list[LatticeDetection], specimen: SpecimenOutlines) -> bool:
 
 
 def _as_told(found: list[LatticeDetection], setup: RecordingSetup) -> list[LatticeDetection]:
-    """Those of the ways to see it that are as the set-up says.
+    """Keeps the ways to see it that are as the set-up says.
 
     Raises:
         UserError: none is.

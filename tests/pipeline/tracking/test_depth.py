@@ -11,7 +11,7 @@ from pipeline.tracking.frames import Frame, import_video
 from pipeline.tracking.geometry import Depth, estimate_depth, outlines_of_design
 from pipeline.tracking.motion import track_video
 from pipeline.tracking.reference_frame import RecordingSetup
-from pipeline.virtual_lab import sensor
+from pipeline.virtual_lab import filming
 from pipeline.virtual_lab.camera_pose import viewpoint
 from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene
@@ -32,7 +32,9 @@ def filmed(frames: int) -> tuple[FilmScene, list[np.ndarray], list[Frame]]:
     sign = np.where(place.sum(axis=1) % 2 == 0, -0.3, 0.3)
     full = np.column_stack([-0.04 * specimen.centre[:, 0], 0.02 * specimen.centre[:, 1], sign])
     poses = [share * full for share in np.linspace(0, 1, frames)]
-    images = [sensor.sensor_frame(scene, pose[None], 0.0, k, ASKED) for k, pose in enumerate(poses)]
+    images = [
+        filming.sensor_frame(scene, pose[None], 0.0, k, ASKED) for k, pose in enumerate(poses)
+    ]
     return scene, poses, [Frame(k, k / 30, image) for k, image in enumerate(images)]
 
 

@@ -7,7 +7,7 @@ import shapely
 
 from pipeline.problem.sections import CameraView, UnitAppearance
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.virtual_lab import coverage, sensor
+from pipeline.virtual_lab import coverage, filming
 from pipeline.virtual_lab.camera_pose import viewpoint
 from pipeline.virtual_lab.coverage import NestedPolygons
 from pipeline.virtual_lab.face_marks import draw_marks
@@ -86,7 +86,7 @@ def test_the_picture_is_true_to_a_fraction_of_a_hundredth_of_a_pixel() -> None:
     look = UnitAppearance.model_validate({"face": 0.6, "mark": 0.0, "side": 0.3, "board": 1.0})
     scene = one_unit(look)
     pose = np.array([0.37, -0.21, 0.5])
-    made, exact = sensor.shade_image(scene, pose[None], 0.0), sampled(scene, pose)
+    made, exact = filming.shade_image(scene, pose[None], 0.0), sampled(scene, pose)
     assert np.isclose(exact, look.side).sum() > 20  # the walls are seen
     assert len(scene.marks.unit) == 2
     slope = np.gradient(made)
@@ -100,12 +100,12 @@ def test_blur_does_not_move_anything() -> None:
     """Blurred on a grid three times as fine, or nine times: the same picture."""
     scene = one_unit(UnitAppearance())
     pose = np.array([[0.1, 0.2, -0.3]])
-    made = sensor.shade_image(scene, pose, 0.5)
-    usual, sensor.FINER = sensor.FINER, 9
+    made = filming.shade_image(scene, pose, 0.5)
+    usual, filming.FINER = filming.FINER, 9
     try:
-        finer = sensor.shade_image(scene, pose, 0.5)
+        finer = filming.shade_image(scene, pose, 0.5)
     finally:
-        sensor.FINER = usual
+        filming.FINER = usual
     slope = np.gradient(made)
     for axis in (0, 1):
         assert abs((slope[axis] * (finer - made)).sum() / (slope[axis] ** 2).sum()) < 0.002
@@ -113,9 +113,8 @@ def test_blur_does_not_move_anything() -> None:
 
 def test_noise_is_that_of_the_electrons(film: VirtualFilm) -> None:
     scene, asked = film.scene, film.asked
-    still = [
-        sensor.sensor_frame(scene, film.motion.instants[0], 0.0, index, asked) for index in range(2)
-    ]
+    poses = film.motion.instants[0]
+    still = [filming.sensor_frame(scene, poses, 0.0, index, asked) for index in range(2)]
     change = still[1][:20, :20].astype(float) - still[0][:20, :20]
     level = still[0][:20, :20].mean()
     counted = asked.sensor.full_well / 255
