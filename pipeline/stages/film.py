@@ -97,7 +97,7 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _plan(args: argparse.Namespace) -> None:
-    import csv
+    import pandas as pd
 
     asked = recordings.Recording(virtual=VirtualRecording())
     if args.recording is not None:
@@ -121,16 +121,12 @@ def _plan(args: argparse.Namespace) -> None:
             rows.append({**choice.words, **found.words})
             bar.update()
     LOG.info("%s; errors of clips of %d frames", SYNTHETIC, args.frames)
-    for line in noise_planning.table(rows):
+    table = pd.DataFrame(rows)
+    for line in table.to_string(index=False).splitlines():
         LOG.info("%s", line)
     if args.csv is not None:
-        with (
-            write_atomically(args.csv) as aside,
-            aside.open("w", encoding="utf-8", newline="") as file,
-        ):
-            table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            table.writeheader()
-            table.writerows(rows)
+        with write_atomically(args.csv) as aside:
+            table.to_csv(aside, index=False, lineterminator="\n")
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:

@@ -133,7 +133,7 @@ def _init(video: Path, args: argparse.Namespace) -> None:
     with write_atomically(out) as aside:
         comments = ("What the first frame did not tell:", *found.doubts)
         aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
-    seen = f"{len(found.sighting.unit)} of {found.specimen.count} units, {found.kind}"
+    seen = f"{len(found.detection.unit)} of {found.specimen.count} units, {found.kind}"
     LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
     for doubt in found.doubts:
         LOG.info("not told: %s", doubt)

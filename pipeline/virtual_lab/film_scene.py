@@ -95,14 +95,11 @@ def _walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
     backs, walls = [], []
     for front, rear in zip(corners, back, strict=True):
         there = ~np.isnan(front[:, 0])
-        backs.append(shapely.Polygon(rear[there]))
-        walls.append(_walls_below(front[there], rear[there]))
+        face, behind = front[there], rear[there]
+        backs.append(shapely.Polygon(behind))
+        sides = [face, np.roll(face, -1, axis=0), np.roll(behind, -1, axis=0), behind]
+        walls.append(np.stack(sides, axis=1))  # (edges, 4, 2) corners of the wall below every edge
     return [np.array(backs), shapely.convex_hull(shapely.multipoints(np.concatenate(walls)))]
-
-
-def _walls_below(front: Floats, rear: Floats) -> Floats:
-    """Returns corners (edges, 4, 2) of the wall below every edge."""
-    return np.stack([front, np.roll(front, -1, axis=0), np.roll(rear, -1, axis=0), rear], axis=1)
 
 
 def _layer(shapes: Floats, shade: float) -> _Layer:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -140,11 +140,9 @@ def _chosen(
     pixel = base.pitch / scale
     image = tuple(2 * round(side * camera.pixel_size / pixel / 2) for side in camera.image)
     if marker is not None:
+        kinds = {"dots": look.dots, "speckle": look.speckle}
         look = look.model_copy(
-            update={
-                "dots": look.dots.model_copy(update={"diameter": marker}),
-                "speckle": look.speckle.model_copy(update={"diameter": marker}),
-            }
+            update={k: v.model_copy(update={"diameter": marker}) for k, v in kinds.items()}
         )
     update = {
         "camera": camera.model_copy(update={"pixel_size": pixel, "image": image}),
@@ -197,12 +195,3 @@ def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
         float(np.isnan(error[..., 0]).mean()),
         pixel,
     )
-
-
-def table(rows: Sequence[Mapping[str, str]]) -> Iterator[str]:
-    """Formats lines of a table of words, in columns."""
-    names = list(rows[0])
-    width = {name: max(len(name), *(len(row[name]) for row in rows)) for name in names}
-    yield "  ".join(name.rjust(width[name]) for name in names)
-    for row in rows:
-        yield "  ".join(row[name].rjust(width[name]) for name in names)

@@ -55,8 +55,8 @@ class PoseFitter:
             noise: (units,) residuals to expect, over the gain, where the pose is nearly known.
         """
         units, place = len(pose), self.templates.centre + pose[:, :2]
-        jacobian = self.camera.jacobian(place)
-        scale = np.sqrt(np.abs(_determinant(jacobian)))
+        j = self.camera.jacobian(place)
+        scale = np.sqrt(np.abs(j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0]))
         start = FitStart(
             np.concatenate([pose, photometry], axis=1),
             self.camera.project(place),
@@ -71,18 +71,10 @@ class PoseFitter:
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
             across = int(2 * start.radius[wanted].max()) // SIZE + 3
-            scene = FramePixels(self._padded(image), self.plane)
+            padded = np.zeros(self.plane.shape[:2], np.float32)  # to whole blocks
+            padded[: image.shape[0], : image.shape[1]] = image
+            scene = FramePixels(padded, self.plane)
             patch_correlation.fit_patches(
                 scene, self.templates, start, wanted, FULL_STEPS, workspace(across**2), out
             )
         return patch_correlation.unpack(out)
-
-    def _padded(self, image: Picture) -> Singles:
-        """Pads the image to whole blocks."""
-        out = np.zeros(self.plane.shape[:2], np.float32)
-        out[: image.shape[0], : image.shape[1]] = image
-        return out
-
-
-def _determinant(matrices: Floats) -> Floats:
-    return matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]

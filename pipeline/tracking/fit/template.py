@@ -65,8 +65,10 @@ class TemplateGrid:
             if depth is not None and back is not None:
                 shown = depth.silhouette(polygon, back[unit])
             self.inside[unit] = self.signed_distance(shown)
-            ends = polygon[specimen.joined[unit, : len(polygon)]]
-            self.joint[unit] = self._distance(ends)
+            far = np.full(self.x.shape, np.inf)
+            for x, y in polygon[specimen.joined[unit, : len(polygon)]]:
+                far = np.minimum(far, np.hypot(self.x - x, self.y - y))
+            self.joint[unit] = far
         self.centre = specimen.centre
 
     def of(self, units: Ints) -> TemplateGrid:
@@ -75,12 +77,6 @@ class TemplateGrid:
         made.inside, made.joint = self.inside[units], self.joint[units]
         made.centre = self.centre[units]
         return made
-
-    def _distance(self, points: Floats) -> Floats:
-        far = np.full(self.x.shape, np.inf)
-        for x, y in points:
-            far = np.minimum(far, np.hypot(self.x - x, self.y - y))
-        return far
 
     def signed_distance(self, polygon: Floats) -> Singles:
         """Measures from the nodes to a polygon about the centroid, positive inside, mm."""

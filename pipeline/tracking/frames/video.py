@@ -179,7 +179,7 @@ def _decoded(
             if index < _ALL * _promised(container, stream, index / max(time, 1e-9)):
                 raise broken_off(path, "the file should go on", index, time)
             return
-        stamp = _nominal(stream, index) if frame.pts is None else float(frame.time)
+        stamp = index / float(stream.average_rate or 1) if frame.pts is None else float(frame.time)
         first = stamp if first is None else first
         time = stamp - first
         if time > end:
@@ -194,10 +194,6 @@ def _promised(container: av.container.InputContainer, stream: av.VideoStream, ra
     if stream.frames or len(container.streams) > 1 or not container.duration:
         return float(stream.frames)
     return rate * container.duration / av.time_base - 1
-
-
-def _nominal(stream: av.VideoStream, index: int) -> float:
-    return index / float(stream.average_rate or 1)
 
 
 def _upright(frame: av.VideoFrame) -> Picture:

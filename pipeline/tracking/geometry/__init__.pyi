@@ -1,5 +1,6 @@
 from . import camera as camera
 from .camera import Camera as Camera
+from .camera import fit_camera as fit_camera
 from .depth import Depth as Depth
 from .depth import estimate_depth as estimate_depth
 from .rigid_fit import arm_swing as arm_swing

@@ -15,8 +15,13 @@ from pipeline.problem.fields import Angle, Coordinate, Section
 from pipeline.problem.reading import section
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import csv_columns as columns
-from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design, robust_motion
-from pipeline.tracking.output.track_dataset import absent_flag, label_track, over_all_units
+from pipeline.tracking.geometry import (
+    SpecimenOutlines,
+    outlines_of_design,
+    robust_motion,
+    rotation_matrix,
+)
+from pipeline.tracking.output.track_dataset import label_track, pose_variables
 from sim.core import Floats, Ints
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
@@ -100,9 +105,8 @@ def read_points(path: Path, asked: DicExport) -> DicPoints:
     """
     names = asked.columns
     table = columns.read(path, (names.time, names.x, names.y, names.ux, names.uy))
-    cos, sin = np.cos(asked.rotation), np.sin(asked.rotation)
     upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
-    turn = np.array([[cos, -sin], [sin, cos]])
+    turn = rotation_matrix(asked.rotation)
     place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn
     return DicPoints(table[:, 0], place, table[:, 3:5] * upright @ turn)
 
@@ -160,8 +164,7 @@ def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
 def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
     """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest."""
     turn, shift, weight = robust_motion(before, after, _FINEST)
-    cos, sin = np.cos(turn), np.sin(turn)
-    rest = after - before @ np.array([[cos, sin], [-sin, cos]]) - shift
+    rest = after - before @ rotation_matrix(-turn) - shift
     count = weight.sum()
     middle = weight @ before / count
     arm = weight @ ((before - middle) ** 2).sum(axis=1)
@@ -176,15 +179,11 @@ def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) ->
     present = np.isfinite(design["vertices"].values[:, 0, 0])
     hidden = TABLES["track"]["quality"].flags["hidden"]
     quality = np.where(np.isfinite(motion[..., 0]), 0, hidden).astype(np.int8)
-    pose, frames = ("time", "unit", "dof"), ("time",)
-    unknown = np.full(len(time), np.nan)
     variables = {
-        "displacement": (pose, over_all_units(motion, present, np.nan)),
-        "sigma": (pose, over_all_units(sigma, present, np.nan)),
-        "quality": (pose[:2], over_all_units(quality, present, absent_flag())),
-        "timing": (frames, np.zeros(len(time), np.int8)),
-        "frame": (frames, np.arange(len(time))),
-        "load_force": (frames, unknown),
+        **pose_variables(present, motion, sigma, quality),
+        "timing": (("time",), np.zeros(len(time), np.int8)),
+        "frame": (("time",), np.arange(len(time))),
+        "load_force": (("time",), np.full(len(time), np.nan)),
         "camera_homography": (("row", "column"), np.full((3, 3), np.nan)),
         "camera_centre": (("xy",), np.full(2, np.nan)),
         "camera_radial": (("power",), np.full(2, np.nan)),

@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline.datasets.tables import TABLES
 from pipeline.runtime import write_atomically
 from pipeline.tracking.motion import Track
-from sim.core import Floats, Mask
+from sim.core import Floats, Mask, Reals
 
 _MOTION = ("time", "unit", "dof")
 _NUMBERS = ("ux_mm", "uy_mm", "theta_rad", "sigma_ux_mm", "sigma_uy_mm", "sigma_theta_rad")
@@ -31,9 +31,7 @@ def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None
     residual = np.full((design.sizes["unit"], 2), np.nan)
     residual[present] = track.calibration.residual
     variables = {
-        "displacement": (_MOTION, over_all_units(track.displacement, present, np.nan)),
-        "sigma": (_MOTION, over_all_units(track.sigma, present, np.nan)),
-        "quality": (_MOTION[:2], over_all_units(track.quality, present, absent_flag())),
+        **pose_variables(present, track.displacement, track.sigma, track.quality),
         "timing": (("time",), track.timing.astype(np.int8)),
         "frame": (("time",), track.frame),
         "load_force": (("time",), np.full(len(track.time), np.nan) if force is None else force),
@@ -45,6 +43,17 @@ def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None
         "blur": ((), track.calibration.blur / pixel),
     }
     return label_track(design, track.time, variables)
+
+
+def pose_variables(
+    present: Mask, motion: Reals, sigma: Reals, quality: np.ndarray
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Spreads poses, uncertainties and quality (frames, present units, ...) over all units."""
+    found = {"displacement": (motion, np.nan), "sigma": (sigma, np.nan)}
+    return {
+        name: (_MOTION[: values.ndim], _over_all_units(values, present, fill))
+        for name, (values, fill) in (found | {"quality": (quality, absent_flag())}).items()
+    }
 
 
 def label_track(design: xr.Dataset, time: Floats, variables: Mapping[str, object]) -> xr.Dataset:
@@ -72,7 +81,7 @@ def mean_over_seen(motion: Floats) -> Floats:
     return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
 
 
-def over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
+def _over_all_units(values: np.ndarray, present: np.ndarray, fill: float) -> np.ndarray:
     """Spreads values (frames, present units, ...) over all units."""
     if present.all():
         return values

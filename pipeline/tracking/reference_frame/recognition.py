@@ -55,15 +55,16 @@ def recognise(
             key="window.start",
             remedy="start where the specimen is lit",
         )
+    enough = _ENOUGH * specimen.count
     found = detect_lattice(image, specimen, px_per_mm)
-    if px_per_mm is not None and not _shown(found, specimen):
+    if px_per_mm is not None and len(found[0].unit) < enough:
         anywhere = detect_lattice(image, specimen, None)
-        if _shown(anywhere, specimen):
+        if len(anywhere[0].unit) >= enough:
             _check_scale(anywhere[0], specimen, px_per_mm)
             found = anywhere
-    if not _shown(found, specimen):
-        raise _another(detection_summary(found[0], specimen))
-    return _as_told(best_orientations(image, specimen, found), setup)
+    if len(found[0].unit) < enough:
+        raise _another_design(detection_summary(found[0], specimen))
+    return _as_stated(best_orientations(image, specimen, found), setup)
 
 
 def ambiguity_text(ways: list[LatticeDetection]) -> str:
@@ -78,7 +79,7 @@ def ambiguity_text(ways: list[LatticeDetection]) -> str:
 
 
 def check_outlines(
-    specimen: SpecimenOutlines, sighting: LatticeDetection, calibration: CameraCalibration
+    specimen: SpecimenOutlines, detection: LatticeDetection, calibration: CameraCalibration
 ) -> None:
     """Refuses a first frame whose outlines are others than the design's.
 
@@ -88,7 +89,9 @@ def check_outlines(
     there = units_in_frame(specimen, calibration)
     strange = there & ~agreeing_outlines(specimen, calibration.outlines)
     if strange.sum() > _STRANGE * there.sum():
-        raise _another(f"{detection_summary(sighting, specimen)}; {_named(specimen, strange)}")
+        raise _another_design(
+            f"{detection_summary(detection, specimen)}; {_named(specimen, strange)}"
+        )
     if not there.all():
         LOG.warning(
             "warning: %d units reach out of the first frame; where a whole row does, the lattice"
@@ -121,7 +124,7 @@ def _named(specimen: SpecimenOutlines, strange: Mask) -> str:
     return f"{strange.sum()} units are hidden or not as the design has them ({ids})"
 
 
-def _another(seen: str) -> UserError:
+def _another_design(seen: str) -> UserError:
     return UserError(
         f"the first frame does not show this design: {seen}",
         key="design",
@@ -130,11 +133,7 @@ def _another(seen: str) -> UserError:
     )
 
 
-def _shown(found: list[LatticeDetection], specimen: SpecimenOutlines) -> bool:
-    return len(found[0].unit) >= _ENOUGH * specimen.count
-
-
-def _as_told(found: list[LatticeDetection], setup: RecordingSetup) -> list[LatticeDetection]:
+def _as_stated(found: list[LatticeDetection], setup: RecordingSetup) -> list[LatticeDetection]:
     """Keeps the ways to see it that are as the set-up says.
 
     Raises:
@@ -158,8 +157,7 @@ def _as_told(found: list[LatticeDetection], setup: RecordingSetup) -> list[Latti
 
 def _check_scale(found: LatticeDetection, specimen: SpecimenOutlines, px_per_mm: float) -> None:
     """Refuses a pixel size far from that which shows the specimen."""
-    jacobian = found.camera.jacobian(specimen.centre)
-    size = float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
+    size = float(np.median(found.camera.px_per_mm(specimen.centre)))
     if abs(np.log(size / px_per_mm)) > _SCALE:
         raise UserError(
             f"the specimen is there, but pixels measure about {1 / size:.3g} mm on it",

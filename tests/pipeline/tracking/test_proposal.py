@@ -28,7 +28,7 @@ def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
     described = import_video.description(CLIPS / f"{name}.yaml")
     found = proposal.propose(first(name), import_video.design(described))
     assert found.kind == kind
-    assert len(found.sighting.unit) > 0.98 * found.specimen.count
+    assert len(found.detection.unit) > 0.98 * found.specimen.count
     assert found.pixel_size == pytest.approx(1 / described["approx_px_per_mm"], rel=0.01)
     assert any("case" in doubt for doubt in found.doubts)
 
@@ -36,7 +36,7 @@ def test_units_and_what_is_on_them_are_found(name: str, kind: str) -> None:
 def test_a_mirrored_video_is_seen_as_such() -> None:
     design = import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))
     found = proposal.propose(np.ascontiguousarray(first("f_silhouette")[:, ::-1]), design)
-    assert "mirrored" in orientation_text(found.sighting.camera)
+    assert "mirrored" in orientation_text(found.detection.camera)
 
 
 def test_a_proposal_is_a_recording_and_a_picture(
@@ -65,12 +65,12 @@ def test_a_turned_video_is_seen_as_such() -> None:
     found = proposal.propose(image, design, 2.74)
     height = found.specimen.centre[:, 1]
     row = np.flatnonzero(height > height.max() - 1)
-    seen = found.sighting.camera.project(found.specimen.centre[row])
+    seen = found.detection.camera.project(found.specimen.centre[row])
     below = np.ascontiguousarray(image[int(seen[:, 1].max()) + 22 :])
     gone = np.isin(design["unit"].values, found.specimen.ids[row])
     names = ("vertices", "vertices_initial")
     cut = design.assign({name: design[name].where(~gone[:, None, None]) for name in names})
-    assert len(proposal.propose(below, cut, 2.74).sighting.unit) == 210
-    turned = proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74).sighting
+    assert len(proposal.propose(below, cut, 2.74).detection.unit) == 210
+    turned = proposal.propose(np.ascontiguousarray(np.rot90(below)), cut, 2.74).detection
     assert len(turned.unit) == 210
     assert "90 deg" in orientation_text(turned.camera)
