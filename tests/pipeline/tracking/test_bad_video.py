@@ -16,20 +16,21 @@ from pipeline.tracking.frames import BrokenOffError, Frame, import_video, read_f
 from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
 from pipeline.tracking.motion import track_video
 from tests.pipeline.tracking.conftest import CLIPS
+from tests.pipeline.virtual_lab.conftest import GRID, film_of
 
-SCALE = 2.74
+SCALE = 1 / 0.365
+WIDTH = 320
 
 
 @pytest.fixture(scope="module")
 def specimen() -> SpecimenOutlines:
-    return outlines_of_design(
-        import_video.design(import_video.description(CLIPS / "f_silhouette.yaml"))
-    )
+    return outlines_of_design(import_video.design(GRID))
 
 
 @pytest.fixture(scope="module")
 def clip() -> list[np.ndarray]:
-    return [frame.image for frame in read_frames(CLIPS / "f_silhouette.mp4")][:4]
+    """The last frame at rest and three in motion."""
+    return list(film_of("bare").images())[2:6]
 
 
 def timed(images: list[np.ndarray]) -> list[Frame]:
@@ -84,15 +85,16 @@ def test_pictures_without_a_rate_or_of_another_size_are_told(
         list(read_frames(tmp_path, rate=1.0))
 
 
-def test_a_phone_s_video_is_shown_upright(tmp_path: Path, clip: list[np.ndarray]) -> None:
+def test_a_phone_s_video_is_shown_upright(tmp_path: Path) -> None:
     """The header of the track tells by how much players are to turn it."""
     held = bytearray((CLIPS / "f_silhouette.mp4").read_bytes())
+    plain = next(read_frames(CLIPS / "f_silhouette.mp4")).image
     matrix = held.index(b"tkhd") + 4 + 40  # behind version, times, ids and layer
     one = 1 << 16
     held[matrix : matrix + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 768 * one, 0, 1 << 30)
     phone = tmp_path / "phone.mp4"
     phone.write_bytes(held)
-    np.testing.assert_array_equal(next(read_frames(phone)).image, np.rot90(clip[0], -1))
+    np.testing.assert_array_equal(next(read_frames(phone)).image, np.rot90(plain, -1))
 
 
 def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
@@ -125,12 +127,13 @@ def test_a_specimen_that_jumped_is_found_again(
     specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
     """By half the distance of two units, where a neighbour is as near as the unit itself."""
-    moved = cv2.getRotationMatrix2D((384, 384), 21.0, 1.0) + np.array([[0, 0, -9.0], [0, 0, 17.0]])
-    jumped = cv2.warpAffine(clip[0], moved, (768, 768), borderValue=205)
+    turn = cv2.getRotationMatrix2D((WIDTH / 2, WIDTH / 2), 21.0, 1.0)
+    moved = turn + np.array([[0, 0, -9.0], [0, 0, 17.0]])
+    jumped = cv2.warpAffine(clip[0], moved, (WIDTH, WIDTH), borderValue=205)
     track = track_video(iter(timed([clip[0], jumped])), specimen, SCALE)
     camera, pose = track.calibration.camera, track.displacement[1]
     wanted = camera.project(specimen.centre) @ moved[:, :2].T + moved[:, 2]
     seen = camera.project(specimen.centre + pose[:, :2])
-    inside = ((wanted > 20) & (wanted < 747)).all(axis=1)
+    inside = ((wanted > 20) & (wanted < WIDTH - 21)).all(axis=1)
     assert (track.quality[1:, inside] == 0).all()
     assert np.abs(seen - wanted)[inside].max() < 0.5
