@@ -85,9 +85,9 @@ def test_a_specimen_is_at_rest_until_it_is_loaded(study: tuple[Problem, Scene]) 
     first = found["displacement"].isel(time=0)
     assert float(np.abs(first).max()) < 1e-9
     assert float(np.abs(found["drive_force"][0]).max()) < 1e-6
-    again, other = (made(study, seed=seed) for seed in (0, 1))
+    again = made(study, seed=0)
     assert again.identical(made(study, seed=0))
-    assert float(np.abs(again["displacement"] - other["displacement"]).max()) > 0.01
+    assert float(np.abs(again["displacement"] - found["displacement"]).max()) > 0.01
 
 
 def test_a_specimen_without_tolerances_is_the_design(study: tuple[Problem, Scene]) -> None:
