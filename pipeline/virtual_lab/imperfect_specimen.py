@@ -92,11 +92,9 @@ def make_specimen(
     if not copy.sound:
         remedy = "give another seed, or smaller tolerances"
         raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
-    made = replace(
-        scene,
+    made = scene.driven_by(
+        imperfect_drive(scene, case, asked.drive, end, asked.unload),
         lattice=replace(scene.lattice, vertices=copy.vertices),
-        motions=(imperfect_drive(scene, case, asked.drive, end, asked.unload),),
-        weights=np.ones(1),
         duration=end,
         frequency=None,
         reference=None,
@@ -117,9 +115,9 @@ def imperfect_drive(
         end: of the motion, s.
         unload: whether the load is taken off again in the second half.
     """
-    planned = scene.motions[case]
-    path = np.asarray(planned(np.linspace(0, scene.duration, SAMPLES)))[:, :2]
-    site = scene.lattice.site[scene.driven]
+    planned = scene.loads.motions[case]
+    path = np.asarray(planned(np.linspace(0, scene.loads.duration, SAMPLES)))[:, :2]
+    site = scene.lattice.site[scene.loads.driven]
     return ImperfectDrive(
         planned,
         site - site.mean(axis=0),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
-from pipeline.stages import track
+from pipeline.__main__ import run_stage
 from tests.pipeline.tracking.conftest import CLIPS
 
 VIDEO = str(CLIPS / "f_silhouette.mp4")
@@ -16,14 +16,17 @@ VIDEO = str(CLIPS / "f_silhouette.mp4")
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """The bare clip, imported."""
-    assert track.main(["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)]) == 0
+    assert (
+        run_stage("track", ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)])
+        == 0
+    )
     return tmp_path / "f_silhouette_recording.yaml"
 
 
 def refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """Returns what the stage says when it refuses; it must leave nothing behind."""
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out)]) == 2
+    assert run_stage("track", [str(recording), "--out", str(out)]) == 2
     assert not out.exists()
     return capsys.readouterr().err
 
@@ -50,7 +53,7 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     extended(recording, "window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}")
     extended(recording, "load_axis: driven displacement")
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
     assert made["displacement"].dims == ("time", "unit", "dof")
     np.testing.assert_array_equal(made["unit"], design["unit"])
@@ -79,7 +82,7 @@ def test_another_design_is_refused(
     other.write_bytes((CLIPS / "f_silhouette.yaml").read_bytes())
     changed(other, old, new)
     folder = str(recording.parent)
-    assert track.main(["import", str(other), "--video", VIDEO, "--out-dir", folder]) == 0
+    assert run_stage("track", ["import", str(other), "--video", VIDEO, "--out-dir", folder]) == 0
     words = refused(recording, capsys)
     assert "does not show this design" in words
     assert told in words
@@ -95,7 +98,7 @@ def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(
     for turned, code in (("turned: 0 deg", 0), ("turned: 180 deg", 2)):
         log = "load_cell: {file: load.csv, offset: 70}\n" if code else ""
         recording.write_text(f"{text}{turned}\n{log}", encoding="utf-8")
-        assert track.main([str(recording), "--out", str(out), "--no-report"]) == code
+        assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == code
         made.append(datasets.read(out, "track"))
     upright, turned_by_half = (each["displacement"].values for each in made)
     assert np.abs(upright[-1, :, :2]).max() > 0.05
@@ -140,11 +143,11 @@ def test_a_recording_that_cannot_be_tracked_is_refused(
         (["frobnicate", "a.mp4"], "no such command"),
         (["init", "a.mp4"], "--design is wanted"),
         (["a.yaml"], "--out is wanted"),
-        (["a.mp4", "--out", "a.nc"], "pipeline.stages.track init a.mp4"),
+        (["a.mp4", "--out", "a.nc"], "pipeline track init a.mp4"),
     ],
 )
 def test_a_command_that_lacks_something_is_told_what(
     words: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert track.main(words) == 2
+    assert run_stage("track", words) == 2
     assert told in capsys.readouterr().err
