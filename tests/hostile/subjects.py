@@ -17,7 +17,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets.tables import TABLES, Kind
-from pipeline.fabrication.papers import manifest
+from pipeline.fabrication.papers import MANIFEST, read_manifest
 from pipeline.posing import scene_of
 from pipeline.problem import canonical_json
 from pipeline.problem.fields import csv_columns, units
@@ -203,7 +203,7 @@ def _manifest(folder: Path) -> Path:
     told = (
         '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "thin_walls_mm": {}, "files": {}}'
     )
-    return _text(manifest.NAME, told, folder)
+    return _text(MANIFEST, told, folder)
 
 
 def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
@@ -303,6 +303,6 @@ SUBJECTS: tuple[Subject, ...] = (
         "manifest of a package",
         "other",
         _manifest,
-        lambda p: [sorted(map(str, manifest.read(p.parent).items()))],
+        lambda p: [sorted(map(str, read_manifest(p.parent).items()))],
     ),
 )
