@@ -12,7 +12,7 @@ from pipeline.calibration.experiments import TrackedSpecimen, per_dof, pose_spec
 from pipeline.calibration.inputs import Constants, TrackedMotion
 from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
 from pipeline.runtime import UserError
-from pipeline.tracking.output import absent, labelled
+from pipeline.tracking.output import absent_flag, label_track
 from sim.core import Floats
 from sim.energy import observe
 from sim.scene import Scene, concrete_parameters, simulate
@@ -101,7 +101,7 @@ def _dataset(
         spread(part, lattice, intact.n_units, axis=1).astype(np.float32) for part in (motion, sigma)
     )
     there = np.isin(intact.id, lattice.id)
-    quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))
+    quality = np.broadcast_to(np.where(there, 0, absent_flag()), (len(time), intact.n_units))
     variables = {
         "displacement": (("time", "unit", "dof"), moved),
         "sigma": (("time", "unit", "dof"), told),
@@ -116,4 +116,4 @@ def _dataset(
         "image_size": (("xy",), np.zeros(2, np.int64)),
         "blur": ((), np.nan),
     }
-    return labelled(design, time, variables)
+    return label_track(design, time, variables)

@@ -13,8 +13,8 @@ from pipeline.comparison.registration import Registration, measure_places, regis
 from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import of_design
-from pipeline.tracking.output import is_driven, mean_seen
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.output import driven_units, mean_over_seen
 from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
@@ -83,7 +83,7 @@ def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
         centre=centre,
         registration=found,
         track=turned,
-        drive=mean_seen(displacement[:, is_driven(design), :2]),
+        drive=mean_over_seen(displacement[:, driven_units(design), :2]),
         force=shown["load_force"].values,
     )
 
@@ -101,7 +101,7 @@ def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
         raise _another("other units are absent, or they have other vertices")
     if (apart := float(np.nanmax(np.abs(tracked - built)))) > _SAME:
         raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
-    seen = np.isfinite(track["displacement"].values[:, is_driven(design), 0]).any(axis=1)
+    seen = np.isfinite(track["displacement"].values[:, driven_units(design), 0]).any(axis=1)
     if not seen.any():
         raise UserError(
             "no driven unit is seen in any frame: there is nothing to align with",
@@ -129,7 +129,7 @@ def select_frames(track: xr.Dataset) -> Ints:
 
 
 def _centres(design: xr.Dataset) -> Floats:
-    specimen = of_design(design)
+    specimen = outlines_of_design(design)
     out = np.full((design.sizes["unit"], 2), np.nan)
     out[np.isin(design["unit"].values, specimen.ids)] = specimen.centre
     return out

@@ -82,7 +82,7 @@ def measure_places(track: xr.Dataset, design: Floats) -> Floats:
     camera, missed = _camera(track), track["camera_residual"].values
     if camera is not None:
         there = np.isfinite(design + missed).all(axis=1)
-        measured[there] = camera.beside(design[there], missed[there])
+        measured[there] = camera.unproject(camera.project(design[there]) + missed[there])
     return measured
 
 

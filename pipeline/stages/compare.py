@@ -27,7 +27,7 @@ from pipeline.posing import read_design, scene_of, structures_of
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built
-from pipeline.virtual_lab import of_structure
+from pipeline.virtual_lab import select_structure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ def work(args: argparse.Namespace) -> None:
         UserError: the recording and the study do not belong together, or cannot be aligned.
     """
     asked = problem.load(args.problem, args.preset)
-    recording = recordings.load(args.recording)
+    recording = recordings.load_recording(args.recording)
     files = {name: getattr(args, name) for name in ("design", "response", "track")}
     try:
         made = compared(asked, recording, args)
@@ -106,7 +106,7 @@ def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
     Raises:
         UserError: the response has none such.
     """
-    one = of_structure(response, recording.structure)
+    one = select_structure(response, recording.structure)
     if recording.case >= (cases := one.sizes["case"]):
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError(

@@ -110,4 +110,4 @@ def check_recording(block: Block, folder: Path) -> None:
     if "points" in yaml.safe_load(block.text):
         dic_points.load(path)
     else:
-        recording.load(path)
+        recording.load_recording(path)

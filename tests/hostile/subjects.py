@@ -26,7 +26,7 @@ from pipeline.problem.sections import Codec
 from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
 from pipeline.tracking.output import dic_points
-from pipeline.virtual_lab import encode
+from pipeline.virtual_lab import encode_video
 from tests.hostile import damage, edits
 from tests.hostile.damage import Damage
 from tests.pipeline import static
@@ -157,17 +157,17 @@ def _frames(folder: Path) -> Path:
 def _film(name: str, codec: Codec, folder: Path) -> Path:
     path = folder / name
     noise = np.random.default_rng(0).integers(0, 255, (8, 96, 128), dtype=np.uint8)
-    encode(path, iter(noise), 30.0, codec, {"title": "noise"})
+    encode_video(path, iter(noise), 30.0, codec, {"title": "noise"})
     return path
 
 
 def _shown(path: Path) -> Told:
-    held, found = [], video.frames(path, rate=30.0)
+    held, found = [], video.read_frames(path, rate=30.0)
     for frame in found:
         held.append((frame.index, frame.time, frame.image.shape, zlib.crc32(frame.image.tobytes())))
         assert frame.image.min() >= 0
         assert frame.image.max() <= 255
-    return [video.length(path) > 0, held]
+    return [video.frame_count(path) > 0, held]
 
 
 def _dataset(kind: Kind, folder: Path) -> Path:
@@ -230,7 +230,10 @@ def _forces(path: Path) -> Told:
 
 
 def _cloud(path: Path) -> Told:
-    return [part.tolist() for part in dic_points.cloud(path, dic_points.Points(points=path.name))]
+    return [
+        part.tolist()
+        for part in dic_points.read_points(path, dic_points.DicExport(points=path.name))
+    ]
 
 
 def _readings(path: Path) -> Told:
@@ -255,7 +258,7 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml(
         "recording",
         _from_study("fig2/recordings/cloaked.yaml"),
-        lambda p: [recording.load(p).model_dump_json()],
+        lambda p: [recording.load_recording(p).model_dump_json()],
     ),
     _yaml(
         "calibration",

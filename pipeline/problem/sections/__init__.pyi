@@ -52,12 +52,12 @@ from .sweep_cases import Setting as Setting
 from .sweep_cases import apply_setting as apply_setting
 from .sweep_cases import case_count as case_count
 from .sweep_cases import group_count as group_count
+from .virtual_recording import CameraView as CameraView
 from .virtual_recording import Codec as Codec
 from .virtual_recording import Lighting as Lighting
 from .virtual_recording import Speckle as Speckle
 from .virtual_recording import UnitAppearance as UnitAppearance
-from .virtual_recording import Viewing as Viewing
 from .virtual_recording import VirtualRecording as VirtualRecording
-from .virtual_specimen import Making as Making
-from .virtual_specimen import Shaking as Shaking
-from .virtual_specimen import Weighing as Weighing
+from .virtual_specimen import DriveFaults as DriveFaults
+from .virtual_specimen import SpecimenFaults as SpecimenFaults
+from .virtual_specimen import VirtualLoadCell as VirtualLoadCell

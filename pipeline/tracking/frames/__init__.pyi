@@ -2,11 +2,11 @@ from . import import_video as import_video
 from . import load_cell as load_cell
 from . import recording as recording
 from .recording import Recording as Recording
-from .recording import load as load
+from .recording import load_recording as load_recording
+from .video import SYNTHETIC_LABEL as SYNTHETIC_LABEL
 from .video import BrokenOffError as BrokenOffError
 from .video import Frame as Frame
-from .video import frames as frames
-from .video import length as length
-from .video import uneven as uneven
-from .video_origin import WORD as WORD
-from .video_origin import rendered as rendered
+from .video import frame_count as frame_count
+from .video import has_uneven_intervals as has_uneven_intervals
+from .video import read_frames as read_frames
+from .video import rendered as rendered

@@ -1,4 +1,4 @@
-"""The YAML file of a recording: which video shows which design, and how to read it."""
+"""Defines the YAML file of a recording: a video, the design that it shows, how to read it."""
 
 from __future__ import annotations
 
@@ -109,8 +109,8 @@ class Recording(Section):
         return self
 
 
-def load(path: Path) -> Recording:
-    """The recording in a YAML file.
+def load_recording(path: Path) -> Recording:
+    """Loads the recording in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
@@ -118,8 +118,8 @@ def load(path: Path) -> Recording:
     return load_section(path, Recording)
 
 
-def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
-    """The YAML of a recording, after lines of comment.
+def recording_yaml(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
+    """Writes the YAML of a recording, after lines of comment.
 
     Args:
         values: keys and their values, as they stand in the file; those that are None are left out.

@@ -13,7 +13,7 @@ from pipeline.problem import Problem
 from pipeline.problem.fields import Section, units
 from pipeline.problem.reading import JointFigure
 from pipeline.tracking.frames import Recording
-from pipeline.tracking.output import Points
+from pipeline.tracking.output import DicExport
 from pipeline.workflow.reference.markdown import table
 
 Node = dict[str, Any]
@@ -61,7 +61,7 @@ def pages() -> dict[str, str]:
     )
     recordings = (
         File("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`"),
-        File("Points", Points, "In place of a video, for `python -m pipeline track points`"),
+        File("Points", DicExport, "In place of a video, for `python -m pipeline track points`"),
     )
     calibrations = (File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),)
     return {

@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.comparison import interpolate_response
 from pipeline.tracking.geometry import as_built
-from pipeline.tracking.output import labelled
+from pipeline.tracking.output import label_track
 
 SIGMA = np.array([0.004, 0.004, 0.0008])
 PIXEL = 0.25
@@ -51,7 +51,7 @@ def track(
         "image_size": (("xy",), np.array([512, 512])),
         "blur": ((), 0.6),
     }
-    return labelled(built, time, variables)
+    return label_track(built, time, variables)
 
 
 def written(made: xr.Dataset, folder: Path, more: str = "") -> list[str]:

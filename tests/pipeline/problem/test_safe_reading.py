@@ -61,7 +61,7 @@ def test_devices_are_not_read() -> None:
     with pytest.raises(UserError, match="not a plain file"):
         csv_columns.read_columns(endless, ["time"])
     with pytest.raises(UserError, match="not a plain file"):
-        list(video.frames(endless))
+        list(video.read_frames(endless))
     with pytest.raises(UserError, match="not a plain file"):
         images.read_outlines(endless)
 
@@ -102,7 +102,7 @@ def test_the_name_of_a_video_is_no_address(
     monkeypatch.chdir(tmp_path)
     Path(name).write_bytes(b"no video")
     with pytest.raises(UserError, match="not a readable video"):
-        list(video.frames(Path(name)))
+        list(video.read_frames(Path(name)))
 
 
 def test_a_playlist_opens_no_other_files(tmp_path: Path) -> None:
@@ -110,4 +110,4 @@ def test_a_playlist_opens_no_other_files(tmp_path: Path) -> None:
     path = tmp_path / "list.m3u8"
     path.write_text(f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\nhttp://localhost/{clip.name}\n")
     with pytest.raises(UserError, match="not a readable video"):
-        list(video.frames(path))
+        list(video.read_frames(path))

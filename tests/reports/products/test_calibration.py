@@ -10,7 +10,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import SYNTHETIC_LABEL
 from reports.base import style
 from reports.products.calibration import build
 from reports.products.calibration.figure import draw_calibration
@@ -72,7 +72,7 @@ def calibration(*, synthetic: bool = True) -> xr.Dataset:
 def test_only_what_was_computed_is_called_so(synthetic: bool) -> None:
     with style.styled():
         made = drawn(draw_calibration(calibration(synthetic=synthetic)))
-    assert (WORD in words(made)) == synthetic
+    assert (SYNTHETIC_LABEL in words(made)) == synthetic
     assert_legible(made)
 
 
