@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,21 +43,6 @@ if TYPE_CHECKING:
     from sim.scene import Plan, Scene
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.design",
-        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from"
-        " which the same command resumes after any kind of end.",
-    )
-    made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    told = "the design to start from, where the problem has optimiser.start: study"
-    made.add_argument("--start", type=Path, metavar="NC", help=told)
-    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -225,12 +208,3 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     for name in ("loss", "loss_case", "best_loss"):
         made[name].attrs["units"] = loss_units(asked)
     return made
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of, setting_losses
 from pipeline.problem.sections import Sweep, sweep_cases
 from pipeline.runtime import Casebook, SweepResult, UserError, case_log
-from pipeline.stages import sweep
 from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
 
@@ -44,7 +44,7 @@ def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
         *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
         *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
     ]
-    assert sweep.main(words) == 0
+    assert run_stage("sweep", words) == 0
     return datasets.read(out, "sweep")
 
 
@@ -84,7 +84,7 @@ def test_parts_join_to_the_whole(folder: Path, whole: xr.Dataset, tmp_path: Path
     for k, part in enumerate(parts):
         run(folder, part, k, 4)
     out = tmp_path / "sweep.nc"
-    assert sweep.main(["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    assert run_stage("sweep", ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
     assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
 
 
