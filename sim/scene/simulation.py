@@ -23,7 +23,7 @@ from sim.scene.objectives import (
 )
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.solvers import Case, Solver, differentiable_motion, solve_cases
+from sim.solvers import Case, Solver, check_concrete, differentiable_motion, solve_cases
 from sim.structure import ConcreteParameters, Parameters, parameters, shape
 from sim.time_integration import simpson_weights
 
@@ -126,6 +126,7 @@ def simulate(
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
     """
+    check_concrete()
     made = plan or make_plan(scene, vertices, times, threads, every_case=True)
     chosen = tuple(int(case) for case in (made.simulated if cases is None else cases))
     if vertices is not None or design is None:

@@ -150,6 +150,16 @@ class Records:
         self.records = records
 
 
+def check_concrete(*values: object) -> None:
+    """Raises a TypeError where a simulation is traced, or where ``values`` are."""
+    leaves = (jnp.add(0.0, 0.0), *jax.tree.leaves(values))
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        raise TypeError(
+            "a simulation loops over concrete arrays and cannot be traced; call it outside jax.jit"
+            " and jax.vmap, once for each structure, and differentiate it once"
+        )
+
+
 def concrete(parameters: Parameters[Any]) -> ConcreteParameters:
     """Converts parameters to arrays of NumPy, as the solvers take them."""
     return ConcreteParameters(*(np.asarray(part) for part in parameters))
@@ -241,11 +251,7 @@ def _motion(
 def _solved(
     solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
 ) -> tuple[CaseMotions, Records]:
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((parameters, cases))):
-        raise TypeError(
-            "a simulation loops over concrete arrays and cannot be traced; call it outside jax.jit"
-            " and jax.vmap, once for each structure, and differentiate it once"
-        )
+    check_concrete(parameters, cases)
     displacement, velocity, records = solve_cases(solver, concrete(parameters), cases)
     return CaseMotions(jnp.asarray(displacement), jnp.asarray(velocity)), records
 

@@ -17,13 +17,12 @@ from sim.core import Floats, Ints, SimulationError
 from sim.energy import (
     ContactLaw,
     LigamentLaw,
-    Topology,
     contact_energy,
     contact_void_angles,
     ligament_energy,
     ligament_strain,
 )
-from sim.structure import ConcreteParameters, Lattice, VoidAngleContact
+from sim.structure import ConcreteParameters, ContactModel, Lattice, VoidAngleContact
 
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""
@@ -79,7 +78,7 @@ class Strained(NamedTuple):
 
 def cell_of(
     lattice: Lattice,
-    topology: Topology,
+    contact: ContactModel,
     values: ConcreteParameters,
     period: tuple[int, int] = (2, 2),
 ) -> UnitCell:
@@ -87,7 +86,7 @@ def cell_of(
 
     Args:
         lattice: wider than one period each way.
-        topology: of the lattice.
+        contact: law by which its units touch, on void angles.
         values: its parameters.
         period: lattice steps after which everything repeats.
 
@@ -106,7 +105,6 @@ def cell_of(
     _check(lattice, of_home)
     begin, end = lattice.ligament_units.T
     mine = np.flatnonzero(number[begin] >= 0)
-    contact = topology.contact
     if not isinstance(contact, VoidAngleContact):
         raise ValueError("the unit cell of a lattice knows contact on void angles alone")
     limits = np.tile([contact.barrier, contact.cutoff], (len(mine), 1))
