@@ -4,7 +4,6 @@ from .base import CaseMotions as CaseMotions
 from .base import PrescribedMotion as PrescribedMotion
 from .base import Solver as Solver
 from .base import adjoint_cases as adjoint_cases
-from .base import check_concrete as check_concrete
 from .base import concrete as concrete
 from .base import differentiable_motion as differentiable_motion
 from .base import solve_case as solve_case

@@ -72,7 +72,7 @@ def _entry(name: str, found: Any) -> str:  # noqa: ANN401
 def _signature(name: str, found: Any) -> str:  # noqa: ANN401
     words = []
     for each in inspect.signature(found).parameters.values():
-        prefix = {each.VAR_POSITIONAL: "*", each.VAR_KEYWORD: "**"}.get(each.kind, "")
+        prefix = "*" * (each.kind is each.VAR_POSITIONAL) + "**" * (each.kind is each.VAR_KEYWORD)
         default = "" if each.default is each.empty else f"={_default(each.default)}"
         words.append(prefix + each.name + default)
     return f"{name}({', '.join(words)})"
