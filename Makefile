@@ -121,10 +121,11 @@ bench-tracking: setup
 
 stress: setup
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \
-	    $(BIN)/python -m reports.products.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
+	    $(BIN)/python -m reports stress --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
 
 survive: setup
-	$(BIN)/python -m tests.hostile $(PARTS)
+	@$(BIN)/python -m tests.hostile $(PARTS); code=$$?; \
+	    $(BIN)/python -m reports survival --out-dir results/survival --quiet && exit $$code
 
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }

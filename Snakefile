@@ -20,7 +20,9 @@ from pipeline.workflow.recordings import (
     tracked,
 )
 from pipeline.runtime.source_closure import source_hash
-from pipeline.workflow.studies import FRAMED, families, figures, joints, movies, targets
+from pipeline.workflow.studies import Study, families, figures, joints, present, targets
+from reports.catalogue import REPORTS
+from reports.paper_figures import paper_figures, paper_movies
 from pipeline.workflow.rule_inputs import (
     any_of,
     check_problems,

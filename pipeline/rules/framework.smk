@@ -1,4 +1,7 @@
 # Figure 1: the framework, drawn from what Figure 2 has computed.
+FRAMED = [Study(name) for name in paper_figures()["fig1"].studies]
+
+
 rule fig1:
     input:
         problem=ancient("experiments/fig2/problem.yaml"),
@@ -13,11 +16,11 @@ rule fig1:
     params:
         folder=subpath(output.page, parent=True),
         problem=lambda wildcards: hashes_of(FRAMED),
-        source=source_hash("reports.figures.framework.build"),
+        source=source_hash(REPORTS["framework"].module),
     message:
         "Drawing the framework"
     shell:
-        "python -m reports.figures.framework.build --problem {input.problem} --results results"
+        "python -m reports framework --problem {input.problem} --results results"
         " --comparisons {input.comparisons} --out-dir {params.folder} --log {log}"
 
 

@@ -1,8 +1,11 @@
 # The paper's movies, of the studies that there are; every study in full, with its recordings.
+MOVIES = present(paper_movies())
+
+
 rule movie:
     input:
-        datasets=lambda wildcards: datasets_of(movies()[wildcards.movie]),
-        comparisons=lambda wildcards: comparisons_of(movies()[wildcards.movie]),
+        datasets=lambda wildcards: datasets_of(MOVIES[wildcards.movie]),
+        comparisons=lambda wildcards: comparisons_of(MOVIES[wildcards.movie]),
     output:
         "results/movies/{movie}.mp4",
     log:
@@ -10,17 +13,17 @@ rule movie:
     threads: 1
     params:
         problems=lambda wildcards: [
-            study.problem for study in movies()[wildcards.movie]
+            study.problem for study in MOVIES[wildcards.movie]
         ],
-        problem=lambda wildcards: hashes_of(movies()[wildcards.movie]),
-        source=source_hash("reports.products.movie.build"),
+        problem=lambda wildcards: hashes_of(MOVIES[wildcards.movie]),
+        source=source_hash(REPORTS["movie"].module),
     message:
         "Drawing movie {wildcards.movie}"
     shell:
-        "python -m reports.products.movie.build --problems {params.problems} --results results"
+        "python -m reports movie --problems {params.problems} --results results"
         " --comparisons {input.comparisons} --out {output} --log {log}"
 
 
 rule movies:
     input:
-        expand("results/movies/{movie}.mp4", movie=movies()),
+        expand("results/movies/{movie}.mp4", movie=MOVIES),

@@ -7,7 +7,6 @@ import json
 import logging
 import os
 import shlex
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -64,7 +63,9 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument("words", nargs="+", metavar="[COMMAND] FILE", help="what to read")
     made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
     made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
-    made.add_argument("--no-report", action="store_true", help="neither overlay nor quality page")
+    made.add_argument(
+        "--no-report", action="store_true", help="no hint at overlay and quality page"
+    )
     made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
     made.add_argument("--pixel-size", type=float, metavar="MM", help="init: roughly")
     made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="of the files")
@@ -192,21 +193,13 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended
     if not args.no_report:
-        _report(args.out, video)
+        words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
+        command = shlex.join([*words, str(args.out.with_name(f"{args.out.stem}_report"))])
+        LOG.info("overlay and quality page: python -m reports tracking %s", command)
     if track.ended is not None:
         raise track.ended
     if cell is not None:
         load_cell.check(log, track.start + track.time, held, cell)
-
-
-def _report(track: Path, video: Path) -> None:
-    """Runs the stage that draws overlay and quality."""
-    folder = track.with_name(f"{track.stem}_report")
-    words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
-    command = [sys.executable, "-m", "reports.products.tracking.build", *words]
-    if subprocess.run(command, check=False).returncode:
-        remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
-        raise UserError("the report could not be made", file=folder, remedy=remedy)
 
 
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:

@@ -32,10 +32,13 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
 
 
 def inlined(svg: str) -> str:
-    """The element of an SVG file without prologue and metadata, coordinates to 0.001 pt."""
-    element = svg[svg.index("<svg") :]
-    element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
-    return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
+    """Returns the element of an SVG file, coordinates to 0.001 pt."""
+    return re.sub(r"(\d\.\d{3})\d+", r"\1", element(svg))
+
+
+def element(svg: str) -> str:
+    """Returns the element of an SVG file without prologue and metadata."""
+    return re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
 
 
 def _symbols(text: str) -> Markup:

@@ -66,16 +66,15 @@ def test_a_truncated_or_foreign_design(undisturbed: Checkout, tmp_path: Path) ->
         out = tmp_path / "response.nc"
         for module, more in (
             ("pipeline.stages.simulate", ("--out", str(out))),
-            ("reports.figures.study_report", ("--out-dir", str(tmp_path / "report"))),
+            ("reports", ("--out-dir", str(tmp_path / "report"))),
         ):
             results = undisturbed.results
             others = ("--response", str(results / "response.nc"), "--sweep")
-            given = (
-                (*others, str(results / "sweep.nc"))
-                if module == "reports.figures.study_report"
-                else ()
-            )
-            ended = undisturbed.stage(module, "--design", str(path), *given, *more)
+            drawn = module == "reports"
+            given = (*others, str(results / "sweep.nc")) if drawn else ()
+            words = ["--problem", f"experiments/{STUDY}/problem.yaml", "--design", str(path)]
+            kind = ["study"] if drawn else []
+            ended = undisturbed.module(module, *kind, *words, *given, *more)
             assert_one_message(ended, f"file:   {path}")
         assert not out.exists()
 

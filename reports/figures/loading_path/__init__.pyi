@@ -10,8 +10,8 @@ from .abscissa import display_name as display_name
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping
 from .content import axis as axis
+from .content import credit as credit
 from .content import fields as fields
-from .content import marks as marks
 from .curves import measure_panel as measure_panel
 from .curves import over_cases as over_cases
 from .curves import path_axes as path_axes
@@ -19,7 +19,8 @@ from .curves import structure_curves as structure_curves
 from .facts import loss_facts as loss_facts
 from .facts import scene_facts as scene_facts
 from .figure import TALLEST_SNAPSHOTS as TALLEST_SNAPSHOTS
-from .figure import at_rest as at_rest
+from .figure import design_panels as design_panels
+from .figure import marks as marks
 from .measures import interest as interest
 from .measures import scales as scales
 from .measures import squares as squares
@@ -30,6 +31,4 @@ from .snapshot_grid import snapshot as snapshot
 from .snapshot_grid import snapshots as snapshots
 from .structure_panels import UnitColouring as UnitColouring
 from .structure_panels import shade_of as shade_of
-from .tables import Columns as Columns
 from .tables import by_structure as by_structure
-from .tables import of_design as of_design

@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from pipeline.problem import Problem
 from pipeline.problem.sections import Region
 from reports.base import style
-from reports.panels import ColourField, draw, draw_clamps, round_up, scalar
+from reports.panels import (
+    ColourField,
+    draw,
+    draw_clamps,
+    scalar,
+    signed_field,
+    size_field,
+    turn_field,
+)
 from reports.study import CLAMPED, CLOAK, DRIVEN, INCLUSION, RigidUnits, from_dataset
 from sim.core import Floats
 
@@ -42,19 +50,13 @@ class UnitColouring:
 
 
 def shade_of(problem: Problem, response: xr.Dataset) -> UnitColouring:
-    """What colours the snapshots: |theta|, u_y or |U|, by what the cloak is for."""
+    """Returns what colours the snapshots: |theta|, u_y or |U|, by what the cloak is for."""
     free = response["displacement"].isel(unit=response["support"].values == 0).values
     if problem.objective.kind == "strain_energy":
-        most = round_up(float(np.degrees(np.nanmax(np.abs(free[..., 2])))))
-        field = ColourField("turn", "|θ|", "°", 180.0 / np.pi, "magnitude", (0.0, most))
-        return UnitColouring(field, r"$|\theta|$ (°)", style.MAGNITUDE)
+        return UnitColouring(turn_field(free), r"$|\theta|$ (°)", style.MAGNITUDE)
     if problem.objective.target != "rest":
-        most = round_up(float(np.nanmax(np.abs(free[..., 1]))))
-        field = ColourField("uy", "u_y", "mm", 1.0, "signed", (-most, most))
-        return UnitColouring(field, "$u_y$ (mm)", style.SIGNED)
-    scale = (problem.lattice.spacing, problem.lattice.spacing, 1.0)
-    most = round_up(float(np.nanmax(np.linalg.norm(free / np.array(scale), axis=-1))))
-    field = ColourField("norm", "|U|", "", 1.0, "magnitude", (0.0, most), scale)
+        return UnitColouring(signed_field("uy", free), "$u_y$ (mm)", style.SIGNED)
+    field = size_field(free, problem.lattice.spacing)
     return UnitColouring(field, r"$\|\mathbf{U}\|$", style.MAGNITUDE)
 
 

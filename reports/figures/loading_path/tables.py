@@ -3,30 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from reports.base import Table
-from reports.facts import history, vertices
+from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
 from reports.figures.loading_path.abscissa import course, structures
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults
-
-Columns = dict[str, NDArray[Any]]
-
-
-def loading_path_tables(study: StudyResults) -> list[Table]:
-    """All tables, in the order of the panels."""
-    tables = [*of_design(study), Table("path.csv", "every structure along the path", path(study))]
-    if study.scatter is not None:
-        tables.append(
-            Table("robustness.csv", "imperfect copies, one a line", copies(study, study.scatter))
-        )
-    return tables
 
 
 def of_design(study: StudyResults) -> list[Table]:

@@ -102,9 +102,7 @@ def load(path: Path, preset: str | None, results: Path) -> DesignSeries:
     """
     asked = problem.load(path, preset)
     if asked.designs is None:
-        remedy = (
-            "list the values of a parameter below `designs`, or use reports.figures.study_report"
-        )
+        remedy = "list the values of a parameter below `designs`, or make the report of a study"
         raise UserError("the problem asks for one design", file=path, key="designs", remedy=remedy)
     ((key, words),) = asked.designs.items()
     if any(taken_apart(word) is None for word in words):
