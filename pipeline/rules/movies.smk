@@ -12,9 +12,7 @@ rule movie:
         "results/logs/movie_{movie}.log",
     threads: 1
     params:
-        problems=lambda wildcards: [
-            study.problem for study in MOVIES[wildcards.movie]
-        ],
+        problems=lambda wildcards: [study.problem for study in MOVIES[wildcards.movie]],
         problem=lambda wildcards: hashes_of(MOVIES[wildcards.movie]),
         source=source_hash(REPORTS["movie"].module),
     message:

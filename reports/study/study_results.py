@@ -129,10 +129,7 @@ class StudyResults:
 
 
 def load(
-    path: Path,
-    preset: str | None,
-    files: Mapping[Output, Path],
-    comparisons: Sequence[Path] = (),
+    path: Path, preset: str | None, files: Mapping[Output, Path], comparisons: Sequence[Path] = ()
 ) -> StudyResults:
     """The study of a problem file (with a preset), its datasets, and those of its recordings.
 

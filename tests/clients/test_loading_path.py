@@ -9,6 +9,7 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
+from reports.figures.study_report import study_report
 from reports.page import publish
 from tests.clients.conftest import Open
 from tests.reports import compressed_study

@@ -31,8 +31,7 @@ def path_axes(axes: Axes, course: Abscissa, label: str) -> None:
         return
     ratio = 100.0 * course.strain / float(course.values[-1])
     above = axes.secondary_xaxis(
-        "top",
-        functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio)),
+        "top", functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio))
     )
     above.set_xlabel("paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
     above.xaxis.set_major_locator(FixedLocator(list(ratio * course.values[list(course.shown)])))

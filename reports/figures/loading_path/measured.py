@@ -20,11 +20,7 @@ from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]
 
-_NAMES = {
-    "rotation": "mean_rotation",
-    "mismatch": "mimicking_error",
-    "contraction": "contraction",
-}
+_NAMES = {"rotation": "mean_rotation", "mismatch": "mimicking_error", "contraction": "contraction"}
 """What comparisons follow, by the key of the report's measure."""
 _ENDS = ("low", "high")
 _SIDES = ("measured", "simulated")

@@ -43,6 +43,8 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
     load = f"$α$ = {direction:g}°"
     quoted = study.problem.report.paper is not None
 
+    most = f"Robustness, largest $J$ = {float(sweep['loss'].max()):.3f}"
+
     def loss(figure: Figure) -> None:
         loss_panel(style.place(figure, 133.5, 8.5, 43.5, 31.5), design, quoted)
 
@@ -91,8 +93,7 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             ],
         ),
         Panel(
-            *("e", f"Robustness, largest $J$ = {float(sweep['loss'].max()):.3f}"),
-            *(109.0, low, losses),
+            *("e", most, 109.0, low, losses),
             "Loss over loading angle and frequency; stars mark the loads designed for.",
             [
                 Table(

@@ -59,8 +59,4 @@ def handles(methods: Iterable[str]) -> list[Line2D]:
 def drawn(method: str) -> dict[str, Any]:
     """Arguments of a line of that method."""
     colour, marker, filled = mark(method)
-    return {
-        "color": colour,
-        "marker": marker,
-        "markerfacecolor": colour if filled else "white",
-    }
+    return {"color": colour, "marker": marker, "markerfacecolor": colour if filled else "white"}
