@@ -106,7 +106,7 @@ def rendered(report: Report, drawn: Mapping[str, Sequence[Path]]) -> str:
 
 @contextmanager
 def _aside(folder: Path) -> Iterator[Path]:
-    """An empty folder beside `folder`, gone at the end; what a killed build left there goes too."""
+    """Makes an empty folder beside `folder`, gone at the end, in place of one left there."""
     aside = folder.with_name(f".{folder.name}.part")
     if aside.exists():
         shutil.rmtree(aside)
@@ -118,7 +118,7 @@ def _aside(folder: Path) -> Iterator[Path]:
 
 
 def _moved(path: Path, folder: Path) -> Path:
-    """The file in `folder`, safe on the disk before it shows under its name."""
+    """Returns the file in `folder`, safe on the disk before it shows under its name."""
     with path.open("rb") as file:
         os.fsync(file.fileno())
     return path.replace(folder / path.name)

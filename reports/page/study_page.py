@@ -61,7 +61,7 @@ def study_text(
 
 @dataclass(frozen=True)
 class Source:
-    """Names a part of the page, a dataset say, with its attributes."""
+    """Describes names a part of the page, a dataset say, with its attributes."""
 
     name: str
     entries: Sequence[tuple[str, str]]
@@ -126,7 +126,7 @@ def study_page(
 
 
 def _json(problem: Problem | Mapping[str, Problem]) -> str:
-    """A problem as resolved, or several by name, as indented JSON."""
+    """Returns a problem as resolved, or several by name, as indented JSON."""
     if isinstance(problem, Problem):
         content = json.loads(canonical_json(problem))
     else:
@@ -146,7 +146,7 @@ def rounding(player: Mapping[str, Any]) -> str:
 
 
 def _skipped(study: StudyResults) -> list[str]:
-    """What the simulation left out, each with the structures that it holds for."""
+    """Tells what the simulation left out, each with the structures that it holds for."""
     plans = json.loads(study.response.attrs["plan"])
     names: dict[str, list[str]] = {}
     for structure, plan in plans.items():
@@ -173,13 +173,13 @@ def sources(study: StudyResults, label: str = "") -> Iterator[Source]:
 
 
 def _source(name: str, data: xr.Dataset) -> Source:
-    """Attributes of a dataset, except the problem, which the page shows once."""
+    """Returns attributes of a dataset, except the problem, which the page shows once."""
     kept = {str(key): value for key, value in data.attrs.items() if key != "problem"}
     return Source(name, [entry for key in sorted(kept) for entry in _entries(key, kept[key])])
 
 
 def _entries(key: str, value: object) -> list[tuple[str, str]]:
-    """An attribute as lines of text; JSON in it is unfolded, one line a leaf or a list."""
+    """Returns an attribute as lines of text; JSON in it is unfolded, one line a leaf or a list."""
     if isinstance(value, str) and value.startswith(("{", "[")):
         value = json.loads(value)
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""HTML from the templates beside the reports; text is escaped, what is not given is an error."""
+"""Renders HTML from templates; text is escaped, what is not given is an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
-    """HTML of a template.
+    """Returns HTML of a template.
 
     Args:
         template: name of its file.
@@ -42,12 +42,12 @@ def element(svg: str) -> str:
 
 
 def _symbols(text: str) -> Markup:
-    """Escaped text in which u_y has its index."""
+    """Returns escaped text in which u_y has its index."""
     return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
 
 
 def _in_order(items: Iterable[Any], attribute: str) -> list[dict[str, object]]:
-    """Items grouped by an attribute, groups in the order of their first member."""
+    """Returns items grouped by an attribute, groups in the order of their first member."""
     groups: dict[str, list[Any]] = {}
     for item in items:
         groups.setdefault(getattr(item, attribute), []).append(item)

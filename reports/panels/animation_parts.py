@@ -41,7 +41,7 @@ def with_recordings(
 
 
 def case_labels(response: xr.Dataset) -> list[str]:
-    """Labels the load cases by their angles."""
+    """Returns labels the load cases by their angles."""
     return [f"α = {angle:g}°" for angle in response["direction"].values]
 
 

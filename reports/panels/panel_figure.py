@@ -58,11 +58,11 @@ class PanelFigure:
 
     @cached_property
     def caption(self) -> str:
-        """The sentences of the panels, as HTML."""
+        """Returns the sentences of the panels, as HTML."""
         told = [f"<b>{each.letter}</b> {each.caption}" for each in self.panels if each.caption]
         return " ".join(told) + self.remark
 
     @cached_property
     def tables(self) -> list[Table]:
-        """The tables of the panels, in their order."""
+        """Returns the tables of the panels, in their order."""
         return [table for panel in self.panels for table in panel.tables]

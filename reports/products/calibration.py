@@ -44,7 +44,7 @@ def report(args: argparse.Namespace) -> None:
 
 
 def draw_calibration(made: xr.Dataset) -> Figure:
-    """Sets in rows of four, each with its whitened residuals below; then the constants' errors."""
+    """Draws sets in rows of four with whitened residuals; then the constants' errors."""
     names = made["set"].values.tolist()
     rows = -(-len(names) // COLUMNS)
     drawn = style.page(rows * _ROW + 44.0)
@@ -94,7 +94,7 @@ def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, floa
 
 
 def _shown(chosen: xr.Dataset) -> xr.Dataset:
-    """Of a track, the displacements that go farthest; of other sets, all."""
+    """Returns of a track, the displacements that go farthest; of other sets, all."""
     channel = chosen["channel"].values
     if not channel.any():
         return chosen
@@ -105,7 +105,7 @@ def _shown(chosen: xr.Dataset) -> xr.Dataset:
 
 
 def _constants(drawn: Figure, made: xr.Dataset, top: float) -> None:
-    """Intervals relative to the values, and how much the errors go together."""
+    """Draws intervals relative to the values, and how much the errors go together."""
     names = [_WORDS[name] for name in made["parameter"].values]
     last = "abcdefghijklmnop"[made.sizes["set"]]
     style.letter(drawn, 2.0, top, last, "Constants: 95 % intervals")

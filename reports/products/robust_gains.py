@@ -56,7 +56,7 @@ def _row(data: xr.Dataset) -> tuple[str, ...]:
 
 
 def draw_robust_gains(data: xr.Dataset) -> Figure:
-    """The figure at two-column width.
+    """Draws the figure at two-column width.
 
     Args:
         data: the gains.
@@ -90,7 +90,7 @@ def _losses(axes: Axes, data: xr.Dataset) -> None:
 
 
 def _changes(axes: Axes, data: xr.Dataset) -> None:
-    """How much less loss the preset's design has, and how much more it pays for that."""
+    """Tells how much less loss the preset's design has, and how much more it pays for that."""
     place = _rows(axes, data)
     axes.set_yticklabels([])
     axes.axvline(0.0, color=style.GREY, linewidth=0.6)

@@ -66,7 +66,7 @@ def _columns(values: xr.DataArray) -> dict[str, list[object]]:
 
 
 def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
-    """The figure at two-column width.
+    """Draws the figure at two-column width.
 
     Args:
         data: the spectrum.

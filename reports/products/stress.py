@@ -25,7 +25,7 @@ def report(args: argparse.Namespace) -> None:
 
 
 def _families(path: Path) -> list[dict[str, Any]]:
-    """The record of every family.
+    """Returns the record of every family.
 
     Raises:
         UserError: the file is none that the suite wrote.
@@ -42,6 +42,6 @@ def _families(path: Path) -> list[dict[str, Any]]:
 
 
 def _share(totals: dict[str, int]) -> str:
-    """Solved cases in range, in percent, never rounded up to all of them."""
+    """Returns solved cases in range, in percent, never rounded up to all of them."""
     tenths = 1000 * totals["in_range_solved"] // max(totals["in_range"], 1)
     return f"{tenths / 10:.1f} %"

@@ -35,7 +35,7 @@ _TOLD = {
 
 
 class SurvivalTable(NamedTuple):
-    """A section of the page.
+    """Describes a section of the page.
 
     Attributes:
         name, title, text: what was tried.

@@ -1,4 +1,4 @@
-"""Figure 1 at a journal's two-column width: problem, model, optimisation, making, comparing."""
+"""Composes Figure 1 at two-column width: problem, model, optimisation, making, comparing."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def framework_figure(study: StudyResults) -> PanelFigure:
 
 
 def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
-    """Row a, left: reference and altered domain, and what is compared of them."""
+    """Draws row a, left: reference and altered domain, and what is compared of them."""
     spacing = study.scene.spacing
     top = 11.0
     reference = style.place(figure, 0.0, top, SIDE, SIDE)
@@ -94,7 +94,7 @@ def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
 
 
 def _loop(figure: Figure, design: xr.Dataset) -> None:
-    """Row a, right: the loss falls, its gradient by a differentiable simulation."""
+    """Draws row a, right: the loss falls, its gradient by a differentiable simulation."""
     left, wide = LOOP, 65.0
     _box(figure, (left, 9.0, wide, 47.0), "#f6f4f9")
     formula = (
@@ -126,7 +126,7 @@ def _loop(figure: Figure, design: xr.Dataset) -> None:
 
 
 def _lying(structure: RigidUnits) -> int:
-    """A ligament along x between two units of the surroundings, near the middle of the bottom."""
+    """Finds a ligament along x in the surroundings, near the middle of the bottom."""
     ends = structure.vertices[structure.ligament_unit, structure.ligament_vertex]
     along = np.abs(ends[:, 1] - ends[:, 0])
     outside = (structure.region[structure.ligament_unit] != CLOAK).all(axis=1)
@@ -137,7 +137,7 @@ def _lying(structure: RigidUnits) -> int:
 
 
 def _kinds(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
-    """Row b, right: what cloaks can do."""
+    """Draws row b, right: what cloaks can do."""
     spacing, radius = study.scene.spacing, study.scene.radii[-1]
     first = style.place(figure, 70.0, SECOND + 7.0, SMALL, SMALL)
     domain_panels.excitation(first, initial, spacing, radius)
@@ -148,7 +148,7 @@ def _kinds(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
 
 
 def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
-    """Row c: the optimised cloak is made, filmed, tracked and compared."""
+    """Draws row c: the optimised cloak is made, filmed, tracked and compared."""
     response, spacing = study.response, study.scene.spacing
     case = measures.nearest_case(response, MONITORED)
     motion = response["displacement"].sel(structure="cloaked").isel(case=case)
@@ -171,7 +171,7 @@ def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
 
 
 def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> None:
-    """Motion of one unit as simulated, and as measured where there is a recording."""
+    """Draws motion of one unit as simulated, and as measured where there is a recording."""
     axes = style.place(figure, *at, SMALL + 2.0, SMALL - 9.0)
     series = monitored(study.scene, study.response)
     for name in ("altered", "cloaked"):
@@ -195,7 +195,7 @@ def _say(figure: Figure, x: float, y: float, text: str, **told: str | float) -> 
 def _box(
     figure: Figure, place: tuple[float, float, float, float], colour: str, edge: str = "none"
 ) -> None:
-    """A rounded box: left, top, width and height in mm."""
+    """Draws a rounded box: left, top, width and height in mm."""
     left, top, wide, high = place
     figure.add_artist(
         FancyBboxPatch(
@@ -219,7 +219,7 @@ def _arrow(
     bend: float = 0.0,
     kind: str = "-|>",
 ) -> None:
-    """An arrow between two points in mm from the page's top-left corner."""
+    """Draws an arrow between two points in mm from the page's top-left corner."""
     tail, tip = ((x / style.TWO_COLUMNS, 1 - y / HEIGHT) for x, y in (start, end))
     figure.add_artist(
         FancyArrowPatch(

@@ -1,4 +1,4 @@
-"""Panels of curves along the path: the measure, contraction, reaction, and imperfect copies."""
+"""Draws curves along the path: the measure, contraction, reaction, imperfect copies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BAND = (5.0, 95.0)
 
 
 def path_axes(axes: Axes, course: Abscissa, label: str) -> None:
-    """An x axis along the path, with a paper's label of the load above it if there is one."""
+    """Draws an x axis along the path, with a paper's label of the load above it if there is one."""
     axes.set(xlabel=course.label, ylabel=label, xlim=(course.values[0], course.values[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 3, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(5))
@@ -41,7 +41,7 @@ def path_axes(axes: Axes, course: Abscissa, label: str) -> None:
 def structure_curves(
     axes: Axes, problem: Problem, course: Abscissa, values: xr.DataArray, names: Iterable[str]
 ) -> None:
-    """Values (structure, case, time) of some structures, the mean of their load cases."""
+    """Draws values (structure, case, time) of some structures, the mean of their load cases."""
     mean = over_cases(problem, values)
     for name in names:
         axes.plot(
@@ -55,14 +55,14 @@ def structure_curves(
 
 
 def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
-    """Weighted mean over the load cases."""
+    """Returns weighted mean over the load cases."""
     weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
     mean: xr.DataArray = (values * weights).sum("case", skipna=False) / float(weights.sum())
     return mean
 
 
 def measure_panel(axes: Axes, study: StudyResults, course: Abscissa, measure: Measure) -> None:
-    """What the cloak should keep small, with the bands of the cloak's imperfect copies."""
+    """Tells what the cloak should keep small, with the bands of the cloak's imperfect copies."""
     problem, response = study.problem, study.response
     path_axes(axes, course, measure.symbol)
     names = [name for name in structures(response) if name != "intact"]
@@ -82,7 +82,7 @@ def measure_panel(axes: Axes, study: StudyResults, course: Abscissa, measure: Me
 
 
 def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignResults) -> None:
-    """The design for contact on distance."""
+    """Draws the design for contact on distance."""
     way = course(study.problem, again.response)
     values = over_cases(study.problem, measure.of(again.response)).sel(structure="cloaked")
     dashes = (0, (3.0, 1.5))
@@ -90,7 +90,7 @@ def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignRe
 
 
 def _jumps(axes: Axes, course: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
-    """Crosses where a structure came to another branch of equilibria."""
+    """Draws crosses where a structure came to another branch of equilibria."""
     jumped = (response["stability"] == JUMPED).any("case")
     for name in structures(response):
         at = jumped.sel(structure=name).values
@@ -101,7 +101,7 @@ def _jumps(axes: Axes, course: Abscissa, mean: xr.DataArray, response: xr.Datase
 def _bands(
     axes: Axes, study: StudyResults, course: Abscissa, measure: Measure, copies: xr.Dataset
 ) -> None:
-    """The 5 % to 95 % percentiles of every kind of noise, laid over one another."""
+    """Draws the 5 % to 95 % percentiles of every kind of noise, laid over one another."""
     along = np.interp([0.0, *copies["time"].values], study.response["time"], course.values)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
     for noise in copies["noise"].values:
@@ -111,7 +111,7 @@ def _bands(
 
 
 def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: xr.Dataset) -> None:
-    """The measure at the end of the path: median and percentiles of every kind of noise."""
+    """Draws the measure at the end of the path: median and percentiles of every kind of noise."""
     ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
     found = monte_carlo.spreads(values, copies)
@@ -132,7 +132,7 @@ def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: 
 
 
 def contraction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None:
-    """How much nearer top and bottom rows come."""
+    """Tells how much nearer top and bottom rows come."""
 
     def of(response: xr.Dataset) -> xr.DataArray:
         return measures.contraction(study.problem, response)
@@ -144,7 +144,7 @@ def contraction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None
 
 
 def reaction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None:
-    """Force of the drive, and of the load cell where there is one."""
+    """Draws force of the drive, and of the load cell where there is one."""
     _plain_panel(axes, study.problem, course, measures.reaction(study.response), "force (N)")
     measured.forces(axes, study)
     if study.problem.objective.target == "rest":  # or another panel has told it
@@ -152,7 +152,7 @@ def reaction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None:
 
 
 def _sides(axes: Axes, study: StudyResults) -> None:
-    """Which curves are measured, and which simulated."""
+    """Tells which curves are measured, and which simulated."""
     if study.recordings:
         told = measured_overlay.handles(study.recordings)
         axes.legend(handles=told, loc="upper left", handlelength=1.6)
@@ -162,7 +162,7 @@ def _sides(axes: Axes, study: StudyResults) -> None:
 def _plain_panel(
     axes: Axes, problem: Problem, course: Abscissa, values: xr.DataArray, label: str
 ) -> None:
-    """A curve of every structure."""
+    """Draws a curve of every structure."""
     path_axes(axes, course, label)
     names = structures(values.to_dataset(name="values"))
     structure_curves(axes, problem, course, values, names)

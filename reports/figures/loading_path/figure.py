@@ -82,7 +82,7 @@ def design_panels(
 
 
 def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
-    """The structures side by side, and how large and how driven they are."""
+    """Yields the structures side by side, and how large and how driven they are."""
     side, names = 40.0, structures(study.response)
     lattice, drive = study.problem.lattice, study.problem.drive
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
@@ -128,7 +128,7 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
 
 
 def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
-    """The panels of curves, lettered from d."""
+    """Yields the panels of curves, lettered from d."""
     width = style.TWO_COLUMNS / len(shown)
     for k, (title, draw, words, data) in enumerate(shown):
         left = k * width

@@ -1,4 +1,4 @@
-"""Panels that show structures: at rest with their regions, and along the path."""
+"""Describes panels that show structures: at rest with their regions, and along the path."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
 
 @dataclass(frozen=True)
 class UnitColouring:
-    """How a displacement (n_units, 3) colours the units."""
+    """Tells how a displacement (n_units, 3) colours the units."""
 
     field: ColourField
     label: str
     colours: Colormap
 
     def values(self, displacement: Floats) -> Floats:
-        """The number (n_units,) that each unit shows."""
+        """Returns the number (n_units,) that each unit shows."""
         return scalar(self.field, displacement)
 
     @property
     def norm(self) -> Normalize:
-        """From the lowest to the highest colour."""
+        """Returns from the lowest to the highest colour."""
         return Normalize(*self.field.limits)
 
 
@@ -61,7 +61,7 @@ def shade_of(problem: Problem, response: xr.Dataset) -> UnitColouring:
 
 
 def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) -> None:
-    """One structure at rest: what is clamped, driven, looked at and redesigned."""
+    """Draws one structure at rest: what is clamped, driven, looked at and redesigned."""
     structure = from_dataset(response.sel(structure=name), problem.lattice.spacing)
     interest = np.zeros(structure.n_units, dtype=bool)
     if isinstance(problem.objective.region, Region):
@@ -89,7 +89,7 @@ def _tints(structure: RigidUnits, interest: NDArray[np.bool_], name: str) -> Ite
 
 
 def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
-    """Arrows onto some of the driven units, along the drive."""
+    """Draws arrows onto some of the driven units, along the drive."""
     ends = structure.centroid[structure.present & (structure.support == DRIVEN)]
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))

@@ -1,4 +1,4 @@
-"""Data tables of the path: what its curves show, as plain CSV."""
+"""Describes data tables of the path: what its curves show, as plain CSV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from reports.study import StudyResults
 
 
 def of_design(study: StudyResults) -> list[Table]:
-    """The design and how it was found."""
+    """Returns the design and how it was found."""
     text = "vertices of the cloaked and of the initial design"
     return [
         Table("design.csv", text, vertices(study.design)),
@@ -25,7 +25,7 @@ def of_design(study: StudyResults) -> list[Table]:
 
 
 def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Columns:
-    """A column for each series of a response and each structure, one row a sample."""
+    """Returns a column for each series of a response and each structure, one row a sample."""
     columns: Columns = {}
     for label, values in series.items():
         mean = over_cases(study.problem, values)
@@ -35,7 +35,7 @@ def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Col
 
 
 def path(study: StudyResults) -> Columns:
-    """One row a sample: the measure, contraction, reaction, energies, voids of each structure."""
+    """Lists per sample the measure, contraction, reaction, energies, voids of each structure."""
     problem, response = study.problem, study.response
     way = course(problem, response)
     measure = measures.measure_of(problem)
@@ -54,7 +54,7 @@ def path(study: StudyResults) -> Columns:
 
 
 def copies(study: StudyResults, made: xr.Dataset) -> Columns:
-    """One row a copy."""
+    """Returns one row a copy."""
     measure = measures.measure_of(study.problem)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, made).isel(time=-1)
     noise, sample = np.meshgrid(made["noise"].values, made["sample"].values, indexing="ij")

@@ -1,4 +1,4 @@
-"""How well each design shields, and the designs themselves, at a journal's two-column width."""
+"""Composes the figure of several designs: how well each shields, and the designs."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _structures(figure: Figure, family: DesignSeries, side: float, rows: int) ->
 
 
 def _limit(family: DesignSeries) -> float:
-    """Largest peak outside the cloaks, rounded up: one range of colours for all."""
+    """Returns largest peak outside the cloaks, rounded up: one range of colours for all."""
     largest = 0.0
     for design in family.designs:
         outside = design.study.response["roi"].values.astype(bool)

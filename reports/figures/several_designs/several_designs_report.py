@@ -47,7 +47,7 @@ def several_designs_report(series: DesignSeries) -> Report:
 
 
 def _sizes(series: DesignSeries) -> Table:
-    """One row a design."""
+    """Returns one row a design."""
     columns: dict[str, Sequence[Any]] = {
         series.key: [str(design.word) for design in series.designs],
         "cloak_units": [design.units for design in series.designs],
@@ -60,7 +60,7 @@ def _sizes(series: DesignSeries) -> Table:
 
 
 def _peaks(series: DesignSeries) -> Table:
-    """One row a unit."""
+    """Returns one row a unit."""
     first = series.designs[0]
     columns: dict[str, Any] = {
         name: first.study.response[name].values for name in ("unit", "i", "j")
@@ -73,7 +73,7 @@ def _peaks(series: DesignSeries) -> Table:
 
 
 def _animation(series: DesignSeries) -> Animation:
-    """The altered structure and every design under one load."""
+    """Returns the altered structure and every design under one load."""
     first = series.designs[0]
     response, spacing = first.study.response, first.scene.spacing
     case = measures.nearest_case(response, SHOWN)

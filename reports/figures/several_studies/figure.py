@@ -58,7 +58,7 @@ def _band(
     place: tuple[float, float],
     letters: Iterator[str],
 ) -> Iterator[Panel]:
-    """A panel of the intact structure, and one of each study; the last one draws all."""
+    """Yields a panel of the intact structure, and one of each study; the last one draws all."""
     top, side = place
     first = band[0]
     columns = [(first, "intact")] if "intact" in structures(first.response) else []
@@ -102,7 +102,7 @@ def heading(study: StudyResults) -> str:
 
 
 def _curves(study: StudyResults, k: int, top: float, letters: Iterator[str]) -> Iterator[Panel]:
-    """Measure and contraction of the k-th study, in rows of four panels."""
+    """Yields measure and contraction of the k-th study, in rows of four panels."""
     way, measure = course(study.problem, study.response), measures.measure_of(study.problem)
     width, y = style.TWO_COLUMNS / 4, top + (2 * k // 4) * CURVES
     for half, title in enumerate((measure.label, "contraction")):

@@ -42,7 +42,7 @@ def several_studies_report(name: str, asked: Joint, studies: Sequence[StudyResul
 
 
 def _facts(study: StudyResults) -> list[Fact]:
-    """A study's facts, with its name before keys and headings."""
+    """Returns a study's facts, with its name before keys and headings."""
     found = loading_path.facts.loading_path_facts(study)
     return [
         replace(fact, key=f"{study.name}.{fact.key}", group=f"{heading(study)}: {fact.group}")
@@ -62,7 +62,7 @@ def _tables(study: StudyResults) -> list[Table]:
 
 
 def _credit(studies: Sequence[StudyResults]) -> str:
-    """Which publication the studies follow, and with which of its values."""
+    """Tells which publication the studies follow, and with which of its values."""
     papers = {p.figure: p.variant for study in studies if (p := study.problem.report.paper)}
     source = "".join(
         f"After Figure {name} of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”"
@@ -83,7 +83,7 @@ def _caption(studies: Sequence[StudyResults]) -> str:
 
 
 def _animation(studies: Sequence[StudyResults]) -> Animation:
-    """Every structure along the first study’s path; equal intact ones once."""
+    """Returns every structure along the first study’s path; equal intact ones once."""
     first = studies[0]
     way, times = course(first.problem, first.response), first.response["time"]
     clips = []

@@ -125,7 +125,7 @@ def _problem(figure: Figure, scene: ReportScene, design: xr.Dataset, direction: 
 
 
 def _top_edge(scene: ReportScene, response: xr.Dataset) -> Columns:
-    """One row a time: ux, uy, theta of both structures under every load."""
+    """Returns one row a time: ux, uy, theta of both structures under every load."""
     unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
     series = response["displacement"].isel(unit=unit)
     columns = {"time_s": response["time"].values}
@@ -138,7 +138,7 @@ def _top_edge(scene: ReportScene, response: xr.Dataset) -> Columns:
 
 
 def _map(sweep: xr.Dataset) -> Columns:
-    """One row a point of the map."""
+    """Returns one row a point of the map."""
     angle, rate = np.meshgrid(sweep["direction"], sweep["frequency"], indexing="ij")
     columns = {"direction_deg": angle.ravel(), "frequency_Hz": rate.ravel()}
     for column, name in (

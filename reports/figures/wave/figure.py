@@ -96,13 +96,13 @@ def _mark_places(study: StudyResults, axes: Axes) -> None:
 
 
 def _mark(place: MonitoredUnit, size: float) -> dict[str, Any]:
-    """Arguments of a plot of the place's mark, `size` points wide; stars are larger."""
+    """Returns arguments of a plot of the place's mark, `size` points wide; stars are larger."""
     width = 6.0 if isinstance(place.mark, tuple) else size
     return {"ls": "", "marker": place.mark, "ms": width, "mfc": CONTACT, "mec": "white", "mew": 0.5}
 
 
 def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: int) -> None:
-    """Dots on the ligaments beside which a void is closed."""
+    """Draws dots on the ligaments beside which a void is closed."""
     part = row.part.isel(case=0)
     structure = from_dataset(row.part, study.problem.lattice.spacing)
     frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
@@ -112,7 +112,7 @@ def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: i
 
 
 def _places(figure: Figure, study: StudyResults, top: float) -> None:
-    """u_y over time at each place, side by side."""
+    """Draws u_y over time at each place, side by side."""
     shown = places(study.problem, study.response)
     path, rise = course(study.problem, study.response), study.response["displacement"].sel(dof="uy")
     width = style.TWO_COLUMNS / max(len(shown), 1)
@@ -129,7 +129,7 @@ def _places(figure: Figure, study: StudyResults, top: float) -> None:
 
 
 def _edges(axes: Axes, study: StudyResults) -> None:
-    """Smallest void angle on the edges over time, and when that is contact."""
+    """Draws smallest void angle on the edges over time, and when that is contact."""
     path_axes(axes, course(study.problem, study.response), "angle (°)")
     angles = 180.0 / np.pi * closed_voids.along_edges(study.problem, study.response).min("ligament")
     structure_curves(
@@ -147,7 +147,7 @@ def _edges(axes: Axes, study: StudyResults) -> None:
 
 
 def _over_time(study: StudyResults) -> Columns:
-    """One row a sample: u_y where marked, mimicking error, void angles, energies."""
+    """Returns one row a sample: u_y where marked, mimicking error, void angles, energies."""
     problem, response = study.problem, study.response
     rise = response["displacement"].sel(dof="uy")
     series = {
@@ -165,7 +165,7 @@ def _over_time(study: StudyResults) -> Columns:
 
 
 def _steps(verification: xr.Dataset) -> Columns:
-    """One row a check and structure."""
+    """Returns one row a check and structure."""
     checks, names = verification["check"].values, verification["structure"].values
     check, structure = np.meshgrid(checks, names, indexing="ij")
     columns: Columns = {"check": check.ravel(), "structure": structure.ravel()}

@@ -99,7 +99,7 @@ def _read(path: Path) -> xr.Dataset:
 def _values(
     section: BenchmarkSection, fresh: Mapping[str, xr.Dataset], own: Sequence[Table]
 ) -> dict[str, object]:
-    """What the page tells of a section; tables that an earlier one has shown are left out."""
+    """Tells what the page tells of a section; tables that an earlier one has shown are left out."""
     return {
         "picture": section,
         "files": [*(table.name for table in own), *(f"{name}.nc" for name in section.shown)],
@@ -115,7 +115,7 @@ def _attributes(data: xr.Dataset) -> list[tuple[str, str]]:
 
 
 def _machines(given: Iterable[xr.Dataset]) -> list[str]:
-    """Where the datasets were measured, each machine, day and commit once."""
+    """Tells where the datasets were measured, each machine, day and commit once."""
     found = []
     for data in given:
         about = json.loads(data.attrs["machine"])
@@ -156,7 +156,7 @@ def sections(given: Mapping[str, xr.Dataset]) -> Iterator[BenchmarkSection]:
 
 
 def _of(given: Mapping[str, xr.Dataset], start: str) -> dict[str, xr.Dataset]:
-    """The datasets whose names begin so, by what follows."""
+    """Returns the datasets whose names begin so, by what follows."""
     return {
         name.removeprefix(start): data for name, data in given.items() if name.startswith(start)
     }

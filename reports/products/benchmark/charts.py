@@ -21,7 +21,7 @@ _DASHES = {"own tracker": "-", "plain OpenCV": ":"}
 
 
 def draw_ablation(data: xr.Dataset) -> Figure:
-    """Bars of time, and beside them how many times less it takes and what the result changes by."""
+    """Draws bars of time, how many times less it takes, and what the result changes by."""
     names = list(dict.fromkeys(data["method"].values))
     high = len(names) * _ROW
     figure = style.page(high + 24.0)
@@ -48,7 +48,7 @@ def draw_ablation(data: xr.Dataset) -> Figure:
 
 
 def draw_growth(data: xr.Dataset) -> Figure:
-    """Time and peak memory against the number of units or of cases, with fitted exponents."""
+    """Draws time and peak memory against the number of units or of cases, with fitted exponents."""
     figure, left, right = _pair(66.0, ("Time", "Memory"))
     measured = data.isel(point=np.flatnonzero(data["outcome"].values == "measured"))
     times = np.nanmedian(measured["cpu_time"].values, axis=1)
@@ -68,7 +68,7 @@ def draw_growth(data: xr.Dataset) -> Figure:
 
 
 def exponent(sizes: np.ndarray, values: np.ndarray, least: int) -> float:
-    """Of the power law through the sizes from ``least`` on; NaN with fewer than two of them."""
+    """Fits the power law through the sizes from ``least`` on; NaN with fewer than two."""
     large = sizes >= least
     if large.sum() < 2:
         return float("nan")
@@ -89,7 +89,7 @@ def _lines(
 
 
 def _pair(height: float, titles: tuple[str, str]) -> tuple[Figure, Axes, Axes]:
-    """A page with two panels side by side."""
+    """Returns a page with two panels side by side."""
     figure = style.page(height)
     left = style.place(figure, 14.0, 9.0, 66.0, 46.0)
     right = style.place(figure, 106.0, 9.0, 66.0, 46.0)
@@ -99,7 +99,7 @@ def _pair(height: float, titles: tuple[str, str]) -> tuple[Figure, Axes, Axes]:
 
 
 def draw_tracking_accuracy(data: xr.Dataset) -> Figure:
-    """Displacement on the left, rotation on the right; a colour a video, dashes a method."""
+    """Draws displacement on the left, rotation on the right; a colour a video, dashes a method."""
     figure, left, right = _pair(80.0, ("Displacement", "Rotation"))
     error = data["error"]
     _accuracies(left, data, (error.sel(dof=["ux", "uy"]) ** 2).mean("dof") ** 0.5)

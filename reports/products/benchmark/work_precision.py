@@ -29,7 +29,7 @@ _PLAIN = {"central differences": ("ESDIRK3, band", "Newton, band")}
 
 
 def draw_work_precision(data: xr.Dataset) -> Figure:
-    """The diagrams of one scene at two-column width."""
+    """Draws the diagrams of one scene at two-column width."""
     methods = list(dict.fromkeys(data["method"].values[_measured(data)]))
     rows = -(-len(methods) // _COLUMNS)
     figure = style.page(_TOP + _HIGH + 13.0 + rows * _LINE)
@@ -48,7 +48,7 @@ def draw_work_precision(data: xr.Dataset) -> Figure:
 
 
 def panel(axes: Axes, data: xr.Dataset, quantity: str, task: str) -> None:
-    """Median time, with the range of the runs, against the error of a quantity."""
+    """Draws median time, with the range of the runs, against the error of a quantity."""
     chosen = data.isel(point=np.flatnonzero((data["task"].values == task) & _measured(data)))
     error = np.maximum(chosen["error"].sel(quantity=quantity).values, ROUNDING)
     times = chosen["cpu_time"].values
@@ -75,7 +75,7 @@ def _measured(data: xr.Dataset) -> np.ndarray:
 
 
 def draw_gradients(scenes: Mapping[str, xr.Dataset]) -> Figure:
-    """A panel a scene."""
+    """Draws a panel a scene."""
     rows = -(-len(scenes) // _SCENES)
     methods = list(dict.fromkeys(m for data in scenes.values() for m in _methods(data)))
     lines = -(-len(methods) // 4)
@@ -118,7 +118,7 @@ def _costs(axes: Axes, data: xr.Dataset) -> None:
 
 
 def _loss(losses: Mapping[tuple[str, str], float], methods: list[str], setting: str) -> float:
-    """Time of the loss by one of the methods: at that setting, or at its first."""
+    """Returns time of the loss by one of the methods: at that setting, or at its first."""
     for method in methods:
         known = {key[1]: time for key, time in losses.items() if key[0] == method}
         if known:
@@ -127,7 +127,7 @@ def _loss(losses: Mapping[tuple[str, str], float], methods: list[str], setting: 
 
 
 def times(data: xr.Dataset, task: str) -> dict[tuple[str, str], float]:
-    """Median time of every measured point of a task, by method and setting."""
+    """Returns median time of every measured point of a task, by method and setting."""
     chosen = data.isel(
         point=np.flatnonzero((data["task"].values == task) & (data["outcome"].values == "measured"))
     )
@@ -137,7 +137,7 @@ def times(data: xr.Dataset, task: str) -> dict[tuple[str, str], float]:
 
 
 def errors(data: xr.Dataset) -> dict[tuple[str, str], float]:
-    """Error of the gradient of every point, by method and setting."""
+    """Returns error of the gradient of every point, by method and setting."""
     chosen = data.isel(point=np.flatnonzero(data["task"].values == "gradient"))
     keys = zip(chosen["method"].values, chosen["setting"].values, strict=True)
     found = chosen["error"].sel(quantity="gradient").values

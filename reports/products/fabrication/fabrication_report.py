@@ -35,7 +35,7 @@ FIXTURE = "#c8ccd0"
 
 @dataclass(frozen=True)
 class PackageFact:
-    """A figure in words."""
+    """Describes a figure in words."""
 
     value: str
     label: str
@@ -44,7 +44,7 @@ class PackageFact:
 
 @dataclass(frozen=True)
 class FilePicture:
-    """A picture of a file (its path from the page), as base64 of a PNG."""
+    """Describes a picture of a file (its path from the page), as base64 of a PNG."""
 
     file: str
     caption: str
@@ -53,7 +53,7 @@ class FilePicture:
 
 @dataclass(frozen=True)
 class PictureGroup:
-    """Pictures under one heading."""
+    """Describes pictures under one heading."""
 
     title: str
     pictures: Sequence[FilePicture]
@@ -61,7 +61,7 @@ class PictureGroup:
 
 @dataclass(frozen=True)
 class PackageSection:
-    """One structure's part of the page; `files` are paths in its folder and their hashes."""
+    """Tells one structure's part of the page; `files` are paths in its folder and their hashes."""
 
     name: str
     title: str
@@ -89,7 +89,7 @@ def report(args: argparse.Namespace) -> None:
 
 
 def package(folder: Path, problem: Problem) -> PackageSection:
-    """What the page shows of a package, all of it read from the package's files."""
+    """Tells what the page shows of a package, all of it read from the package's files."""
     told = manifest.read(folder)
     name = folder.name
     return PackageSection(
@@ -102,7 +102,7 @@ def package(folder: Path, problem: Problem) -> PackageSection:
 
 
 def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
-    """Dotted keys and values."""
+    """Yields dotted keys and values."""
     for key, value in values.items():
         if isinstance(value, dict):
             yield from parameters(value, f"{above}{key}.")

@@ -31,14 +31,14 @@ PROOFS = {
 
 
 class Movie(NamedTuple):
-    """A movie, and its bytes as base64 where the page holds it."""
+    """Describes a movie, and its bytes as base64 where the page holds it."""
 
     link: Link
     data: str
 
 
 class IndexTable(NamedTuple):
-    """The claims on one figure of the paper; not built: `built` is None."""
+    """Describes the claims on one figure of the paper; not built: `built` is None."""
 
     name: str
     title: str
@@ -70,7 +70,7 @@ def shown(results: Path) -> dict[str, Any]:
 
 
 def tables(built: Sequence[BuiltReport]) -> list[IndexTable]:
-    """The claims by figure, of those that are built and of those that are not."""
+    """Returns the claims by figure, of those that are built and of those that are not."""
     by_name = {each.name: each for each in built}
     made = []
     for name in dict.fromkeys(claim.study for claim in claims.listed().claims):
@@ -82,7 +82,7 @@ def tables(built: Sequence[BuiltReport]) -> list[IndexTable]:
 
 
 def movies(results: Path) -> list[Movie]:
-    """All movies; the page holds as many of them as it has room for, the smallest first."""
+    """Returns all movies; the page holds as many of them as it has room for, the smallest first."""
     links = inventory.others(results, "movies", "*.mp4")
     files = {link.address: (results / link.address).read_bytes() for link in links}
     held, room = set(), LARGEST_MOVIES
@@ -108,7 +108,7 @@ def proofs(results: Path) -> list[Link]:
 
 
 def thumbnail(picture: Path) -> str:
-    """A picture made small, as base64 of a JPEG; empty where there is none."""
+    """Returns a picture made small, as base64 of a JPEG; empty where there is none."""
     image = cv2.imread(str(picture), cv2.IMREAD_COLOR)
     if image is None:
         return ""
@@ -123,6 +123,6 @@ def _base64(data: bytes) -> str:
 
 
 def _made() -> list[tuple[str, Any]]:
-    """What made this page."""
+    """Tells what made this page."""
     packages = dict(package_versions()) | {name: version(name) for name in ("jinja2", "matplotlib")}
     return [("git_commit", git_commit()), ("packages", json.dumps(packages, sort_keys=True))]

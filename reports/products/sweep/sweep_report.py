@@ -63,7 +63,7 @@ def report(args: argparse.Namespace) -> None:
 
 
 def facts(data: xr.Dataset) -> list[Fact]:
-    """The numbers of a sweep."""
+    """Returns the numbers of a sweep."""
     good = data.isel(case=np.flatnonzero(cases.good(data)))
     found = grouped("Cases", _counts(data, good))
     if good.sizes["case"]:
@@ -75,14 +75,14 @@ def facts(data: xr.Dataset) -> list[Fact]:
 
 
 def shown(data: xr.Dataset) -> PageTable:
-    """The numbers, and how many cases failed for which reason, as the page's table."""
+    """Returns the numbers, and how many cases failed for which reason, as the page's table."""
     rows = [(fact.group, fact.label, fact.ours, fact.note) for fact in facts(data)]
     failed = [("Failed cases", why, str(count), "") for why, count in cases.failures(data)]
     return PageTable(("of", "quantity", "here", "how it is taken"), [*rows, *failed])
 
 
 def tables(data: xr.Dataset) -> list[Table]:
-    """The numbers, and every case with what came of it."""
+    """Returns the numbers, and every case with what came of it."""
     units = data["loss"].attrs["units"]
     settings = {
         str(key): data["setting"].sel(parameter=key).values for key in data.parameter.values
@@ -132,7 +132,7 @@ def _void(good: xr.Dataset) -> Fact:
 
 
 def _ranks(good: xr.Dataset) -> list[Fact]:
-    """Spearman's, of every parameter that has numbers for values."""
+    """Returns Spearman's, of every parameter that has numbers for values."""
     from scipy.stats import spearmanr
 
     numeric = [axis for axis in cases.axes(good) if not axis.words and len(axis.distinct) > 1]

@@ -1,4 +1,4 @@
-"""What to change before the next recording: one line a finding."""
+"""Tells what to change before the next recording: one line a finding."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _REMEDIES = {
 
 
 def advice(found: TrackQuality) -> list[str]:
-    """All findings, what is lost and when first; praise if there is none."""
+    """Returns all findings, what is lost and when first; praise if there is none."""
     told = [line for check in _CHECKS if (line := check(found))]
     return told or ["Nothing to improve: light, sharpness, codec and timing are as they should be."]
 

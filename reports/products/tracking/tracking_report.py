@@ -26,7 +26,7 @@ from sim.core import Image
 
 
 class Line(NamedTuple):
-    """A line of the page's table."""
+    """Describes a line of the page's table."""
 
     label: str
     value: str
@@ -66,7 +66,7 @@ def _check_origin(track: xr.Dataset, path: Path, video: Path) -> None:
 
 
 def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Frame]:
-    """The frames of the video that the track has."""
+    """Yields the frames of the video that the track has."""
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
     shown = frames(video, asked.window.start, end, asked.frame_rate)
@@ -74,7 +74,7 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
 
 
 def _values(track: xr.Dataset, asked: Recording, found: TrackQuality) -> dict[str, object]:
-    """What the page shows, its figure within it."""
+    """Tells what the page shows, its figure within it."""
     return {
         "title": asked.title or "Recording",
         "synthetic": track.attrs["synthetic"] == "yes",
