@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from pipeline.runtime import cli
-from reports.catalogue import REPORTS, ReportCommand
+from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -28,8 +28,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
     parser = cli.parser(f"reports {kind}", command.description, study=command.study)
-    for option in command.options:
-        parser.add_argument(option.flag, **option.settings)
+    for word in command.options.split():
+        flag = word.rstrip("?")
+        parser.add_argument(flag, required=word == flag, **OPTIONS[flag])
     return cli.run(lambda args: import_module(command.module).report(args), parser, words)
 
 

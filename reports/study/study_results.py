@@ -119,7 +119,7 @@ class StudyResults:
         return self.datasets.get("verification")
 
     @property
-    def again(self) -> RedesignResults | None:
+    def redesign(self) -> RedesignResults | None:
         """Returns the design for contact on distance, of a static study by the angle law."""
         if "geometric_design" not in self.datasets:
             return None
@@ -164,7 +164,7 @@ def load(
     )
 
 
-def built(
+def load_built(
     path: Path, preset: str | None, results: Path, recordings: Sequence[str] = ()
 ) -> StudyResults:
     """Finds the study of a problem file, its datasets where the workflow puts them below `results`.

@@ -29,5 +29,5 @@ def framework_report(study: StudyResults) -> Report:
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
     shown = [file.parent.name for file in args.comparisons]
-    study = study_results.built(args.problem, args.preset, args.results, shown)
+    study = study_results.load_built(args.problem, args.preset, args.results, shown)
     publish(framework_report(study), args.out_dir)

@@ -5,7 +5,7 @@ from . import figure as figure
 from . import measures as measures
 from . import tables as tables
 from .abscissa import Abscissa as Abscissa
-from .abscissa import course as course
+from .abscissa import abscissa_of as abscissa_of
 from .abscissa import display_name as display_name
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping

@@ -47,7 +47,7 @@ class Abscissa:
         return f"{words} ({share:.2g} %)"
 
 
-def course(problem: Problem, response: xr.Dataset) -> Abscissa:
+def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     """Returns the path of a response."""
     static = problem.static
     values = driven_displacement(response) if static else response["time"].values

@@ -23,8 +23,8 @@ def contact_facts(study: StudyResults) -> Iterator[Fact]:
         return
     names = [name for name in structures(study.response) if name != "intact"]
     yield from _by_law(study.response, names)
-    if study.again is not None:
-        yield from _again(study, study.again)
+    if study.redesign is not None:
+        yield from _again(study, study.redesign)
 
 
 def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iterator[Fact]:

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.problem.sections import Paper
 from reports.facts import Fact
 from reports.figures.loading_path import measures
-from reports.figures.loading_path.abscissa import Abscissa, course, display_name, structures
+from reports.figures.loading_path.abscissa import Abscissa, abscissa_of, display_name, structures
 from reports.figures.loading_path.structure_panels import shade_of
 from reports.page import PageText, study_text
 from reports.panels import (
@@ -30,7 +30,7 @@ _KEYS: tuple[Literal["ux", "uy", "theta"], ...] = ("ux", "uy", "theta")
 
 def loading_path_animation(study: StudyResults) -> Animation:
     """Returns every structure along the path, with its recordings."""
-    path, response = course(study.problem, study.response), study.response
+    path, response = abscissa_of(study.problem, study.response), study.response
     clips: list[AnimationClip] = []
     for name in structures(response):
         clip = structure_clip(display_name(study.problem, name), study, name)

@@ -16,7 +16,7 @@ from reports.facts import Fact, checks, grouped, number, recording_facts, share,
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
     Abscissa,
-    course,
+    abscissa_of,
     display_name,
     lattice_size,
     structures,
@@ -27,7 +27,7 @@ from reports.study import StudyResults, from_dataset
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
     """Returns all facts, under headings."""
-    path = course(study.problem, study.response)
+    path = abscissa_of(study.problem, study.response)
     return [
         *grouped("Scene", scene_facts(study, path)),
         *grouped("Result", measure_facts(study, path)),

@@ -12,7 +12,7 @@ from reports.facts import JUMPED
 from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
     Abscissa,
-    course,
+    abscissa_of,
     display_name,
     lattice_size,
     structures,
@@ -35,7 +35,7 @@ Curve = tuple[str, Callable[[Axes], None], str, Sequence[Table]]
 
 def loading_path_figure(study: StudyResults) -> PanelFigure:
     """Returns the whole figure."""
-    problem, path = study.problem, course(study.problem, study.response)
+    problem, path = study.problem, abscissa_of(study.problem, study.response)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
     head = 11.5 if study.recordings else 8.5
@@ -143,7 +143,7 @@ def marks(studies: Sequence[StudyResults]) -> str:
     """Tells what else is drawn with the curves of the measure, each after a semicolon."""
     bands = any(study.scatter is not None for study in studies)
     jumps = any((study.response["stability"] == JUMPED).any() for study in studies)
-    second = any(study.again is not None and study.again.changed for study in studies)
+    second = any(study.redesign is not None and study.redesign.changed for study in studies)
     return (
         ("; the bands hold 90 % of the imperfect cloaks" if bands else "")
         + ("; crosses mark jumps to another branch" if jumps else "")

@@ -13,7 +13,13 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
 from reports.base import style
-from reports.figures.loading_path.abscissa import SECOND, Abscissa, course, display_name, structures
+from reports.figures.loading_path.abscissa import (
+    SECOND,
+    Abscissa,
+    abscissa_of,
+    display_name,
+    structures,
+)
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
 from reports.panels import draw
 from reports.study import StudyResults, from_dataset
@@ -38,7 +44,7 @@ class SnapshotStructure:
 def rows(study: StudyResults) -> list[SnapshotStructure]:
     """Lists the structures of a study, recordings above them, and the second design."""
     response, problem = study.response, study.problem
-    along, found = course(problem, response).values, []
+    along, found = abscissa_of(problem, response).values, []
     for name in structures(response):
         label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
         filmed = [each for each in study.recordings if each.structure == name]
@@ -47,8 +53,8 @@ def rows(study: StudyResults) -> list[SnapshotStructure]:
             found.append(SnapshotStructure(f"{label}\n{each.source}", colour, part))
         label = f"{label}\nsimulation" if filmed else label
         found.append(SnapshotStructure(label, colour, response.sel(structure=name)))
-    if study.again is not None and study.again.changed:
-        part = study.again.response.sel(structure="cloaked")
+    if study.redesign is not None and study.redesign.changed:
+        part = study.redesign.response.sel(structure="cloaked")
         found.append(SnapshotStructure(SECOND, style.CLOAKED, part))
     return found
 
@@ -58,7 +64,7 @@ class SnapshotLayout:
     """Tells how the snapshots are laid out: structures above one another or side by side; mm."""
 
     rows: list[SnapshotStructure]
-    course: Abscissa
+    path: Abscissa
     side: float
     beside: bool
 
@@ -77,12 +83,12 @@ class SnapshotLayout:
     @property
     def lines(self) -> int:
         """Returns number of snapshots above one another."""
-        return len(self.course.shown) if self.beside else len(self.rows)
+        return len(self.path.shown) if self.beside else len(self.rows)
 
     @property
     def columns(self) -> int:
         """Returns number of snapshots side by side."""
-        return len(self.rows) if self.beside else len(self.course.shown)
+        return len(self.rows) if self.beside else len(self.path.shown)
 
     @property
     def left(self) -> float:
@@ -107,7 +113,7 @@ def snapshots(
     """Draws all structures at all loads shown, from ``top`` (mm) on, an ``overlay`` on each."""
     shade, side = shade_of(study.problem, study.response), grid.side
     for k, row in enumerate(grid.rows):
-        for m, sample in enumerate(grid.course.shown):
+        for m, sample in enumerate(grid.path.shown):
             line, column = grid.at(k, m)
             axes = style.place(
                 figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
@@ -115,7 +121,7 @@ def snapshots(
             snapshot(axes, study.problem, row.part, sample, shade)
             if overlay is not None:
                 overlay(axes, row, sample)
-    loads = [f"{grid.course.symbol} = {grid.course.at(sample)}" for sample in grid.course.shown]
+    loads = [f"{grid.path.symbol} = {grid.path.at(sample)}" for sample in grid.path.shown]
     kinds = [(row.label, row.colour) for row in grid.rows]
     values = [(load, style.INTACT) for load in loads]
     _labels(figure, grid, top, *((kinds, values) if grid.beside else (values, kinds)))

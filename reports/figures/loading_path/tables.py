@@ -10,7 +10,7 @@ import xarray as xr
 from reports.base import Table
 from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
-from reports.figures.loading_path.abscissa import course, structures
+from reports.figures.loading_path.abscissa import abscissa_of, structures
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults
 
@@ -37,7 +37,7 @@ def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Col
 def path(study: StudyResults) -> Columns:
     """Lists per sample the measure, contraction, reaction, energies, voids of each structure."""
     problem, response = study.problem, study.response
-    way = course(problem, response)
+    way = abscissa_of(problem, response)
     measure = measures.measure_of(problem)
     columns: Columns = {"time_s": response["time"].values}
     if way.static:

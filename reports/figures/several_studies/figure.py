@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from reports.base import style
 from reports.figures.loading_path import (
     UnitColouring,
+    abscissa_of,
     colour_bar,
-    course,
     curves,
     display_name,
     measures,
@@ -86,7 +86,7 @@ def _structures(
             if row == 0:
                 title, colour = display_name(study.problem, name), style.STRUCTURE_COLOURS[name]
                 axes.set_title(title, color=colour, fontsize=style.TEXT, pad=1.0)
-    way = course(columns[0][0].problem, columns[0][0].response)
+    way = abscissa_of(columns[0][0].problem, columns[0][0].response)
     for row, sample in enumerate((0, -1)):
         style.write(
             figure, 3.0, top + (row + 0.5) * side, f"{way.symbol} = {way.at(sample)}",
@@ -103,7 +103,7 @@ def heading(study: StudyResults) -> str:
 
 def _curves(study: StudyResults, k: int, top: float, letters: Iterator[str]) -> Iterator[Panel]:
     """Yields measure and contraction of the k-th study, in rows of four panels."""
-    way, measure = course(study.problem, study.response), measures.measure_of(study.problem)
+    way, measure = abscissa_of(study.problem, study.response), measures.measure_of(study.problem)
     width, y = style.TWO_COLUMNS / 4, top + (2 * k // 4) * CURVES
     for half, title in enumerate((measure.label, "contraction")):
         left = ((2 * k + half) % 4) * width

@@ -12,7 +12,7 @@ from pipeline.runtime import UserError
 from reports.base import Table
 from reports.facts import Fact, fact_records
 from reports.figures import loading_path
-from reports.figures.loading_path import course, display_name, measures, structures
+from reports.figures.loading_path import abscissa_of, display_name, measures, structures
 from reports.figures.several_studies.figure import heading, several_studies_figure
 from reports.page import PageText, Report, publish, study_page
 from reports.panels import Animation, case_labels, structure_clip
@@ -85,7 +85,7 @@ def _caption(studies: Sequence[StudyResults]) -> str:
 def _animation(studies: Sequence[StudyResults]) -> Animation:
     """Returns every structure along the first study’s path; equal intact ones once."""
     first = studies[0]
-    way, times = course(first.problem, first.response), first.response["time"]
+    way, times = abscissa_of(first.problem, first.response), first.response["time"]
     clips = []
     for study in studies:
         for name in structures(study.response):
@@ -109,7 +109,7 @@ def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[
     found = []
     for name in asked.studies:
         path = figure.parent.parent / name / "problem.yaml"
-        found.append(study_results.built(path, preset, results))
+        found.append(study_results.load_built(path, preset, results))
     for each in found:
         if not each.problem.static:
             raise UserError(

@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.problem.sections import RampHarmonicDrive
 from reports.facts import Fact, checks, grouped, number, share, within, worded
 from reports.figures.loading_path import (
-    course,
+    abscissa_of,
     display_name,
     loss_facts,
     measures,
@@ -26,7 +26,7 @@ from reports.study import StudyResults
 
 def wave_facts(study: StudyResults) -> list[Fact]:
     """Returns all facts, under headings."""
-    path = course(study.problem, study.response)
+    path = abscissa_of(study.problem, study.response)
     return [
         *grouped("Scene", (*scene_facts(study, path), *drive_facts(study))),
         *grouped("Result", error_facts(study)),

@@ -16,8 +16,8 @@ from reports.figures.loading_path import (
     TALLEST_SNAPSHOTS,
     SnapshotLayout,
     SnapshotStructure,
+    abscissa_of,
     by_structure,
-    course,
     design_panels,
     measure_panel,
     measures,
@@ -39,7 +39,7 @@ ROOM = 8.5
 
 def wave_figure(study: StudyResults) -> PanelFigure:
     """Returns the whole figure."""
-    path, half = course(study.problem, study.response), style.TWO_COLUMNS / 2
+    path, half = abscissa_of(study.problem, study.response), style.TWO_COLUMNS / 2
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
     middle = top + ROOM + grid.lines * grid.side + 1.5
@@ -114,7 +114,10 @@ def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: i
 def _places(figure: Figure, study: StudyResults, top: float) -> None:
     """Draws u_y over time at each place, side by side."""
     shown = places(study.problem, study.response)
-    path, rise = course(study.problem, study.response), study.response["displacement"].sel(dof="uy")
+    path, rise = (
+        abscissa_of(study.problem, study.response),
+        study.response["displacement"].sel(dof="uy"),
+    )
     width = style.TWO_COLUMNS / max(len(shown), 1)
     for k, place in enumerate(shown):
         axes = style.place(figure, k * width + 11.0, top, width - 14.0, 25.0)
@@ -130,10 +133,10 @@ def _places(figure: Figure, study: StudyResults, top: float) -> None:
 
 def _edges(axes: Axes, study: StudyResults) -> None:
     """Draws smallest void angle on the edges over time, and when that is contact."""
-    path_axes(axes, course(study.problem, study.response), "angle (°)")
+    path_axes(axes, abscissa_of(study.problem, study.response), "angle (°)")
     angles = 180.0 / np.pi * closed_voids.along_edges(study.problem, study.response).min("ligament")
     structure_curves(
-        axes, study.problem, course(study.problem, study.response), angles,
+        axes, study.problem, abscissa_of(study.problem, study.response), angles,
         structures(study.response),
     )  # fmt: skip
     contact = study.problem.contact

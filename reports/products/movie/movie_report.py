@@ -21,7 +21,7 @@ def report(args: argparse.Namespace) -> None:
         name = path.resolve().parent.name
         folder = args.results / name / "recordings"
         shown = [file.parent.name for file in args.comparisons if file.parent.parent == folder]
-        studies.append(study_results.built(path, None, args.results, shown))
+        studies.append(study_results.load_built(path, None, args.results, shown))
     labels = {"title": args.out.stem, "comment": _note(studies)}
     with cli.progress(len(studies), "movie") as bar:
         frames = _frames(args.out.stem, studies, bar)

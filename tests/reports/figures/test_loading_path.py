@@ -90,7 +90,7 @@ def test_reaction_is_the_sum_over_the_driven_units_along_the_drive(smile: StudyR
 
 
 def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) -> None:
-    way = abscissa.course(shield.problem, shield.response)
+    way = abscissa.abscissa_of(shield.problem, shield.response)
     np.testing.assert_allclose(way.values, np.linspace(0, 15, 9), atol=1e-12)
     assert [way.at(k) for k in way.shown] == [
         "0 mm (0 %)", "5.62 mm (3.8 %)", "11.2 mm (7.5 %)", "15 mm (10 %)",
