@@ -148,7 +148,7 @@ def styled() -> Iterator[None]:
 
 
 def page(height: float, width: float = TWO_COLUMNS) -> Figure:
-    """Draws empty figure of width x height mm."""
+    """Makes an empty figure of width x height mm."""
     return Figure(figsize=(width / MM_PER_INCH, height / MM_PER_INCH))
 
 
@@ -163,7 +163,7 @@ def place(figure: Figure, left: float, top: float, width: float, height: float) 
 
 
 def write(figure: Figure, left: float, top: float, text: str, **style: str | float) -> None:
-    """Draws text whose top-left corner lies `left`, `top` mm from the page's top-left corner."""
+    """Writes text whose top-left corner lies `left`, `top` mm from the page's top-left corner."""
     inches_wide, inches_high = figure.get_size_inches()
     settings: dict[str, Any] = {"ha": "left", "va": "top"} | style
     x, y = left / (inches_wide * MM_PER_INCH), 1 - top / (inches_high * MM_PER_INCH)

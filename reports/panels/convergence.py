@@ -1,4 +1,4 @@
-"""Tells the loss against the evaluation of the design, for every method, as a panel of a figure."""
+"""Draws the loss against the evaluation of the design, for every method, as a panel of a figure."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, floa
 
 
 def _shown(chosen: xr.Dataset) -> xr.Dataset:
-    """Returns of a track, the displacements that go farthest; of other sets, all."""
+    """Keeps of a track the displacements that go farthest; of other sets, all."""
     channel = chosen["channel"].values
     if not channel.any():
         return chosen

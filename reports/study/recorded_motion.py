@@ -1,4 +1,4 @@
-"""Tells recordings of a study beside its simulation, along the same course: time, or the load."""
+"""Holds recordings of a study beside its simulation, along the same course: time, or the load."""
 
 from __future__ import annotations
 

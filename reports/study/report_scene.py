@@ -37,7 +37,7 @@ class ReportScene:
 
     @property
     def period(self) -> float:
-        """Returns of the drive, s."""
+        """Returns the period of the drive, s."""
         return 1.0 / self.frequency
 
     @property

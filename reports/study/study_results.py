@@ -42,7 +42,7 @@ KINDS: dict[Output, Kind] = {
 
 @dataclass(frozen=True)
 class RedesignResults:
-    """Tells the design for contact on distance, and what the structures do with that contact."""
+    """Holds the design for contact on distance, and what the structures do with that contact."""
 
     design: xr.Dataset
     response: xr.Dataset

@@ -1,4 +1,4 @@
-"""Tells pictures of the framework: domains with their regions, what is cut, what a camera sees."""
+"""Draws pictures of the framework: domains with their regions, what is cut, what a camera sees."""
 
 from __future__ import annotations
 

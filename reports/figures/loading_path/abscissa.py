@@ -35,7 +35,7 @@ class Abscissa:
 
     @property
     def label(self) -> str:
-        """Returns of an axis."""
+        """Labels an axis."""
         return f"{self.name} {self.symbol} ({self.unit})"
 
     def at(self, sample: int) -> str:

@@ -93,7 +93,7 @@ def _radii(problem: Problem) -> Iterator[Fact]:
 
 
 def _cloak_width(problem: Problem) -> float | None:
-    """Returns of a cloak around something round, mm."""
+    """Finds the width of a cloak around something round, mm."""
     if problem.cloak.around is not None:
         return problem.cloak.around.distance
     cloak = problem.cloak.bounds
@@ -120,7 +120,7 @@ def _strain_fact(lattice: Lattice, path: Abscissa) -> Fact:
 
 
 def _drive_facts(problem: Problem) -> Iterator[Fact]:
-    """Yields of a harmonic drive."""
+    """Yields amplitude and frequency of a harmonic drive."""
     if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
         yield number("amplitude", "Amplitude A", problem.drive.amplitude, "mm")
         yield number("frequency", "Frequency f", problem.drive.frequency, "Hz")

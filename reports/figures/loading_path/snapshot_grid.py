@@ -34,7 +34,7 @@ Label = tuple[str, str]
 
 @dataclass(frozen=True)
 class SnapshotStructure:
-    """Tells one structure among the snapshots: its name, the colour of that, and what it does."""
+    """Holds one structure among the snapshots: its name, the colour of that, and what it does."""
 
     label: str
     colour: str

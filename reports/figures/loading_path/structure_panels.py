@@ -45,7 +45,7 @@ class UnitColouring:
 
     @property
     def norm(self) -> Normalize:
-        """Returns from the lowest to the highest colour."""
+        """Spans the lowest to the highest colour."""
         return Normalize(*self.field.limits)
 
 

@@ -1,4 +1,4 @@
-"""Tells numbers of several designs: how well each shields the boundary, and how that goes on."""
+"""States numbers of several designs: how well each shields the boundary, and how that goes on."""
 
 from __future__ import annotations
 

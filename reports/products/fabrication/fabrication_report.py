@@ -61,7 +61,7 @@ class PictureGroup:
 
 @dataclass(frozen=True)
 class PackageSection:
-    """Tells one structure's part of the page; `files` are paths in its folder and their hashes."""
+    """Holds one structure's part of the page; `files` are paths in its folder and their hashes."""
 
     name: str
     title: str

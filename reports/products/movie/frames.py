@@ -1,4 +1,4 @@
-"""Tells the frames of a movie: every structure true to scale, coloured by what its figure shows."""
+"""Draws the frames of a movie: every structure true to scale, coloured by what its figure shows."""
 
 from __future__ import annotations
 
