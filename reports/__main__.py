@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from pipeline.runtime import cli
+from pipeline.runtime import PREFIX, cli
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
@@ -31,7 +31,7 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
     for word in command.options.split():
         flag = word.rstrip("?")
         parser.add_argument(flag, required=word == flag, **OPTIONS[flag])
-    return cli.run(lambda args: import_module(command.module).report(args), parser, words)
+    return cli.run(lambda args: import_module(PREFIX + command.module).report(args), parser, words)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from benchmarks.methods.own_solvers import gradient_of
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats
 from sim.energy import gradient, system_of
-from sim.scene import structure
+from sim.scene import parameters_of_design
 from sim.solvers import Harmonic
 from sim.structure import ConcreteParameters
 from sim.vibration import linearised
@@ -38,11 +38,11 @@ class FirstOrderSystem:
 
     def __init__(self, posed: LoadCase, values: ConcreteParameters) -> None:
         scene = posed.scene
-        (drive,) = scene.motions
+        (drive,) = scene.loads.motions
         assert isinstance(drive, Harmonic)
         self.topology, self.values, self.drive = scene.topology, values, drive
         self.free = np.sort(self.topology.free_dofs)
-        driven = 3 * scene.driven
+        driven = 3 * scene.loads.driven
         self._along_x, self._along_y = driven, driven + 1
         self._system = system_of(self.topology, values)
         self._turn = np.empty((self.topology.n_units, 4))
@@ -122,7 +122,7 @@ def _solve(
     more = {"jac": motion.jacobian} if method in IMPLICIT else {}
     found = solve_ivp(
         motion.rates,
-        (0.0, posed.scene.duration),
+        (0.0, posed.scene.loads.duration),
         np.zeros(2 * len(motion.free)),
         method=method,
         t_eval=posed.times,
@@ -142,7 +142,7 @@ def _solve(
 def reference(name: str) -> Run:
     """Motion, loss and slope by DOP853 at 1e-11; the whole gradient by our tightest adjoint."""
     posed = case(name)
-    of_design = structure(posed.scene)
+    of_design = parameters_of_design(posed.scene)
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
         values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -16,8 +16,16 @@ from pipeline.posing import limits_of, scene_of
 from pipeline.problem.reading import load
 from sim.constraints import Limits
 from sim.core import Floats
-from sim.scene import Objective, Scene, concrete_parameters, objective, sample_times, target_motion
-from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.scene import (
+    Clamp,
+    Mimicking,
+    Scene,
+    concrete_parameters,
+    mimicking,
+    sample_times,
+    target_motion,
+)
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
 from sim.structure import ConcreteParameters, Parameters, quads
 
 DIRECTION_SEED = 0
@@ -58,9 +66,9 @@ class LoadCase:
         return concrete_parameters(self.scene, self.scene.lattice.vertices)
 
     @cached_property
-    def objective(self) -> Objective:
+    def objective(self) -> Mimicking:
         """The loss (1,) of motions (1, n_times, n_units, 3)."""
-        return objective(self.scene, self.target)
+        return mimicking(self.scene, self.target)
 
     @cached_property
     def direction(self) -> Floats:
@@ -80,7 +88,7 @@ class LoadCase:
     def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
         """What is compared: region's motion by spacings, loss, gradient and its slope."""
         spacing = self.scene.lattice.spacing
-        moved = np.asarray(motion)[0][:, self.scene.region]
+        moved = np.asarray(motion)[0][:, self.scene.objective.region]
         found = {
             "displacement": moved / np.array([spacing, spacing, 1.0]),
             "loss": np.asarray(loss),
@@ -95,14 +103,14 @@ class LoadCase:
 def case(name: str) -> LoadCase:
     """The case of that name (a key of TITLES)."""
     posed = scene(name)
-    return LoadCase(posed, None if posed.reference is None else target_motion(posed))
+    return LoadCase(posed, None if posed.objective.reference is None else target_motion(posed))
 
 
 def scene(name: str) -> Scene:
     """Its scene."""
     if name.startswith("small"):
         return _small_wave() if name == "small_wave" else _small_push()
-    whole = replace(scene_of(load(_file(name)), _file(name).parent), symmetry="none")
+    whole = scene_of(load(_file(name)), _file(name).parent).updated(symmetry="none")
     return paper_scenes.one_case(whole, 45.0) if name == "fig2" else whole
 
 
@@ -111,7 +119,7 @@ def symmetric(name: str) -> Scene:
     if name == "fig2":
         return paper_scenes.fig2(symmetry="C4")
     turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
-    return replace(scene(name), symmetry="C4", motions=turns, weights=np.full(2, 0.5))
+    return scene(name).driven_by(*turns, symmetry="C4")
 
 
 def designed(name: str) -> tuple[Scene, Limits]:
@@ -129,13 +137,11 @@ def _file(name: str) -> Path:
 def _small_wave() -> Scene:
     lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
     corners = np.array([0, 4, 20, 24])
-    return replace(
-        paper_scenes.fig2(),
+    return paper_scenes.fig2().updated(
         lattice=lattice,
-        clamped=held_dofs(corners, np.array([], dtype=np.int64)),
-        driven=np.array([12]),
-        motions=(Harmonic(1.0, 20.0, 0.3),),
-        weights=np.ones(1),
+        supports=(Clamp(corners),),
+        cases=(PrescribedMotion(np.array([12]), Harmonic(1.0, 20.0, 0.3)),),
+        weights=None,
         duration=0.05,
         frequency=20.0,
         cloak=CLOAK,
@@ -147,13 +153,11 @@ def _small_wave() -> Scene:
 def _small_push() -> Scene:
     lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
     left = 5 * np.arange(5)
-    return replace(
-        paper_scenes.fig4(),
+    return paper_scenes.fig4().updated(
         lattice=lattice,
-        material=paper_scenes.fig2().material,
-        clamped=held_dofs(left, np.array([], dtype=np.int64)),
-        driven=left + 4,
-        motions=(LinearRamp(-4.0, 1.0),),
+        material=paper_scenes.fig2().structure.material,
+        supports=(Clamp(left),),
+        cases=(PrescribedMotion(left + 4, LinearRamp(-4.0, 1.0)),),
         steps=4,
         cloak=CLOAK,
         region=REGION,

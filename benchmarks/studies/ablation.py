@@ -30,8 +30,8 @@ from benchmarks.suites import warm
 from sim.core import Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import evaluator, make_plan, structure, value_and_gradient
-from sim.solvers import Harmonic, LinearRamp, Solver, base
+from sim.scene import Evaluator, GradientChain, make_plan, parameters_of_design
+from sim.solvers import Harmonic, LinearRamp, Solver, solve_cases
 from sim.time_integration import ImplicitSolver
 
 EXACT = 1e-12
@@ -65,11 +65,13 @@ def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
     """The region is compared with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
     run, solver = loss_by_solver(name, make_plan(posed.scene).solver), make_plan(posed.scene).solver
-    still = replace(posed.scene, motions=tuple(_still(motion) for motion in posed.scene.motions))
+    still = posed.scene.updated(
+        motions=tuple(_still(motion) for motion in posed.scene.loads.motions)
+    )
 
     def simulated() -> Sample:
-        rest, *_ = base.forward(solver, posed.values, still.drives)
-        moved, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        rest, *_ = solve_cases(solver, posed.values, still.loads.cases)
+        moved, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
 
     del task
@@ -93,12 +95,11 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     """A slow load as equilibria, or as the motion that it is."""
     del task
     scene = load_cases.scene(name)
-    (ramp,) = scene.motions
+    (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
-    slow = replace(
-        scene,
+    slow = scene.driven_by(
+        ramp._replace(duration=SLOWLY),
         static=False,
-        motions=(ramp._replace(duration=SLOWLY),),
         duration=SLOWLY,
         integrator="implicit",
     )
@@ -114,7 +115,7 @@ def other_outputs(name: str, skipped: float, task: Task) -> Run:
     solver = make_plan(posed.scene).solver
 
     def run() -> Sample:
-        motion, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         if not skipped:
             observe(posed.scene.topology, posed.values, motion[0])
         return Sample(posed.results(*posed.measured(motion, posed.values)), {})
@@ -130,8 +131,10 @@ def far_derivatives(name: str, skipped: float, task: Task) -> Run:
     if not skipped:
         every = np.arange(posed.scene.lattice.n_ligaments, dtype=np.int64)
         solver = _on(solver, designed=every)
-    of_design = structure(posed.scene)
-    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.drives)
+    of_design = parameters_of_design(posed.scene)
+    evaluate = partial(
+        GradientChain(of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+    )
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> Sample:
@@ -150,7 +153,7 @@ def equal_cases(name: str, skipped: float, task: Task) -> Run:
     """Load cases that are copies of others, turned by a quarter."""
     del task
     scene = load_cases.symmetric(name)
-    evaluate = evaluator(scene, make_plan(scene, every_case=not skipped))
+    evaluate = Evaluator(scene, make_plan(scene, every_case=not skipped))
     start = np.zeros(scene.space.n_variables)
 
     def run() -> Sample:

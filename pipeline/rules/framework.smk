@@ -1,12 +1,12 @@
 # Figure 1: the framework, drawn from what Figure 2 has computed.
-FRAMED = [Study(name) for name in paper_figures()["fig1"].studies]
+FRAMED = [studies.Study(name) for name in paper_figures()["fig1"].studies]
 
 
 rule fig1:
     input:
         problem=ancient("experiments/fig2/problem.yaml"),
-        datasets=lambda wildcards: datasets_of(FRAMED),
-        comparisons=lambda wildcards: comparisons_of(FRAMED),
+        datasets=lambda wildcards: rule_inputs.datasets_of(FRAMED),
+        comparisons=lambda wildcards: rule_inputs.comparisons_of(FRAMED),
     output:
         multiext("results/fig1/report/fig1", ".pdf", ".svg", ".png"),
         page="results/fig1/report/index.html",
@@ -15,7 +15,7 @@ rule fig1:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        problem=lambda wildcards: hashes_of(FRAMED),
+        problem=lambda wildcards: rule_inputs.hashes_of(FRAMED),
         source=source_hash(REPORTS["framework"].module),
     message:
         "Drawing the framework"

@@ -1,7 +1,9 @@
 # Every figure and movie of the paper, and the page over them.
 rule all:
     input:
-        expand("results/{figure}/report/index.html", figure=["fig1", *figures()]),
+        expand(
+            "results/{figure}/report/index.html", figure=["fig1", *studies.figures()]
+        ),
         expand("results/movies/{movie}.mp4", movie=MOVIES),
     output:
         "results/index.html",

@@ -1,11 +1,13 @@
 # The paper's movies, of the studies that there are; every study in full, with its recordings.
-MOVIES = present(paper_movies())
+MOVIES = studies.present(paper_movies())
 
 
 rule movie:
     input:
-        datasets=lambda wildcards: datasets_of(MOVIES[wildcards.movie]),
-        comparisons=lambda wildcards: comparisons_of(MOVIES[wildcards.movie]),
+        datasets=lambda wildcards: rule_inputs.datasets_of(MOVIES[wildcards.movie]),
+        comparisons=lambda wildcards: rule_inputs.comparisons_of(
+            MOVIES[wildcards.movie]
+        ),
     output:
         "results/movies/{movie}.mp4",
     log:
@@ -13,7 +15,7 @@ rule movie:
     threads: 1
     params:
         problems=lambda wildcards: [study.problem for study in MOVIES[wildcards.movie]],
-        problem=lambda wildcards: hashes_of(MOVIES[wildcards.movie]),
+        problem=lambda wildcards: rule_inputs.hashes_of(MOVIES[wildcards.movie]),
         source=source_hash(REPORTS["movie"].module),
     message:
         "Drawing movie {wildcards.movie}"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,7 +14,6 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
 from pipeline.runtime import UserError, cli
-from sim.solvers import base
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,19 +39,6 @@ class Gain(NamedTuple):
     price: float
 
 
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.robust_gains",
-        "Evaluate the loss of every preset that asks for more than the study's own drive at the"
-        " study's own design and at the preset's.",
-    )
-    told = "the study's own design as plain=NC, and one for each preset"
-    made.add_argument("--designs", nargs="+", required=True, metavar="PRESET=NC", help=told)
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
-
-
 def work(args: argparse.Namespace) -> None:
     """Reads the designs, evaluates them, writes the gains.
 
@@ -67,7 +52,7 @@ def work(args: argparse.Namespace) -> None:
         remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
         raise UserError(what, key="--designs", remedy=remedy)
     made = gains(args.problem, given)
-    origin = provenance.attributes(problem.load(args.problem), "design", parents=given)
+    origin = provenance.attributes(problem.load(args.problem), "robust_gains", parents=given)
     datasets.write(made, args.out, "gains", origin)
 
 
@@ -137,26 +122,12 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     vertices = scene.lattice.vertices
     if path is not None:
         vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
-    shifts = [0.0] if scene.copies is None else scene.copies[:, scene.lattice.group]
+    shifts = [0.0] if scene.design.copies is None else scene.design.copies[:, scene.lattice.group]
     return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
     """The combined loss of one structure."""
-    from sim.scene import combined, concrete_parameters, make_plan, objective
+    from sim.scene import make_plan, simulate
 
-    plan = make_plan(scene, vertices)
-    values = concrete_parameters(scene, vertices)
-    drives = [scene.drives[case] for case in plan.simulated]
-    motion, *_ = base.forward(plan.solver, values, drives)
-    each = objective(scene)(motion, values)[np.searchsorted(plan.simulated, plan.case_of)]
-    return float(combined(each, scene.weights, scene.sharpness))
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)

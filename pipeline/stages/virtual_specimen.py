@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,13 +20,11 @@ from pipeline.posing import (
     times_of,
     unit_coordinates,
 )
-from pipeline.runtime import UserError, cli, found_in
+from pipeline.runtime import UserError, found_in
 from pipeline.tracking.frames import recording as recordings
 from pipeline.virtual_lab import specimen
 from sim.core import SimulationError
-from sim.energy import observe
-from sim.scene import concrete_parameters, make_plan
-from sim.solvers import solve_case
+from sim.scene import simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,17 +34,6 @@ if TYPE_CHECKING:
     from pipeline.tracking.frames import Recording
     from sim.core import Floats
     from sim.scene import Scene
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.virtual_specimen", "Simulate the specimen of a virtual recording."
-    )
-    made.add_argument("recording", type=Path, metavar="RECORDING.yaml")
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -63,7 +47,7 @@ def work(args: argparse.Namespace) -> None:
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
-    origin = provenance.attributes(asked, "simulate", parents={"design": args.design})
+    origin = provenance.attributes(asked, "virtual_specimen", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 
@@ -96,7 +80,7 @@ def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedSt
         remedy = f"give one of: {', '.join(held)}"
         what = "the study has no such structure"
         raise UserError(what, key="structure", value=recording.structure, remedy=remedy)
-    cases = len(structure.scene.motions)
+    cases = len(structure.scene.loads.motions)
     if recording.case >= cases:
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError(
@@ -111,7 +95,7 @@ def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
     times = wanted.asked[wanted.shown]
     if not unload:
         return times
-    if not scene.static:
+    if not scene.loads.static:
         remedy = "leave it out: a motion in time comes back by itself"
         raise UserError("no static load", key="virtual.specimen.unload", remedy=remedy)
     return np.concatenate([times, 2 * times[-1] - times[-2::-1]])
@@ -125,7 +109,7 @@ def _described(
     scene, vertices = made
     intact, lattice = lattice_of(asked), scene.lattice
     motion, force = _simulated(made, times)
-    drive = motion[:, scene.driven, :2].mean(axis=1)
+    drive = motion[:, scene.loads.driven, :2].mean(axis=1)
     variables = {
         **network_variables(asked, altered),
         "vertices": (
@@ -148,24 +132,11 @@ def _described(
 def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
     """Displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
     scene, vertices = made
-    values = concrete_parameters(scene, vertices)
     try:
-        plan = make_plan(scene, vertices, times)
-        motion = solve_case(plan.solver, values, scene.drives[0])[0]
+        response = simulate(scene, vertices=vertices, times=times)
     except SimulationError as error:
         remedy = "give another seed, or smaller tolerances"
         raise UserError(
             f"the specimen cannot be simulated: {error}", key="virtual.specimen", remedy=remedy
         ) from error
-    motion = motion.reshape(len(times), -1, 3)
-    reaction = observe(scene.topology, values, motion).reaction
-    return motion, reaction[:, scene.driven, :2].sum(axis=1)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    return response.displacement[0], response.drive_force[0]

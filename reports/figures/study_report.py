@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from pipeline.runtime import REPORTED
 from reports.facts import fact_records
 from reports.figures import kinds
 from reports.page import Report, publish, study_page
@@ -28,7 +29,7 @@ def study_report(study: StudyResults) -> Report:
 
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
-    named = {kind: getattr(args, kind) for kind in study_results.KINDS}
+    named = {kind: getattr(args, kind) for kind in REPORTED}
     files = {kind: path for kind, path in named.items() if path is not None}
     study = study_results.load(args.problem, args.preset, files, args.comparisons)
     publish(study_report(study), args.out_dir)

@@ -66,8 +66,8 @@ def stages(out: Path) -> dict[str, list[str]]:
 
 def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> str:
     """The fault of a stage that must fail in words, or an empty text."""
-    module = ("reports", "study") if name == "report" else (f"pipeline.stages.{name}",)
-    ended = checkout.module(*module, *words, first=first)
+    module = "reports study" if name == "report" else f"pipeline {name}"
+    ended = checkout.module(module, *words, first=first)
     told = ended.stdout + ended.stderr
     if ended.returncode == 0:
         return "it says that it has succeeded"
@@ -127,7 +127,7 @@ def two_at_once(checkout: Checkout) -> Iterator[Tried]:
     """Two processes that write the same file."""
     with tempfile.TemporaryDirectory() as folder:
         words = stages(Path(folder))["simulate"]
-        command = [".venv/bin/python", "-m", "pipeline.stages.simulate", *words]
+        command = [".venv/bin/python", "-m", "pipeline", "simulate", *words]
         runs = [
             subprocess.Popen(command, cwd=checkout.root, stderr=subprocess.DEVNULL) for _ in "12"
         ]
@@ -210,7 +210,6 @@ def odd_paths(checkout: Checkout) -> Iterator[Tried]:
         }
         for place, name in names.items():
             other = checkout.copied(Path(folder) / name)
-            other.take_kernels(checkout.root)
             fault = _made(other, wanted)
             pwned = list(Path(folder).rglob("pwned"))
             yield Tried(f"path: {place}", "make", fault or ("a command was run" if pwned else ""))

@@ -17,12 +17,14 @@ from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Matrix
-from sim.solvers import MotionLaw, PrescribedMotion, Solver, held_dofs, simulate
+from sim.solvers import MotionLaw, PrescribedMotion, Solver, differentiable_motion, held_dofs
 from sim.structure import (
     DesignSpace,
+    DistanceContact,
     Lattice,
     Material,
     Parameters,
+    VoidAngleContact,
     design_space,
     parameters,
     quads,
@@ -152,7 +154,9 @@ class Rig:
     @cached_property
     def topology(self) -> Topology:
         held = held_dofs(self.clamped, self.driven)
-        return topology(self.lattice, held, BARRIER, CUTOFF, distance=self.distance)
+        angles = VoidAngleContact(BARRIER, CUTOFF)
+        contact = angles if self.distance is None else DistanceContact(self.distance)
+        return topology(self.lattice, held, contact)
 
     @property
     def numbers(self) -> Numbers:
@@ -200,13 +204,13 @@ class Rig:
     def loss(self, solver: Solver, numbers: Numbers) -> Array:
         """A smooth function of displacement and velocity without any symmetry."""
         drive = PrescribedMotion(self.driven, numbers.drive)
-        response = simulate(solver, self.parameters(numbers), (drive,))
+        response = differentiable_motion(solver, self.parameters(numbers), (drive,))
         return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
 
 
 @jax.jit
 def _uneven(motion: Array, scale: float) -> Array:
-    """Sum of squares of (n_cases, n_asked, n_units, 3) with weights that differ everywhere."""
+    """Sum of squares of (n_cases, n_times, n_units, 3) with weights that differ everywhere."""
     weights = 1.5 + jnp.sin(jnp.arange(motion.size, dtype=float)).reshape(motion.shape)
     lengths = scale * motion * jnp.array([1.0, 1.0, 7.5])
     return jnp.sum(weights * lengths**2) / motion.shape[1]

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     StressCase,
     StressFamily,
@@ -27,7 +27,6 @@ from sim.time_integration import ExplicitSolver, ImplicitSolver
 HARD = Harmonic(8.0, 30.0, 0.6)
 CHAOS = 0.1
 """What half the steps may change where units collide again and again."""
-LAWS = {"angles": None, "distances": DISTANCE}
 
 
 def family() -> StressFamily:
@@ -45,14 +44,14 @@ def _cases(small: bool) -> Iterator[StressCase]:
     side = 5 if small else 9
     yield from _starts((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
     for share in (0.25,) if small else (0.05, 0.1, 0.15, 0.2, 0.25):
-        for law, distance in LAWS.items():
+        for law, contact in LAWS.items():
             for n_loads in (1,) if small else (1, 10):
-                case = pressed(squares(side), share, contact_distance=distance)
+                case = pressed(squares(side), share, contact=contact)
                 loads = np.arange(1, n_loads + 1) / n_loads
                 name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
                 yield StressCase(name, partial(equilibria, case, loads))
-    for law, distance in LAWS.items():
-        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact_distance=distance)
+    for law, contact in LAWS.items():
+        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact=contact)
         yield StressCase(f"8 mm at 30 Hz, contact on {law}", partial(_shaken, case))
     case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
     for n_steps in (1,) if small else (1, 10, 100):
@@ -69,7 +68,7 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
             yield StressCase(name, attempt, "refusal" if beyond else "solution")
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
-            case = replace(gentle, scene=replace(gentle.scene, integrator=integrator))
+            case = replace(gentle, scene=gentle.scene.updated(integrator=integrator))
             name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
             yield StressCase(name, partial(_shaken, case), "refusal" if beyond else "either")
     yield from _jolts()
@@ -91,10 +90,10 @@ def _jolts() -> Iterator[StressCase]:
 
 
 def _shaken(case: StressScene) -> Sequence[Check]:
-    return motions(case, np.linspace(0.0, case.scene.duration, 101), CHAOS)
+    return motions(case, np.linspace(0.0, case.scene.loads.duration, 101), CHAOS)
 
 
 def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
-    asked = np.array([case.scene.duration])
-    solver = ExplicitSolver(case.topology, case.scene.duration, n_steps, asked)
+    asked = np.array([case.scene.loads.duration])
+    solver = ExplicitSolver(case.topology, case.scene.loads.duration, n_steps, asked)
     return motions(case, asked, CHAOS, solver)

@@ -10,8 +10,8 @@ import pytest
 from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
 from sim.core import Floats
 from sim.energy import gradient, system_of, workspace
-from sim.scene import Scene, concrete_parameters, make_plan, objective
-from sim.solvers import Harmonic, TimeSeries, solve_case
+from sim.scene import Loads, Objective, Scene, Structure, concrete_parameters, make_plan, mimicking
+from sim.solvers import Harmonic, PrescribedMotion, TimeSeries, solve_case
 from sim.structure import quads
 from sim.time_integration import BLANES_MOAN, ExplicitSolver
 from sim.vibration import highest_frequency
@@ -26,52 +26,43 @@ def shaken_lattice() -> Scene:
     intact = quads(SIDE, SIDE, 15.0, 2.25, np.deg2rad(20.0))
     kept = np.setdiff1d(np.arange(SIDE**2), HOLE)
     left = SIDE * np.arange(SIDE)
+    shaken = Harmonic(4.5, 30.0, 0.0, rise=0.01, delay=0.015)
     whole = Scene(
-        lattice=intact,
-        material=MATERIAL,
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=NONE,
-        driven=left,
-        motions=(Harmonic(4.5, 30.0, 0.0, rise=0.01, delay=0.015),),
-        weights=np.ones(1),
-        duration=0.07,
-        frequency=30.0,
-        static=False,
-        cloak=NONE,
-        region=kept,
-        samples=71,
+        Structure(intact, MATERIAL),
+        Loads((PrescribedMotion(left, shaken),), duration=0.07),
+        Objective(region=kept, samples=71),
     )
     holed = intact.without(HOLE)
     places = holed.positions(kept)
-    return replace(
-        whole, lattice=holed, driven=holed.positions(left), region=places, reference=whole
-    )
+    cases = (PrescribedMotion(holed.positions(left), shaken),)
+    return whole.updated(lattice=holed, cases=cases, region=places, reference=whole)
 
 
 def motion(scene: Scene, finer: int = 1) -> tuple[Floats, Floats]:
-    """Displacement (n_asked, n_units, 3), and smallest void angle at each time."""
+    """Displacement (n_times, n_units, 3), and smallest void angle at each time."""
     values = concrete_parameters(scene, scene.lattice.vertices)
     solver = make_plan(scene, scene.lattice.vertices).solver
     assert isinstance(solver, ExplicitSolver)
     finer_solver = replace(solver, n_steps=finer * solver.n_steps)
-    states = solve_case(finer_solver, values, scene.drives[0])[0].reshape(scene.samples, -1, 3)
+    states = solve_case(finer_solver, values, scene.loads.cases[0])[0].reshape(
+        scene.objective.samples, -1, 3
+    )
     return states, scene.topology.smallest_void_angle(values.void, states)
 
 
 def loss(scene: Scene, whole: Floats, part: Floats) -> float:
     """Of a holed lattice whose intact one moves as ``whole``."""
-    assert scene.reference is not None
-    measure = objective(scene, whole[None][:, :, scene.reference.region])
+    assert scene.objective.reference is not None
+    measure = mimicking(scene, whole[None][:, :, scene.objective.reference.objective.region])
     values = concrete_parameters(scene, scene.lattice.vertices)
     return float(measure(part[None], values)[0])
 
 
 def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
     holed = shaken_lattice()
-    assert holed.reference is not None
-    (whole, closed), (part, _) = motion(holed.reference), motion(holed)
-    (fine_whole, _), (fine_part, _) = motion(holed.reference, 6), motion(holed, 6)
+    assert holed.objective.reference is not None
+    (whole, closed), (part, _) = motion(holed.objective.reference), motion(holed)
+    (fine_whole, _), (fine_part, _) = motion(holed.objective.reference, 6), motion(holed, 6)
     assert BARRIER < closed.min() < CUTOFF
     for coarse, fine in ((whole, fine_whole), (part, fine_part)):
         np.testing.assert_allclose(coarse, fine, atol=1e-2 * np.abs(fine).max())
@@ -106,7 +97,7 @@ def pushed(bias_deg: float) -> Rig:
 
 
 def undamped(rig: Rig, step: float, n_steps: int) -> tuple[Floats, Floats]:
-    """Displacement and velocity (n_asked, n_dofs) every second step after the push."""
+    """Displacement and velocity (n_times, n_dofs) every second step after the push."""
     values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
     asked = np.asarray(step * np.arange(500, n_steps + 1, 2))
     solver = ExplicitSolver(rig.topology, n_steps * step, n_steps, asked)

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sim.collision import CandidatePairs
 from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
@@ -49,7 +50,7 @@ DYNAMIC: dict[str, Callable[[Rig], Solver]] = {
 
 
 def path(rig: Rig, solver: Solver) -> Floats:
-    """States (n_asked, n_units, 3) of a rig."""
+    """States (n_times, n_units, 3) of a rig."""
     found = solve_case(solver, rig.values, rig.drive)[0]
     return found.reshape(len(found), -1, 3)
 
@@ -117,7 +118,8 @@ def far_apart(depth: float) -> Rig:
 
 def test_units_meet_that_were_far_apart_at_rest() -> None:
     rig = far_apart(32.5)
-    assert [1, 2] not in rig.topology.meeting.pairs.tolist()  # type: ignore[union-attr]
+    assert isinstance(rig.topology.contact, CandidatePairs)
+    assert [1, 2] not in rig.topology.contact.pairs.tolist()
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4
