@@ -44,22 +44,22 @@ SHIELDING = ReportKind(
     "shielding",
     shielding.facts.shielding_facts,
     shielding.figure.shielding_figure,
-    shielding.content.shielding_text,
-    shielding.content.shielding_animation,
+    shielding.figure.shielding_text,
+    shielding.figure.shielding_animation,
 )
 LOADING_PATH = ReportKind(
     "loading_path",
     loading_path.facts.loading_path_facts,
     loading_path.figure.loading_path_figure,
-    loading_path.content.loading_path_text,
-    loading_path.content.loading_path_animation,
+    loading_path.figure.loading_path_text,
+    loading_path.figure.loading_path_animation,
 )
 WAVE = ReportKind(
     "wave",
     wave.facts.wave_facts,
     wave.figure.wave_figure,
     _wave_text,
-    loading_path.content.loading_path_animation,
+    loading_path.figure.loading_path_animation,
 )
 
 

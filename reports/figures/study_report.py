@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import get_args
 
-from pipeline.runtime import REPORTED
+from pipeline.problem import Output
 from reports.facts import fact_records
 from reports.figures import kinds
 from reports.page import Report, publish, study_page
@@ -29,7 +31,8 @@ def study_report(study: StudyResults) -> Report:
 
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
-    named = {kind: getattr(args, kind) for kind in REPORTED}
-    files = {kind: path for kind, path in named.items() if path is not None}
+    files: dict[Output, Path] = {
+        name: path for name in get_args(Output) if (path := getattr(args, name)) is not None
+    }
     study = study_results.load(args.problem, args.preset, files, args.comparisons)
     publish(study_report(study), args.out_dir)

@@ -17,17 +17,13 @@ class Panel:
     """Describes a part of a figure.
 
     Attributes:
-        letter, title: above it.
-        left, top: of the letter on the page, mm.
+        head: its letter and title, and where they stand: mm from the page's left and top.
         draw: draws the panel below its letter; none if another one draws it too.
         caption: its sentence, as HTML.
         tables: what it shows.
     """
 
-    letter: str
-    title: str
-    left: float
-    top: float
+    head: tuple[str, str, float, float]
     draw: Callable[[Figure], object] | None = None
     caption: str = ""
     tables: Sequence[Table] = ()
@@ -49,7 +45,8 @@ class PanelFigure:
         """Draws all panels."""
         figure = style.page(self.height)
         for panel in self.panels:
-            style.letter(figure, panel.left, panel.top, panel.letter, panel.title)
+            letter, title, left, top = panel.head
+            style.letter(figure, left, top, letter, title)
             if panel.draw is not None:
                 panel.draw(figure)
         if self.draft:
@@ -59,7 +56,7 @@ class PanelFigure:
     @cached_property
     def caption(self) -> str:
         """Returns the sentences of the panels, as HTML."""
-        told = [f"<b>{each.letter}</b> {each.caption}" for each in self.panels if each.caption]
+        told = [f"<b>{each.head[0]}</b> {each.caption}" for each in self.panels if each.caption]
         return " ".join(told) + self.remark
 
     @cached_property

@@ -31,7 +31,7 @@ def framework_figure(study: StudyResults) -> PanelFigure:
     cloaked = from_dataset(design, scene.spacing)
     panels = [
         Panel(
-            *("a", "Mimicking problem", 0.0, 0.8),
+            ("a", "Mimicking problem", 0.0, 0.8),
             lambda figure: _problem(figure, study, initial),
             "A reference lattice and an altered one, in which a cloak (purple) is to undo the "
             "alteration in the region of interest (blue): a loss measures how far the two "
@@ -40,11 +40,11 @@ def framework_figure(study: StudyResults) -> PanelFigure:
             "are those of the study itself.",
         ),
         Panel(
-            *("", "Gradient-based optimisation", LOOP - 4.2, 0.8),
+            ("", "Gradient-based optimisation", LOOP - 4.2, 0.8),
             lambda figure: _loop(figure, design),
         ),
         Panel(
-            *("b", "Rigid units, elastic ligaments, contact", 0.0, SECOND),
+            ("b", "Rigid units, elastic ligaments, contact", 0.0, SECOND),
             lambda figure: model_panel.ligament_panel(
                 style.place(figure, 0.0, SECOND + 6.0, 58.0, SMALL + 2.0), cloaked, _lying(cloaked)
             ),
@@ -52,12 +52,12 @@ def framework_figure(study: StudyResults) -> PanelFigure:
             "shears and bends, and contact as a void closes.",
         ),
         Panel(
-            *("c", "Shield excitations, conceal inclusions", 64.0, SECOND),
+            ("c", "Shield excitations, conceal inclusions", 64.0, SECOND),
             lambda figure: _kinds(figure, study, initial),
             "Cloaks shield their surroundings from an excitation, or conceal what was cut out.",
         ),
         Panel(
-            *("d", "From the design to the experiment", 0.0, THIRD),
+            ("d", "From the design to the experiment", 0.0, THIRD),
             lambda figure: _making(figure, study, cloaked),
             "The optimised cloak, what is cut of it, its units as a camera finds them (cyan "
             "outlines; orange: how far they moved), and the motion of the middle unit of the top "

@@ -1,4 +1,3 @@
-from . import content as content
 from . import curves as curves
 from . import facts as facts
 from . import figure as figure
@@ -9,9 +8,6 @@ from .abscissa import abscissa_of as abscissa_of
 from .abscissa import display_name as display_name
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping
-from .content import axis as axis
-from .content import credit as credit
-from .content import fields as fields
 from .curves import measure_panel as measure_panel
 from .curves import over_cases as over_cases
 from .curves import path_axes as path_axes
@@ -19,7 +15,10 @@ from .curves import structure_curves as structure_curves
 from .facts import loss_facts as loss_facts
 from .facts import scene_facts as scene_facts
 from .figure import TALLEST_SNAPSHOTS as TALLEST_SNAPSHOTS
+from .figure import axis as axis
+from .figure import credit as credit
 from .figure import design_panels as design_panels
+from .figure import fields as fields
 from .figure import marks as marks
 from .measures import interest as interest
 from .measures import scales as scales

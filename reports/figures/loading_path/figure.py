@@ -1,14 +1,17 @@
-"""Composes the figure of structures along a path: its panels and their tables."""
+"""Composes the report along a path: panels with tables, text of the page, animation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Literal
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.problem.sections import Paper
 from reports.base import Table, style
-from reports.facts import JUMPED
+from reports.facts import JUMPED, Fact
 from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
     Abscissa,
@@ -19,7 +22,21 @@ from reports.figures.loading_path.abscissa import (
 )
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
 from reports.figures.loading_path.structure_panels import rest_panel, shade_of
-from reports.panels import Panel, PanelFigure, loss_history, measured_overlay
+from reports.page import PageText, study_text
+from reports.panels import (
+    Animation,
+    AnimationAxis,
+    AnimationClip,
+    ColourField,
+    Panel,
+    PanelFigure,
+    case_labels,
+    loss_history,
+    measured_overlay,
+    signed_field,
+    structure_clip,
+    with_recordings,
+)
 from reports.study import StudyResults
 
 TALLEST_SNAPSHOTS = 116.0
@@ -30,6 +47,7 @@ _HISTORY = (
     "the best feasible design."
 )
 
+_KEYS: tuple[Literal["ux", "uy", "theta"], ...] = ("ux", "uy", "theta")
 Curve = tuple[str, Callable[[Axes], None], str, Sequence[Table]]
 
 
@@ -51,7 +69,7 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     panels = [
         *design_panels(study, symbol, clamped),
         Panel(
-            *("c", "Response, true to scale", 0.0, top),
+            ("c", "Response, true to scale", 0.0, top),
             lambda figure: snapshots(figure, study, grid, top + head),
             f"Snapshots at true size, coloured by {colours}.",
         ),
@@ -76,8 +94,8 @@ def design_panels(
 
     design, history = tables.of_design(study)
     return [
-        Panel("a", "", 0.0, 0.8, at_rest, caption, [design]),
-        Panel("b", "Optimisation", 123.0, 0.8, optimisation, _HISTORY, [history]),
+        Panel(("a", "", 0.0, 0.8), at_rest, caption, [design]),
+        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _HISTORY, [history]),
     ]
 
 
@@ -136,7 +154,7 @@ def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
         def placed(figure: Figure, left: float = left, draw: Callable[[Axes], None] = draw) -> None:
             draw(style.place(figure, left + 11.0, top + 11.5, width - 14.0, 27.0))
 
-        yield Panel("defg"[k], title, left, top, placed, words, data)
+        yield Panel(("defg"[k], title, left, top), placed, words, data)
 
 
 def marks(studies: Sequence[StudyResults]) -> str:
@@ -149,3 +167,51 @@ def marks(studies: Sequence[StudyResults]) -> str:
         + ("; crosses mark jumps to another branch" if jumps else "")
         + (_SECOND if second else "")
     )
+
+
+def loading_path_animation(study: StudyResults) -> Animation:
+    """Returns every structure along the path, with its recordings."""
+    path, response = abscissa_of(study.problem, study.response), study.response
+    clips: list[AnimationClip] = []
+    for name in structures(response):
+        clip = structure_clip(display_name(study.problem, name), study, name)
+        clips += with_recordings(clip, study, name, path.values)
+    pad = study.problem.lattice.spacing
+    return Animation(axis(path), case_labels(response), clips, fields(study), pad=pad)
+
+
+def axis(path: Abscissa) -> AnimationAxis:
+    """Returns what the slider runs over: once through the path in six seconds."""
+    pace = float(path.values[-1] - path.values[0]) / 6.0
+    digits = max(0, 3 - int(np.ceil(np.log10(max(path.values[-1], 1e-9)))))
+    symbol = path.symbol.strip("$")
+    speeds = {"once in 6 s": pace, "3 s": 2 * pace, "12 s": pace / 2}
+    return AnimationAxis(symbol, path.unit, path.values, digits, not path.static, speeds)
+
+
+def fields(study: StudyResults) -> list[ColourField]:
+    """Lists what may colour the units; that of the figure first."""
+    first = shade_of(study.problem, study.response).field
+    motion = study.response["displacement"].values
+    return [first, *(signed_field(key, motion) for key in _KEYS if key != first.key)]
+
+
+def loading_path_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
+    """Returns what the page says of itself."""
+    key = measures.measure_of(study.problem).key
+    headline = (f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction")
+    return study_text(
+        study, caption, facts, credit=credit(study.problem.report.paper), headline=headline
+    )
+
+
+def credit(paper: Paper | None) -> str:
+    """Tells which figure of the paper a study follows, and with which of its values."""
+    source = ""
+    if paper is not None:
+        variant = f" Run with its values: {paper.variant}." if paper.variant else ""
+        source = (
+            f"After Figure {paper.figure} of Bordiga et al., “Nonlinear mechanical metamaterial "
+            f"cloaks”.{variant} "
+        )
+    return f"{source}Every number here is computed from the datasets."

@@ -27,13 +27,13 @@ def design_series_figure(family: DesignSeries) -> PanelFigure:
     over = "the size of the cloak" if family.key == RADIUS else family.key
     panels = [
         Panel(
-            *("a", "Shielding of the boundary", 0.0, 0.8),
+            ("a", "Shielding of the boundary", 0.0, 0.8),
             lambda figure: _curve(style.place(figure, 13.0, HEAD, side - 9.0, side - 12.0), family),
             f"Largest |U| of a unit of the outer rows and columns against {over}: altered "
             "(dashed) and cloaked structures, mean over the load angles of the greatest in time.",
         ),
         Panel(
-            *("b", "Peak displacement", side + GAP, 0.8),
+            ("b", "Peak displacement", side + GAP, 0.8),
             lambda figure: _structures(figure, family, side, rows),
             "Altered and cloaked structures, coloured by the largest |U| of each unit in time, "
             "mean over the load angles; |U| counts displacements in spacings, rotations in "

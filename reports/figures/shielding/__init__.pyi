@@ -1,4 +1,3 @@
-from . import content as content
 from . import facts as facts
 from . import figure as figure
 from .facts import MONITORED as MONITORED

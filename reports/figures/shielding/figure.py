@@ -1,13 +1,16 @@
-"""Composes Figure 2 of the paper at a journal's two-column width: its panels and their tables."""
+"""Composes Figure 2 of the paper: panels with their tables, text of the page, animation."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from reports.base import Table, style
-from reports.facts import Columns, history, measures, vertices
+from reports.facts import Columns, Fact, history, measures, vertices
 from reports.figures.shielding.curves import loss_panel, map_panel, motion_panel
 from reports.figures.shielding.facts import MONITORED, monitored_recordings
 from reports.figures.shielding.structure_panels import (
@@ -17,8 +20,22 @@ from reports.figures.shielding.structure_panels import (
     snapshots_panel,
 )
 from reports.figures.shielding.sweep_map import frequency_map
-from reports.panels import Panel, PanelFigure, measured_overlay
-from reports.study import ReportScene, StudyResults, from_dataset, middle_of_top_edge
+from reports.page import PageText, study_text
+from reports.panels import (
+    Animation,
+    AnimationClip,
+    DashedDisc,
+    Panel,
+    PanelFigure,
+    case_labels,
+    measured_overlay,
+    signed_field,
+    size_field,
+    structure_clip,
+    time_axis,
+    with_recordings,
+)
+from reports.study import DRIVEN, ReportScene, StudyResults, from_dataset, middle_of_top_edge
 
 TALLEST_SNAPSHOTS = 122.0
 """Height in mm that the snapshots may take however many rows there are."""
@@ -58,7 +75,8 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
 
     panels = [
         Panel(
-            *("a", "", 0.0, 0.8, lambda figure: _problem(figure, scene, design, direction)),
+            ("a", "", 0.0, 0.8),
+            lambda figure: _problem(figure, scene, design, direction),
             "Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
             "is the drive, the dashed circle bounds the cloak.",
             [
@@ -70,19 +88,21 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             ],
         ),
         Panel(
-            *("b", "Optimisation", 123.0, 0.8, loss),
+            ("b", "Optimisation", 123.0, 0.8),
+            loss,
             "Loss against evaluation: mean over the load angles (thick) and each angle (thin); "
             "rejected evaluations are dots, infeasible ones pale, circles the best feasible "
             "designs.",
             [Table("loss_history.csv", "loss against evaluation (panel b)", history(design))],
         ),
         Panel(
-            *("c", f"Response over one drive cycle, {load}", 0.0, top),
+            ("c", f"Response over one drive cycle, {load}", 0.0, top),
             lambda figure: snapshots_panel(figure, scene, rows, top + 8.5, height),
             "Snapshots over the last drive cycle at true size, coloured by |U|.",
         ),
         Panel(
-            *("d", f"Middle unit of the top edge, {load}", 0.0, low, motion),
+            ("d", f"Middle unit of the top edge, {load}", 0.0, low),
+            motion,
             "Vertical displacement of the middle unit of the top edge; dots mark the snapshots.",
             [
                 Table(
@@ -93,7 +113,8 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             ],
         ),
         Panel(
-            *("e", most, 109.0, low, losses),
+            ("e", most, 109.0, low),
+            losses,
             "Loss over loading angle and frequency; stars mark the loads designed for.",
             [
                 Table(
@@ -104,6 +125,47 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
     ]
     remark = measured_overlay.caption(study.recordings)
     return PanelFigure(low + 51.0, panels, study.draft, remark)
+
+
+def shielding_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
+    """Returns what the page says of itself."""
+    return study_text(
+        study,
+        caption,
+        facts,
+        credit=(
+            "After Figure 2 of Bordiga et al., “Nonlinear mechanical metamaterial cloaks”; every "
+            "number here is computed from the datasets."
+        ),
+        figure_title="Shielding dynamic excitations",
+        headline=("mean_reduction", "loss_end", "peak_to_peak_reduction", "map_max"),
+        note="The dot marks the unit of panel d.",
+    )
+
+
+def shielding_animation(study: StudyResults) -> Animation:
+    """Returns altered and cloaked structures under every load, with their recordings."""
+    scene, response = study.scene, study.response
+    clips: list[AnimationClip] = []
+    times = response["time"].values
+    for name in ("altered", "cloaked"):
+        clip = structure_clip(name.capitalize(), study, name)
+        clip = replace(clip, marker=middle_of_top_edge(clip.structure))
+        clips += with_recordings(clip, study, name, times)
+    others = clips[0].structure.support != DRIVEN
+    motion = np.concatenate([clip.motion[:, :, others] for clip in clips])
+    colours = [
+        size_field(motion, scene.spacing),
+        signed_field("uy", motion),
+        signed_field("theta", motion),
+    ]
+    discs = [DashedDisc(*scene.middle, radius, style.CLOAKED) for radius in scene.radii]
+    start = measures.nearest_case(response, MONITORED)
+    return Animation(
+        *(time_axis(times, real=True), case_labels(response), clips, colours, discs),
+        start=start,
+        pad=scene.spacing,
+    )
 
 
 def _problem(figure: Figure, scene: ReportScene, design: xr.Dataset, direction: float) -> None:

@@ -57,24 +57,25 @@ def wave_figure(study: StudyResults) -> PanelFigure:
     panels = [
         *design_panels(study, r"Loss $J$", lattices, partial(_mark_places, study)),
         Panel(
-            *("c", "Response, true to scale; red dots: closed voids", 0.0, top),
+            ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
             lambda figure: snapshots(figure, study, grid, top + ROOM, partial(_contacts, study)),
             "Snapshots at true size, coloured by u<sub>y</sub>; red dots are ligaments beside "
             "which a void is closed to contact.",
         ),
         Panel(
-            *("d", "Vertical displacement where marked in a", 0.0, middle),
+            ("d", "Vertical displacement where marked in a", 0.0, middle),
             lambda figure: _places(figure, study, middle + ROOM),
             "Vertical displacement of the marked units.",
             [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
         ),
         Panel(
-            *("e", "Mimicking error", 0.0, low, error),
+            ("e", "Mimicking error", 0.0, low),
+            error,
             "Distance of the surroundings' motion to the intact one, over the largest size of "
             "that in time.",
         ),
         Panel(
-            *("f", "Smallest void angle along the top and bottom edges", half, low),
+            ("f", "Smallest void angle along the top and bottom edges", half, low),
             lambda figure: _edges(
                 style.place(figure, half + 11.0, low + ROOM, half - 14.0, 27.0), study
             ),

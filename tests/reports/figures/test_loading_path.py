@@ -13,7 +13,7 @@ from pipeline.runtime import UserError
 from reports.base import style
 from reports.facts import checks, fact_records
 from reports.figures import kinds
-from reports.figures.loading_path import abscissa, content, figure, measures, monte_carlo
+from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.shielding import facts as shielding
 from reports.figures.study_report import study_report
@@ -216,7 +216,7 @@ def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
 
 
 def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:
-    intact, voided, _ = payload(content.loading_path_animation(smile))["structures"]
+    intact, voided, _ = payload(figure.loading_path_animation(smile))["structures"]
     count = [len(part["owner"]) for part in (intact, voided)]
     assert count[0] - count[1] == pytest.approx(18 * 4 * 4 * 4 / 3, abs=4)  # base64 of int32
     assert voided["name"] == "Voided"
