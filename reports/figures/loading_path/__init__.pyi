@@ -2,8 +2,6 @@ from . import curves as curves
 from . import facts as facts
 from . import figure as figure
 from . import measures as measures
-from . import tables as tables
-from .abscissa import Abscissa as Abscissa
 from .abscissa import abscissa_of as abscissa_of
 from .abscissa import display_name as display_name
 from .abscissa import structures as structures
