@@ -13,7 +13,7 @@ import numpy as np
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
 from pipeline.posing import loss_units, read_design, setting_losses
-from pipeline.problem.sections import sweep_cases, taken_apart
+from pipeline.problem.sections import split_value, sweep_cases
 from pipeline.runtime import SweepResult, UserError, case_log, cli, source_hash
 from sim.core import SimulationError
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from pipeline.problem.sections import DirectionGroup, Word
+    from pipeline.problem.sections import DirectionGroup, SettingValue
     from pipeline.runtime import Casebook, SweepResult
 
 LOG = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ LOG = logging.getLogger(__name__)
 
 def work(args: argparse.Namespace) -> None:
     """Computes a part of the cases, or joins all parts."""
-    chunked.work(args, _run, "sweep", "case")
+    chunked.run_or_gather(args, _run, "sweep", "case")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -47,7 +47,7 @@ def _run(args: argparse.Namespace) -> None:
     words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.stages.sweep"))
     key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())
     folder = args.out.parent / ".journal" / f"sweep_{key.hexdigest()[:16]}"
-    here = sweep_cases.part(asked.sweep, args.chunk, args.chunks)
+    here = sweep_cases.select_groups(asked.sweep, args.chunk, args.chunks)
     found = case_log.known(folder)
     path = folder / f"part_{args.chunk}.csv"
     with case_log.Casebook(path, asked.sweep.keys) as book:
@@ -55,7 +55,7 @@ def _run(args: argparse.Namespace) -> None:
         _simulate(args, asked, design["vertices"], here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
     LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
-    origin = provenance.attributes(asked, "sweep", parents=parents)
+    origin = provenance.of_study(asked, "sweep", parents=parents)
     datasets.write(made, args.out, "sweep", origin)
 
 
@@ -96,7 +96,9 @@ def _results(
 
 
 def dataset(
-    asked: Problem, cases: Sequence[tuple[int, dict[str, Word]]], found: dict[int, SweepResult]
+    asked: Problem,
+    cases: Sequence[tuple[int, dict[str, SettingValue]]],
+    found: dict[int, SweepResult],
 ) -> xr.Dataset:
     """The dataset ``sweep`` of some cases."""
     import xarray as xr
@@ -105,7 +107,7 @@ def dataset(
     keys = asked.sweep.keys
     numbers = [number for number, _ in cases]
     words = [[setting[key] for key in keys] for _, setting in cases]
-    values = [[(taken_apart(word) or (np.nan,))[0] for word in row] for row in words]
+    values = [[(split_value(word) or (np.nan,))[0] for word in row] for row in words]
     of_case = {
         name: ("case", [getattr(found[number], name) for number in numbers])
         for name in ("loss", "loss_altered", "min_void_angle", "status")
@@ -122,7 +124,7 @@ def dataset(
             "parameter": list(keys),
             "parameter_units": (
                 "parameter",
-                [sweep_cases.unit_of(asked.sweep, key) for key in keys],
+                [sweep_cases.parameter_unit(asked.sweep, key) for key in keys],
             ),
         },
     )

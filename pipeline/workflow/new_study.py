@@ -11,8 +11,8 @@ from string import Template
 from textwrap import indent
 
 from pipeline import problem
-from pipeline.problem.outlines import ImageError, read_outlines
-from pipeline.runtime import BUILD, UserError
+from pipeline.problem.outlines import read_outlines
+from pipeline.runtime import BUILD, UserError, found_in
 
 LOG = logging.getLogger(__name__)
 
@@ -86,7 +86,5 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
         remedy = "rename it: letters, digits, and . - _ between them"
         raise UserError("not a name for an image", file=args.image, remedy=remedy)
 
-    try:
+    with found_in(args.image):
         read_outlines(args.image)
-    except ImageError as error:
-        raise UserError(error.what, file=args.image, remedy=error.remedy) from error

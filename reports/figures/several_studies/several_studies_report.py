@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.problem.reading import Joint, joint_figure
+from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
 from reports.base import Table
 from reports.facts import Fact, fact_records
@@ -19,7 +19,9 @@ from reports.panels import Animation, case_labels, structure_clip
 from reports.study import StudyResults, study_results
 
 
-def several_studies_report(name: str, asked: Joint, studies: Sequence[StudyResults]) -> Report:
+def several_studies_report(
+    name: str, asked: JointFigure, studies: Sequence[StudyResults]
+) -> Report:
     """Returns the report; `name` is that of the figure."""
     facts = [fact for study in studies for fact in _facts(study)]
     tables = [fact_records.table(facts), *(table for study in studies for table in _tables(study))]
@@ -100,7 +102,7 @@ def _animation(studies: Sequence[StudyResults]) -> Animation:
     return Animation(loading_path.axis(way), cases, clips, colours, pad=pad)
 
 
-def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[StudyResults]:
+def load(figure: Path, asked: JointFigure, preset: str | None, results: Path) -> list[StudyResults]:
     """Reads the studies, in their order.
 
     Raises:
@@ -123,7 +125,7 @@ def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[
 
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
-    asked = joint_figure.load(args.figure)
+    asked = joint_figure.load_joint_figure(args.figure)
     studies = load(args.figure, asked, args.preset, args.results)
     name = args.figure.resolve().parent.name
     publish(several_studies_report(name, asked, studies), args.out_dir)

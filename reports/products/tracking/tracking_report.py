@@ -16,8 +16,8 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import Codec
 from pipeline.runtime import UserError, cli
-from pipeline.tracking.frames import Frame, Recording, frames
-from pipeline.virtual_lab import encode
+from pipeline.tracking.frames import Frame, Recording, read_frames
+from pipeline.virtual_lab import encode_video
 from reports.base import style
 from reports.page import templating, write_page
 from reports.products.tracking import advice, figure, overlay, track_quality
@@ -53,7 +53,9 @@ def report(args: argparse.Namespace) -> None:
         labels = {"title": asked.title or args.video.stem, "comment": painted.note}
         rate = 1 / float(np.median(np.diff(track["time"].values)))
         codec = Codec(crf=20)
-        encode(args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels)
+        encode_video(
+            args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels
+        )
     found = track_quality.measured(track, kept, track_quality.stream_of(args.video))
     write_page(args.out_dir / "index.html", "tracking.html.j2", _values(track, asked, found))
 
@@ -69,7 +71,7 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
     """Yields the frames of the video that the track has."""
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
-    shown = frames(video, asked.window.start, end, asked.frame_rate)
+    shown = read_frames(video, asked.window.start, end, asked.frame_rate)
     return islice((each for each in shown if each.index in wanted), len(wanted))
 
 
