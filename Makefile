@@ -117,7 +117,7 @@ bench: setup
 	$(BIN)/python -m benchmarks
 
 bench-tracking: setup
-	$(BIN)/python -m benchmarks.tracking --folder "$(VIDEOS)"
+	$(BIN)/python -m benchmarks tracking --videos "$(VIDEOS)"
 
 stress: setup
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \

@@ -1,2 +1,3 @@
 from . import jax_baseline as jax_baseline
+from . import own_solvers as own_solvers
 from . import selection as selection

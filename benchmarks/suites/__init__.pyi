@@ -1,2 +1,2 @@
-from . import static as static
-from . import warm as warm
+from .catalogue import VIDEOS as VIDEOS
+from .catalogue import suites as suites

@@ -1,0 +1,56 @@
+"""Compiles loops anew in a process of its own; nothing that loads Numba is imported before.
+
+The constants of compiled loops are part of their machine code, so a change of one needs this too.
+Packages are lazy: their modules, and Numba with them, are loaded by the first use of a name.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from tempfile import TemporaryDirectory
+
+from benchmarks import methods, scenes
+from benchmarks.harness import Run, Sample, Task
+from sim import quasistatics, time_integration
+from sim import scene as sim_scene
+
+
+def compilation(name: str, skipped: float, task: Task) -> Run:
+    """Times the first result of a process, with its loops from the disk or compiled for it."""
+    del task
+
+    def run() -> Sample:
+        if skipped:
+            return _default(name)()
+        with _no_cache():
+            return _default(name)()
+
+    return run
+
+
+def factors(name: str, skipped: float, task: Task) -> Run:
+    """Keeps factors while they converge, or makes a new one for every Newton step."""
+    del task
+    if skipped:
+        return _default(name)
+    with _no_cache():
+        time_integration.esdirk_stage.REFACTOR_ABOVE = 0.0
+        quasistatics.newton.KEEP_FACTOR = quasistatics.newton.RENEW_FACTOR = 0.0
+        return _default(name)
+
+
+@contextmanager
+def _no_cache() -> Iterator[None]:
+    """Lends an empty folder to what is compiled. Numba reads where it is as it is imported."""
+    with TemporaryDirectory() as folder:
+        os.environ["NUMBA_CACHE_DIR"] = folder
+        yield
+
+
+def _default(name: str) -> Run:
+    """Prepares the loss by the scene's own plan."""
+    own = methods.own_solvers
+    solver = sim_scene.make_plan(scenes.scene(name)).solver
+    return own.warmed_up(own.loss_run(scenes.case(name), solver))
