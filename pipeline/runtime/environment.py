@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 
 from pipeline.runtime.locations import CACHE
-from pipeline.runtime.source_closure import kernels_hash
 
 RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
 
@@ -41,5 +40,3 @@ def pin() -> None:
     os.environ.update(ONE_THREAD | REPRODUCIBLE | BOUNDED)
     for name, value in CACHES.items():
         os.environ.setdefault(name, value)
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        os.environ["NUMBA_CACHE_DIR"] = str(CACHE / "numba" / kernels_hash())

@@ -1,20 +1,22 @@
-"""How loops are compiled: once on a machine, however many processes want them at the same time."""
+"""Compiles loops: once on a machine, however many processes want them at the same time."""
 
 from __future__ import annotations
 
 import fcntl
-import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from pathlib import Path
 from threading import RLock
 from typing import Any, TypeVar, cast
 
 from numba import njit
 
+from sim.core import loop_cache
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 _HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+loop_cache.install()
+
 _WITHIN = RLock()
 _mine: set[str] = set()
 """Loops that this process compiles now: one, what it calls, what that calls."""
@@ -57,9 +59,7 @@ def _turn(loop: str) -> Iterator[None]:
 
 def _take(turn: ExitStack, loop: str) -> None:
     """Waits for the turn; where no file can be made or locked, nobody waits for anybody."""
-    if not (cache := os.environ.get("NUMBA_CACHE_DIR")):
-        return
     with suppress(OSError):
-        folder = Path(cache) / "turns"
+        folder = loop_cache.cache_folder() / "turns"
         folder.mkdir(parents=True, exist_ok=True)
         fcntl.flock(turn.enter_context((folder / loop).open("w")), fcntl.LOCK_EX)

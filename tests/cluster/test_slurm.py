@@ -14,7 +14,6 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.runtime import ROOT
 from pipeline.workflow.stale_jobs import PREFIX
 from tests.e2e.checkout import Checkout, wait_until
 
@@ -97,7 +96,6 @@ def made(root: Path) -> Checkout:
     """A checkout in which nothing is built."""
     checkout = Checkout.made(root)
     checkout.edit("evaluations: 6\n", f"evaluations: {LASTING}\n", "fig3")
-    checkout.take_kernels(ROOT)
     return checkout
 
 
@@ -121,7 +119,6 @@ def on_a_node(process: psutil.Process) -> bool:
 def test_whatever_is_lost_the_results_are_those_of_one_machine(tmp_path: Path) -> None:
     alone = made(tmp_path / "alone")
     checkout = alone.copied(tmp_path / "checkout")
-    checkout.take_kernels(ROOT)
     with begun(alone, ".venv/bin/snakemake", TARGET) as building:
         lost, left = disturb(checkout)
         with begun(checkout, *SUBMIT) as run:

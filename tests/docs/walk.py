@@ -35,7 +35,6 @@ class Reader:
         shutil.rmtree(root / "experiments/logo", ignore_errors=True)
         (root / "docs").mkdir()
         shutil.copy(ROOT / "docs/example_sim.py", root / "docs")
-        checkout.take_kernels(ROOT)
         return cls(checkout, draft)
 
     def told(self, page: str) -> str:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numba.core.caching
 import psutil
 import yaml
 
@@ -34,6 +33,7 @@ SMALLER = {
 }
 ROOMS = ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim")
 FILES = ("Snakefile", "Makefile", "CITATION.cff", "requirements.lock", ".gitignore")
+_CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
 
@@ -45,7 +45,7 @@ class Checkout:
     """A folder that holds the repository, and what a user does there."""
 
     root: Path
-    shares_not: tuple[str, ...] = ("NUMBA_CACHE_DIR",)  # loops are cached by folder
+    own_caches: bool = False
 
     @classmethod
     def made(cls, root: Path) -> Checkout:
@@ -72,17 +72,7 @@ class Checkout:
         """Another checkout of the same commit, in which nothing is built."""
         built = shutil.ignore_patterns("results", ".snakemake", ".cache")
         shutil.copytree(self.root, root, symlinks=True, ignore=built)
-        return Checkout(root, self.shares_not)
-
-    def take_kernels(self, root: Path) -> None:
-        """Compiled loops of another checkout with the same sources, which Numba files by folder."""
-        locate = numba.core.caching.UserProvidedCacheLocator.get_suitable_cache_subpath
-        sources = (path for room in ROOMS for path in root.glob(f"{room}/**/*.py"))
-        for room in {path.parent.relative_to(root) for path in sources}:
-            there, here = (locate(str(folder / room / "loop.py")) for folder in (root, self.root))  # type: ignore[no-untyped-call]
-            for folder in root.glob(f".cache/numba/*/{there}"):
-                target = self.root / folder.relative_to(root).with_name(here)
-                shutil.copytree(folder, target, dirs_exist_ok=True)
+        return Checkout(root, self.own_caches)
 
     @property
     def problem(self) -> Path:
@@ -178,9 +168,11 @@ class Checkout:
         )
 
     def _environment(self) -> dict[str, str]:
-        """Of a user's shell, not of `make test`: and the checkout has its own caches."""
-        unwanted = {*self.shares_not, "MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
-        return {name: value for name, value in os.environ.items() if name not in unwanted}
+        """Of a user's shell, not of `make test`; with its own caches, if asked for."""
+        unwanted = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
+        kept = {name: value for name, value in os.environ.items() if name not in unwanted}
+        own = {name: str(self.root / ".cache" / name.lower()) for name in _CACHES}
+        return kept | own if self.own_caches else kept
 
 
 _NO_SETUP = ("--old-file=.venv/requirements.lock", "--old-file=setup")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.runtime import ROOT
 from tests.e2e.checkout import Checkout
 
 
@@ -21,7 +20,6 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not built.exists():
             Checkout.made(checkout.root)
-            checkout.take_kernels(ROOT)
             ended = checkout.make()
             assert ended.returncode == 0, ended.stdout + ended.stderr
             built.touch()
@@ -31,6 +29,4 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
 @pytest.fixture
 def fresh(undisturbed: Checkout, tmp_path: Path) -> Checkout:
     """The same commit in another folder, with nothing built."""
-    checkout = undisturbed.copied(tmp_path / "grüße from a folder")
-    checkout.take_kernels(undisturbed.root)
-    return checkout
+    return undisturbed.copied(tmp_path / "grüße from a folder")

@@ -36,7 +36,6 @@ AS_FILMED = {
 def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """A checkout with a study of the specimen that the clip shows, designed and simulated."""
     made = Checkout.made(tmp_path_factory.mktemp("filmed") / "checkout")
-    made.take_kernels(ROOT)
     folder, results = made.root / "experiments" / STUDY, made.root / "results" / STUDY
     recordings = folder / "recordings"
     recordings.mkdir(parents=True)

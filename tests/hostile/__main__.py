@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.datasets import git_commit
-from pipeline.runtime import ROOT, write_atomically
+from pipeline.runtime import write_atomically
 from reports.products.survival import build
 from tests.e2e.checkout import Checkout
 from tests.hostile import inputs, kills, places
@@ -58,10 +58,8 @@ def _built() -> Iterator[tuple[Checkout, float]]:
     """A checkout with a small study, built; and how long that took, in s."""
     with tempfile.TemporaryDirectory() as folder:
         checkout = kills.filmed(Checkout.made(Path(folder, "checkout")))
-        checkout.take_kernels(ROOT)
         kills.finished(checkout)  # compiles
         again = checkout.copied(Path(folder, "grüße, again"))
-        again.take_kernels(checkout.root)
         start = time.monotonic()
         kills.finished(again)
         yield again, time.monotonic() - start
@@ -76,7 +74,6 @@ def _kills(asked: argparse.Namespace) -> Part:
 
     with _built() as (checkout, span):
         other = checkout.copied(checkout.root.with_name("killed"))
-        other.take_kernels(checkout.root)
         wanted = kills.built(checkout)
         faults = kills.killed(other, wanted, asked.kills, asked.seed, span, tell)
     rows = [

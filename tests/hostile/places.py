@@ -209,7 +209,6 @@ def odd_paths(checkout: Checkout) -> Iterator[Tried]:
         }
         for place, name in names.items():
             other = checkout.copied(Path(folder) / name)
-            other.take_kernels(checkout.root)
             fault = _made(other, wanted)
             pwned = list(Path(folder).rglob("pwned"))
             yield Tried(f"path: {place}", "make", fault or ("a command was run" if pwned else ""))

@@ -16,14 +16,13 @@ from tests.e2e.checkout import Checkout
 
 TARGET = "fig2@quick"
 KILLS = 12
-OWN_CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 
 
 @pytest.fixture(scope="module")
 def first(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """A checkout in which everything was compiled and built from nothing."""
     made = Checkout.made(tmp_path_factory.mktemp("first") / "checkout")
-    return build(replace(made, shares_not=OWN_CACHES))
+    return build(replace(made, own_caches=True))
 
 
 def build(checkout: Checkout) -> Checkout:
@@ -41,7 +40,6 @@ def test_compiled_just_now_or_long_ago_the_bytes_are_the_same(
     first: Checkout, tmp_path: Path
 ) -> None:
     second = first.copied(tmp_path / "checkout")
-    second.take_kernels(first.root)
     assert build(second).built(TARGET) == first.built(TARGET)
 
 
@@ -50,7 +48,6 @@ def test_kills_at_random_moments(
     first: Checkout, tmp_path: Path, kill: Callable[[int, int], None]
 ) -> None:
     checkout = first.copied(tmp_path / "checkout")
-    checkout.take_kernels(first.root)
     moments = random.Random(0)
     for _ in range(KILLS):
         run = checkout.start(TARGET)

@@ -1,0 +1,86 @@
+"""Locates compiled loops by what they are made of, so that a machine compiles each of them once.
+
+Numba files a loop by the path of its source, and takes it for current as long as that file is: a
+second checkout compiles anew, and an edit in a file that the loop calls goes unseen. Here a loop is
+filed by a hash of its file and of all that this imports; Numba itself adds its version, the
+signature, and the processor's features.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba.core.config
+import platformdirs
+from numba.core.caching import _CacheLocator
+
+from sim.core.import_graph import import_closure
+
+ROOT = Path(__file__).resolve().parents[2]
+_NUMBA_OWN = (
+    "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,IPythonCacheLocator,"
+    "ZipCacheLocator"
+)
+
+
+class SourceHashLocator(_CacheLocator):
+    """Locates the cache of one loop of this project; others keep Numba's own places."""
+
+    def __init__(self, function: Callable[..., Any], file: Path) -> None:
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        self._hash = loop_hash(module)
+        self._folder = cache_folder() / f"{module}-{self._hash}"
+        self._line = function.__code__.co_firstlineno
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> SourceHashLocator | None:
+        """Makes the locator of a loop; None where it is none of ours or nothing can be written."""
+        path = Path(file).resolve()
+        if not path.is_relative_to(ROOT) or not path.is_file():
+            return None
+        located = cls(function, path)
+        try:
+            located.ensure_cache_path()  # type: ignore[no-untyped-call]
+        except OSError:
+            return None
+        return located
+
+    def get_cache_path(self) -> str:
+        """Names the folder of the loop's machine code."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Returns the hash of the loop's sources."""
+        return self._hash
+
+    def get_disambiguator(self) -> str:
+        """Tells loops of the same name in one file apart, by their line."""
+        return str(self._line)
+
+
+@cache
+def loop_hash(module: str, root: Path = ROOT) -> str:
+    """Hashes the file of a loop and what it imports: constants and callees are compiled into it."""
+    digest = hashlib.sha256()
+    for name, path in sorted(import_closure([module], root, packages=False).items()):
+        content = path.read_bytes()
+        digest.update(f"{name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Returns the folder of all compiled loops: NUMBA_CACHE_DIR, or one of the user's caches."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    return Path(named) if named else platformdirs.user_cache_path("metacloak") / "loops"
+
+
+def install() -> None:
+    """Makes Numba ask this locator first, unless the user named others."""
+    config: Any = numba.core.config
+    if not config.CACHE_LOCATOR_CLASSES:
+        config.CACHE_LOCATOR_CLASSES = f"{__name__}.SourceHashLocator,{_NUMBA_OWN}"

@@ -1,0 +1,80 @@
+"""Compiled loops are found by what they are made of: in any checkout, and in no edited one."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import ROOT
+from sim.core import import_closure
+from sim.core.loop_cache import loop_hash
+
+MARCH = "sim.quasistatics.equilibrium_path"
+LOOPS = {
+    "sim/loops.py": "from sim.core import compiled\nfrom sim.inner import inner\n\n"
+    "@compiled\ndef outer(n):\n    return inner(n) + 1\n",
+    "sim/inner.py": "from sim.core import compiled\n\n@compiled\ndef inner(n):\n    return 2 * n\n",
+    "sim/other.py": "",
+}
+RUN = "from sim.loops import outer as f; f(3); print(f(3), sum(f.stats.cache_misses.values()))"
+
+
+def checkout(root: Path) -> Path:
+    shutil.copytree(ROOT / "sim/core", root / "sim/core")
+    shutil.copy(ROOT / "sim/__init__.py", root / "sim/__init__.py")
+    for name, text in LOOPS.items():
+        (root / name).write_text(text)
+    return root
+
+
+def run(root: Path, cache: Path) -> list[str]:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache)}
+    command = [sys.executable, "-c", RUN]
+    return subprocess.run(
+        command, cwd=root, env=environment, text=True, capture_output=True, check=True
+    ).stdout.split()
+
+
+def test_a_second_checkout_compiles_nothing_and_an_edited_one_does(tmp_path: Path) -> None:
+    first, second = checkout(tmp_path / "first"), checkout(tmp_path / "second")
+    cache = tmp_path / "cache"
+    assert run(first, cache) == ["7", "1"]
+    assert run(second, cache) == ["7", "0"]
+    (second / "sim/other.py").write_text("unrelated = 1\n")
+    assert run(second, cache) == ["7", "0"]
+    (second / "sim/inner.py").write_text(LOOPS["sim/inner.py"].replace("2 * n", "5 * n"))
+    assert run(second, cache) == ["16", "1"]
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("copy")
+    kept = shutil.ignore_patterns("__pycache__")
+    for folder in ("sim", "pipeline"):
+        shutil.copytree(ROOT / folder, root / folder, ignore=kept)
+    return root
+
+
+@pytest.mark.parametrize("module", sorted(import_closure([MARCH], ROOT, packages=False)))
+def test_a_byte_in_any_file_that_a_loop_reaches_changes_its_hash(copy: Path, module: str) -> None:
+    before = loop_hash(MARCH, copy)
+    path = copy / f"{module.replace('.', '/')}.py"
+    text = path.read_bytes()
+    path.write_bytes(text + b"\n")
+    loop_hash.cache_clear()
+    try:
+        assert loop_hash(MARCH, copy) != before
+    finally:
+        path.write_bytes(text)
+        loop_hash.cache_clear()
+
+
+def test_the_path_of_equilibria_reaches_its_kernels_through_faces() -> None:
+    reached = set(import_closure([MARCH], ROOT, packages=False))
+    assert {"sim.energy.ligament_kernels", "sim.linalg.banded", "sim.core.compiling"} <= reached
+    assert not {"sim.scene.plan", "sim.optimise.sqp", "sim.time_integration.explicit"} & reached
