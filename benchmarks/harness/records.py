@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
-import xarray as xr
 
-from pipeline.datasets.tables import Kind
 from sim.core import Floats
+
+if TYPE_CHECKING:  # every worker loads this module: it stays light
+    import xarray as xr
+
+    from pipeline.datasets.tables import Kind
 
 Task = Literal["loss", "gradient"]
 Tell = Callable[[str], None]

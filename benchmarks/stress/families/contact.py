@@ -1,21 +1,24 @@
-"""Numbers as they come: of 32 bits, whole, at the cutoff to the last digit, far too large."""
+"""Tries contact at its barrier and cutoff, and inputs of 32 bits, none, far too large."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.stress import (
+    DISTANCE,
     Check,
     StressCase,
-    StressFamily,
     StressScene,
     apart,
     equilibria,
+    family,
     motions,
+    posed,
     pressed,
     shaken,
     solved,
@@ -26,6 +29,77 @@ from sim.solvers import Harmonic, PrescribedMotion, Solver, TimeSeries, solve_ca
 from sim.structure import ConcreteParameters
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
+HARD = Harmonic(8.0, 30.0, 0.6)
+CHAOS = 0.1
+"""What half the steps may change where units collide again and again."""
+LAWS = {"angles": None, "distances": DISTANCE}
+
+
+@family(
+    "starts on and beyond the contact barrier, explicit steps too large, compression to 25 %,"
+    " 8 mm at 30 Hz, both laws of contact",
+    "balance by the definition, void angles and overlaps by geometry, half the steps",
+)
+def barrier(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
+    side = 5 if small else 9
+    yield from _starts((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
+    for share in (0.25,) if small else (0.05, 0.1, 0.15, 0.2, 0.25):
+        for law, distance in LAWS.items():
+            for n_loads in (1,) if small else (1, 10):
+                case = pressed(squares(side), share, contact_distance=distance)
+                loads = np.arange(1, n_loads + 1) / n_loads
+                name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
+                yield StressCase(name, partial(equilibria, case, loads))
+    for law, distance in LAWS.items():
+        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact_distance=distance)
+        yield StressCase(f"8 mm at 30 Hz, contact on {law}", partial(_shaken, case))
+    case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
+    for n_steps in (1,) if small else (1, 10, 100):
+        yield StressCase(f"{n_steps} explicit steps asked for", partial(_too_large, case, n_steps))
+
+
+def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
+    for angle in angles:
+        lattice = squares(5, bias=45.0 - angle / 2)
+        beyond = angle <= -15.0
+        for share in (0.02, -0.05):
+            name = f"voids of {angle:g} deg at rest, {'pressed' if share > 0 else 'pulled'}"
+            attempt = partial(equilibria, pressed(lattice, share), np.array([0.0, 0.5, 1.0]))
+            yield StressCase(name, attempt, "refusal" if beyond else "solution")
+        gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
+        for integrator in ("implicit", "explicit"):
+            case = replace(gentle, scene=replace(gentle.scene, integrator=integrator))
+            name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
+            yield StressCase(name, partial(_shaken, case), "refusal" if beyond else "either")
+    yield from _jolts()
+
+
+def _jolts() -> Iterator[StressCase]:
+    """Held units that are beyond the barrier from the first moment, or get there."""
+    for start, sense in ((-2.0, "further"), (-2.0, "back")):
+        end = -3.0 if sense == "further" else 0.0
+        series = TimeSeries(np.array([0.0, 0.01]), np.array([[0, 0, start], [0, 0, end]]))
+        case = posed(squares(3), [0], [4], series, duration=0.01)
+        times = np.linspace(0.0, 0.01, 11)
+        implicit = ImplicitSolver(case.topology, times, times)
+        explicit = ExplicitSolver(case.topology, 0.01, 100, times)
+        for name, solver in (("implicit", implicit), ("explicit", explicit)):
+            said = f"turned beyond the barrier at once, then {sense}, {name}"
+            attempt = partial(motions, case, times, CHAOS, solver)
+            yield StressCase(said, attempt, "refusal")
+
+
+def _shaken(case: StressScene) -> Sequence[Check]:
+    return motions(case, np.linspace(0.0, case.scene.duration, 101), CHAOS)
+
+
+def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
+    asked = np.array([case.scene.duration])
+    solver = ExplicitSolver(case.topology, case.scene.duration, n_steps, asked)
+    return motions(case, asked, CHAOS, solver)
+
+
 LOADS = np.array([0.5, 1.0])
 DURATION = 0.01
 ASKED = np.linspace(0.0, DURATION, 11)
@@ -33,18 +107,13 @@ SINGLE = 1e-4
 """Change of an answer by 32-bit input, relative: 1e-7 times what a lattice makes of it."""
 
 
-def family() -> StressFamily:
-    """The family."""
-    return StressFamily(
-        "inputs",
-        "parameters, drives and times of 32 bits; void angles at the cutoff of contact and up to"
-        " 1e-12 deg beside it; parameters that are no numbers, zero, negative, huge",
-        "the answer of 64 bits, as 64 bits; balance by the definition; a refusal of what is none",
-        _cases,
-    )
-
-
-def _cases(small: bool) -> Iterator[StressCase]:
+@family(
+    "parameters, drives and times of 32 bits; void angles at the cutoff of contact and up to"
+    " 1e-12 deg beside it; parameters that are no numbers, zero, negative, huge",
+    "the answer of 64 bits, as 64 bits; balance by the definition; a refusal of what is none",
+)
+def inputs(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
     for name, solver in _solvers():
         yield StressCase(f"32-bit parameters, {name}", partial(_single, name, solver))
     sizes = (0.0, 1e-12) if small else (0.0, 1e-12, 1e-9, 1e-6, 1e-3)

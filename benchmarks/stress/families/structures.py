@@ -1,4 +1,4 @@
-"""Structures in pieces: disconnected, floating, held by a thread, one unit, one-unit cloaks."""
+"""Tries lattices from 3 x 3 to 120 x 120 units, and structures in pieces."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
+    DISTANCE,
     NONE,
     Check,
     StressCase,
-    StressFamily,
     StressScene,
     Wanted,
     equilibria,
+    family,
     motions,
     posed,
     pressed,
@@ -26,24 +27,60 @@ from sim.core import Ints
 from sim.scene import evaluator, make_plan
 from sim.solvers import Harmonic, LinearRamp
 from sim.structure import Lattice, quads
+from sim.time_integration import ExplicitSolver, ImplicitSolver
+
+SIDES = (3, 4, 5, 8, 15, 30, 60, 120)
+TOUCHING = 30
+"""Largest lattice that is also pressed with contact on distances."""
+
+
+@family(
+    f"squares of {SIDES[0]} to {SIDES[-1]} units a side, and strips: pressed by 10 %, shaken by"
+    " either integrator",
+    "balance by the definition, void angles and overlaps by geometry, half the steps",
+)
+def sizes(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
+    shapes = [(side, side) for side in SIDES] + [(60, 2), (3, 40), (2, 2)]
+    for columns, rows in [(3, 3), (8, 8)] if small else shapes:
+        lattice, name = squares(columns, rows), f"{columns} x {rows}"
+        loads = np.array([1.0])
+        wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
+        yield StressCase(
+            f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads), wanted
+        )
+        if max(columns, rows) <= TOUCHING:
+            touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+            attempt = partial(equilibria, touching, loads)
+            yield StressCase(f"{name}, contact on distances", attempt, wanted)
+        if min(columns, rows) > 2:
+            case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
+            for integrator in ("implicit", "explicit"):
+                yield StressCase(
+                    f"{name}, shaken, {integrator}", partial(_shaken, case, integrator)
+                )
+
+
+def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
+    duration, asked = case.scene.duration, np.linspace(0.0, case.scene.duration, 6)
+    if integrator == "explicit":
+        return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))
+    times = np.linspace(0.0, duration, 41)
+    return motions(case, asked, 0.05, ImplicitSolver(case.topology, times, asked))
+
 
 LOADS = np.array([0.5, 1.0])
 SIDE = 5
 ASKED = np.linspace(0.0, 0.02, 21)
 
 
-def family() -> StressFamily:
-    """The family."""
-    return StressFamily(
-        "pieces",
-        "floating units and halves, ends that hang on one ligament, supports along x alone, all"
-        " units held, no ligament, a single unit; cloaks of one unit",
-        "equilibria and motions as elsewhere; gradients of the loss against differences",
-        _cases,
-    )
-
-
-def _cases(small: bool) -> Iterator[StressCase]:
+@family(
+    "floating units and halves, ends that hang on one ligament, supports along x alone, all"
+    " units held, no ligament, a single unit; cloaks of one unit",
+    "equilibria and motions as elsewhere; gradients of the loss against differences",
+)
+def pieces(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
     for name, lattice, wanted in list(_structures())[:2] if small else _structures():
         plate = pressed(lattice, 0.04)
         yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS), wanted)
