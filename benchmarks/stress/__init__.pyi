@@ -26,5 +26,6 @@ from .verdicts import StressCase as StressCase
 from .verdicts import StressFamily as StressFamily
 from .verdicts import Tally as Tally
 from .verdicts import Wanted as Wanted
+from .verdicts import attempt as attempt
 from .verdicts import attempted as attempted
 from .verdicts import family as family

@@ -156,19 +156,21 @@ def _void_angles(case: StressScene, state: Floats) -> Floats:
 
 
 def motions(
-    case: StressScene, asked: Floats, error: float, solver: Solver | None = None
+    case: StressScene, asked: Floats | int, error: float, solver: Solver | None = None
 ) -> list[Check]:
     """Integrates a motion and checks it, also against one of half the steps.
 
     Args:
         case: the case.
-        asked: times of the output, s.
+        asked: times of the output, s, or how many from zero to the end.
         error: that half the steps may find, root mean square relative to that of the motion.
         solver: by default the plan's.
 
     Raises:
         SimulationError: it cannot be integrated.
     """
+    if isinstance(asked, int):
+        asked = np.linspace(0.0, case.scene.duration, asked)
     used = solver or case.solver(asked)
     answer = solved(case, used)
     checks = [*admissible(case, answer.displacement), reached(case, answer.displacement, asked)]
@@ -182,13 +184,12 @@ def motions(
     ]
 
 
-def motions_as_advised(case: StressScene, asked: Floats, error: float) -> list[Check]:
+def motions_as_advised(case: StressScene, asked: Floats | int, error: float) -> list[Check]:
     """Integrates as planned by default; if that is not enough by its own account, tight.
 
     Args:
         case: the case.
-        asked: times of the output, s.
-        error: as of ``motions``.
+        asked, error: as of ``motions``.
 
     Raises:
         SimulationError: it cannot be integrated, or not without other changes.

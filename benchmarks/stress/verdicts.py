@@ -10,8 +10,8 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal, NamedTuple
+from functools import cached_property, partial
+from typing import Any, Literal, NamedTuple
 
 from sim.core import SimulationError
 
@@ -63,6 +63,16 @@ class StressCase:
     name: str
     attempt: Callable[[], Sequence[Check]]
     wanted: Wanted = "solution"
+
+
+def attempt(
+    name: str,
+    check: Callable[..., Sequence[Check]],
+    *arguments: Any,  # noqa: ANN401  (of the check)
+    wanted: Wanted = "solution",
+) -> StressCase:
+    """Poses an attempt whose check takes arguments."""
+    return StressCase(name, partial(check, *arguments), wanted)
 
 
 class StressOutcome(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,6 +22,7 @@ from benchmarks.stress import (
     StressCase,
     StressScene,
     apart,
+    attempt,
     balance,
     family,
     posed,
@@ -74,8 +74,7 @@ def symmetry(small: bool) -> Iterator[StressCase]:
             for law, distance in (("angles", None), ("distances", DISTANCE)):
                 for solver in ("static", "implicit", "explicit"):
                     name = f"design {seed}, {kind}, {solver}, contact on {law}"
-                    attempt = partial(_equivalent, draws, seed, kind, solver, distance)
-                    yield StressCase(name, attempt)
+                    yield attempt(name, _equivalent, draws, seed, kind, solver, distance)
 
 
 def _equivalent(
@@ -162,8 +161,8 @@ def agreement(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     draws = RandomDesigns(squares(SIDE), NONE, 2.0, 0.8)
     for seed in range(1 if small else 12):
-        yield StressCase(f"scene {seed}, equilibria", partial(_equilibria, draws, seed))
-        yield StressCase(f"scene {seed}, motions", partial(_motions, draws, seed))
+        yield attempt(f"scene {seed}, equilibria", _equilibria, draws, seed)
+        yield attempt(f"scene {seed}, motions", _motions, draws, seed)
 
 
 def _scene(draws: RandomDesigns, seed: int, static: bool) -> StressScene:

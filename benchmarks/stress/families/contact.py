@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from benchmarks.stress import (
     StressCase,
     StressScene,
     apart,
+    attempt,
     equilibria,
     family,
     motions,
@@ -50,13 +50,13 @@ def barrier(small: bool) -> Iterator[StressCase]:
                 case = pressed(squares(side), share, contact_distance=distance)
                 loads = np.arange(1, n_loads + 1) / n_loads
                 name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
-                yield StressCase(name, partial(equilibria, case, loads))
+                yield attempt(name, equilibria, case, loads)
     for law, distance in LAWS.items():
         case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact_distance=distance)
-        yield StressCase(f"8 mm at 30 Hz, contact on {law}", partial(_shaken, case))
+        yield attempt(f"8 mm at 30 Hz, contact on {law}", motions, case, 101, CHAOS)
     case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
     for n_steps in (1,) if small else (1, 10, 100):
-        yield StressCase(f"{n_steps} explicit steps asked for", partial(_too_large, case, n_steps))
+        yield attempt(f"{n_steps} explicit steps asked for", _too_large, case, n_steps)
 
 
 def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
@@ -65,13 +65,18 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
         beyond = angle <= -15.0
         for share in (0.02, -0.05):
             name = f"voids of {angle:g} deg at rest, {'pressed' if share > 0 else 'pulled'}"
-            attempt = partial(equilibria, pressed(lattice, share), np.array([0.0, 0.5, 1.0]))
-            yield StressCase(name, attempt, "refusal" if beyond else "solution")
+            yield attempt(
+                name,
+                equilibria,
+                pressed(lattice, share),
+                np.array([0.0, 0.5, 1.0]),
+                wanted="refusal" if beyond else "solution",
+            )
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
             case = replace(gentle, scene=replace(gentle.scene, integrator=integrator))
             name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
-            yield StressCase(name, partial(_shaken, case), "refusal" if beyond else "either")
+            yield attempt(name, motions, case, 101, CHAOS, wanted="refusal" if beyond else "either")
     yield from _jolts()
 
 
@@ -86,12 +91,7 @@ def _jolts() -> Iterator[StressCase]:
         explicit = ExplicitSolver(case.topology, 0.01, 100, times)
         for name, solver in (("implicit", implicit), ("explicit", explicit)):
             said = f"turned beyond the barrier at once, then {sense}, {name}"
-            attempt = partial(motions, case, times, CHAOS, solver)
-            yield StressCase(said, attempt, "refusal")
-
-
-def _shaken(case: StressScene) -> Sequence[Check]:
-    return motions(case, np.linspace(0.0, case.scene.duration, 101), CHAOS)
+            yield attempt(said, motions, case, times, CHAOS, solver, wanted="refusal")
 
 
 def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
@@ -115,19 +115,19 @@ SINGLE = 1e-4
 def inputs(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for name, solver in _solvers():
-        yield StressCase(f"32-bit parameters, {name}", partial(_single, name, solver))
+        yield attempt(f"32-bit parameters, {name}", _single, name, solver)
     sizes = (0.0, 1e-12) if small else (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
     for offset in sorted({sign * size for sign in (1, -1) for size in sizes}):
         lattice = squares(5, bias=50.0 - offset / 2)
         name = f"voids at the cutoff {offset:+g} deg"
         for share in (1e-6, 0.02):
             plate = pressed(lattice, share)
-            yield StressCase(f"{name}, pressed by {share:g}", partial(equilibria, plate, LOADS))
+            yield attempt(f"{name}, pressed by {share:g}", equilibria, plate, LOADS)
         for integrator in ("implicit", "explicit"):
             case = shaken(
                 lattice, Harmonic(0.5, 60.0), duration=0.01, frequency=60.0, integrator=integrator
             )
-            yield StressCase(f"{name}, shaken, {integrator}", partial(motions, case, ASKED, 0.1))
+            yield attempt(f"{name}, shaken, {integrator}", motions, case, ASKED, 0.1)
     yield from _nonsense()
 
 
@@ -169,14 +169,20 @@ def _nonsense() -> Iterator[StressCase]:
     for name, solver in _solvers():
         for field in ("arm", "vector", "void", "law", "contact", "mass", "damping"):
             for value in (np.nan, np.inf):
-                attempt = partial(_spoilt, name, solver, field, value)
                 said = f"{field} is {value}, {name}"
-                yield StressCase(said, attempt, "refusal")
+                yield attempt(said, _spoilt, name, solver, field, value, wanted="refusal")
         for field, value in (("mass", 0.0), ("mass", -1.0), ("law", -1.0), ("damping", -1e3)):
             if name == "static" and field != "law":
                 continue
-            attempt = partial(_spoilt, name, solver, field, value)
-            yield StressCase(f"{field} is {value:g}, {name}", attempt, "refusal")
+            yield attempt(
+                f"{field} is {value:g}, {name}",
+                _spoilt,
+                name,
+                solver,
+                field,
+                value,
+                wanted="refusal",
+            )
 
 
 def _spoilt(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from benchmarks.stress import (
     StressCase,
     StressScene,
     admissible,
+    attempt,
     balance,
     balanced,
     energies,
@@ -83,16 +83,12 @@ def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterato
     """A structure of these constants pressed, and shaken slowly and fast."""
     if stiff:
         plate = pressed(squares(SIDE), 0.08).with_material(**constants)
-        yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS))
+        yield attempt(f"{name}, pressed", equilibria, plate, LOADS)
     for frequency, duration in ((2.0, 0.25), (60.0, 0.02)):
         motion = Harmonic(2.0, frequency, 0.8)
         case = shaken(squares(SIDE), motion, duration=duration, frequency=frequency)
         made = case.with_material(**constants)
-        yield StressCase(f"{name}, shaken at {frequency:g} Hz", partial(_shaken_advised, made))
-
-
-def _shaken_advised(case: StressScene) -> Sequence[Check]:
-    return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 26), 0.05)
+        yield attempt(f"{name}, shaken at {frequency:g} Hz", motions_as_advised, made, 26, 0.05)
 
 
 DURATION = 0.1
@@ -115,25 +111,22 @@ def times(small: bool) -> Iterator[StressCase]:
             yield _at_frequency(frequency, accuracy)
     for width in (1e-3,) if small else (1e-4, 1e-3, 1e-2):
         pulse = shaken(squares(5), Pulse(1.0, width, 0.4, 4 * width), duration=8 * width)
-        yield StressCase(f"pulse {width:g} s wide", partial(_shaken_with, pulse, ERROR["default"]))
+        yield attempt(f"pulse {width:g} s wide", motions_as_advised, pulse, 51, ERROR["default"])
     for n_steps in (1, 100) if small else (1, 2, 3, 10, 100, 1_000, 10_000):
-        yield StressCase(f"{n_steps} implicit steps", partial(_implicit, n_steps))
+        yield attempt(f"{n_steps} implicit steps", _implicit, n_steps)
     for n_steps in (1, 1_000) if small else (1, 10, 1_000, 100_000, 1_000_000):
-        yield StressCase(f"{n_steps} explicit steps", partial(_explicit, n_steps))
+        yield attempt(f"{n_steps} explicit steps", _explicit, n_steps)
     for n_loads in (1, 100) if small else (1, 10, 1_000, 100_000):
-        yield StressCase(f"{n_loads} load steps", partial(_static, n_loads))
+        yield attempt(f"{n_loads} load steps", _static, n_loads)
 
 
 def _at_frequency(frequency: float, accuracy: str) -> StressCase:
     motion = Harmonic(min(2.0, 60.0 / frequency), frequency, 0.8)
     duration = 1.0 / frequency if frequency < 5.0 else min(3.0 / frequency, 0.1)
     case = shaken(squares(5), motion, duration=duration, frequency=frequency, accuracy=accuracy)
-    attempt = partial(_shaken_with, case, ERROR[accuracy])
-    return StressCase(f"{frequency:g} Hz, accuracy {accuracy}", attempt)
-
-
-def _shaken_with(case: StressScene, error: float) -> Sequence[Check]:
-    return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 51), error)
+    return attempt(
+        f"{frequency:g} Hz, accuracy {accuracy}", motions_as_advised, case, 51, ERROR[accuracy]
+    )
 
 
 def _small_scene() -> StressScene:
@@ -188,16 +181,13 @@ def balances(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for n_steps in (2_000,) if small else (2_000, 20_000, 100_000):
         for bias, kind in ((20.0, "without contact"), (46.0, "with contact")):
-            attempt = partial(_kept, _pushed(bias), n_steps)
-            yield StressCase(f"undamped for {n_steps} steps, {kind}", attempt)
+            yield attempt(f"undamped for {n_steps} steps, {kind}", _kept, _pushed(bias), n_steps)
     touching = _pushed(46.0, contact_distance=DISTANCE)
-    yield StressCase("undamped, contact on distances", partial(_kept, touching, 2_000))
+    yield attempt("undamped, contact on distances", _kept, touching, 2_000)
     for bias in (46.0,) if small else (20.0, 46.0):
-        yield StressCase(f"damped, squares turned by {bias:g} deg", partial(_spent, _pushed(bias)))
-        yield StressCase(f"implicit, squares turned by {bias:g} deg", partial(_lost, _pushed(bias)))
-        yield StressCase(
-            f"free, squares turned by {bias:g} deg", partial(_momentum, _pushed(bias, []))
-        )
+        yield attempt(f"damped, squares turned by {bias:g} deg", _spent, _pushed(bias))
+        yield attempt(f"implicit, squares turned by {bias:g} deg", _lost, _pushed(bias))
+        yield attempt(f"free, squares turned by {bias:g} deg", _momentum, _pushed(bias, []))
 
 
 def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> StressScene:

@@ -14,6 +14,7 @@ from benchmarks.stress import (
     RandomDesigns,
     StressCase,
     StressScene,
+    attempt,
     equilibria,
     family,
     motions_as_advised,
@@ -49,9 +50,7 @@ def designs(small: bool) -> Iterator[StressCase]:
         partial(_motion, fast, 0.05),
     )
     for seed in range(6 if small else 1000):
-        yield StressCase(
-            f"design {seed}", partial(_both, draws, seed, plate, attempts[seed % len(attempts)])
-        )
+        yield attempt(f"design {seed}", _both, draws, seed, plate, attempts[seed % len(attempts)])
 
 
 def _both(
@@ -66,8 +65,7 @@ def _equilibria(case: StressScene, vertices: np.ndarray) -> Sequence[Check]:
 
 
 def _motion(case: StressScene, error: float, vertices: np.ndarray) -> Sequence[Check]:
-    asked = np.linspace(0.0, case.scene.duration, 26)
-    return motions_as_advised(replace(case, vertices=vertices), asked, error)
+    return motions_as_advised(replace(case, vertices=vertices), 26, error)
 
 
 WIDEST = 7.0
@@ -91,7 +89,7 @@ def slender(small: bool) -> Iterator[StressCase]:
     fast = shaken(lattice, Harmonic(2.0, 60.0, 0.8), duration=0.02, frequency=60.0)
     for seed in range(1 if small else 40):
         for case, name in ((plate, "pressed"), (slow, "slowly shaken"), (fast, "shaken")):
-            yield StressCase(f"design {seed}, {name}", partial(_slender, draws, seed, case))
+            yield attempt(f"design {seed}, {name}", _slender, draws, seed, case)
 
 
 def _slender(draws: RandomDesigns, seed: int, case: StressScene) -> Sequence[Check]:
@@ -100,4 +98,4 @@ def _slender(draws: RandomDesigns, seed: int, case: StressScene) -> Sequence[Che
     made = replace(case, vertices=vertices)
     if case.scene.static:
         return [margin, *equilibria(made, np.array([0.5, 1.0]))]
-    return [margin, *motions_as_advised(made, np.linspace(0.0, case.scene.duration, 26), 0.05)]
+    return [margin, *motions_as_advised(made, 26, 0.05)]

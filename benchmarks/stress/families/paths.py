@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from benchmarks.stress import (
     StressScene,
     admissible,
     apart,
+    attempt,
     balanced,
     equilibria,
     family,
@@ -40,8 +40,9 @@ def branches(small: bool) -> Iterator[StressCase]:
     for length in lengths:
         for n_loads in (1,) if small else (1, 3, 10, 50):
             for name, case in _paths(length):
-                attempt = partial(_followed, case, n_loads)
-                yield StressCase(f"{name} of {length} units in {n_loads} loads", attempt)
+                yield attempt(
+                    f"{name} of {length} units in {n_loads} loads", _followed, case, n_loads
+                )
 
 
 def _paths(length: int) -> Iterator[tuple[str, StressScene]]:
@@ -94,13 +95,13 @@ PERIOD = 0.05
 def windings(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for turns in (1.0,) if small else (0.5, 0.75, 1.0, 3.0, 100.0):
-        yield StressCase(f"a free lattice turned {turns:g} times", partial(_rigid, turns))
+        yield attempt(f"a free lattice turned {turns:g} times", _rigid, turns)
     for turns in () if small else (0.6, 1.1, 1.5, 2.2):
-        yield StressCase(f"a chain rolled up {turns:g} times", partial(_rolled, turns))
+        yield attempt(f"a chain rolled up {turns:g} times", _rolled, turns)
     for turns in (1.5,) if small else (0.6, 1.5, 2.2):
         for integrator in ("implicit", "explicit"):
             name = f"a lattice whirled {turns:g} times, {integrator}"
-            yield StressCase(name, partial(_whirled, turns, integrator))
+            yield attempt(name, _whirled, turns, integrator)
 
 
 def _turning(turns: float, n: int, duration: float) -> TimeSeries:

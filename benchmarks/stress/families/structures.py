@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from benchmarks.stress import (
     StressCase,
     StressScene,
     Wanted,
+    attempt,
     equilibria,
     family,
     motions,
@@ -46,19 +46,16 @@ def sizes(small: bool) -> Iterator[StressCase]:
         lattice, name = squares(columns, rows), f"{columns} x {rows}"
         loads = np.array([1.0])
         wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
-        yield StressCase(
-            f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads), wanted
-        )
+        yield attempt(f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, wanted=wanted)
         if max(columns, rows) <= TOUCHING:
             touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
-            attempt = partial(equilibria, touching, loads)
-            yield StressCase(f"{name}, contact on distances", attempt, wanted)
+            yield attempt(
+                f"{name}, contact on distances", equilibria, touching, loads, wanted=wanted
+            )
         if min(columns, rows) > 2:
             case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
             for integrator in ("implicit", "explicit"):
-                yield StressCase(
-                    f"{name}, shaken, {integrator}", partial(_shaken, case, integrator)
-                )
+                yield attempt(f"{name}, shaken, {integrator}", _shaken, case, integrator)
 
 
 def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
@@ -83,17 +80,16 @@ def pieces(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for name, lattice, wanted in list(_structures())[:2] if small else _structures():
         plate = pressed(lattice, 0.04)
-        yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS), wanted)
+        yield attempt(f"{name}, pressed", equilibria, plate, LOADS, wanted=wanted)
         for integrator in ("implicit", "explicit"):
             case = shaken_ends(lattice, integrator)
             more: Wanted = "solution" if len(lattice.ligaments) else "refusal"
-            attempt = partial(motions, case, ASKED, 0.15)
-            yield StressCase(f"{name}, shaken, {integrator}", attempt, more)
+            yield attempt(f"{name}, shaken, {integrator}", motions, case, ASKED, 0.15, wanted=more)
     yield from _odd()
     for unit in (6,) if small else (0, 6, 7, 12, 17):
         for static in (True, False):
             kind = "pressed" if static else "shaken"
-            yield StressCase(f"cloak of unit {unit}, {kind}", partial(_cloak, unit, static))
+            yield attempt(f"cloak of unit {unit}, {kind}", _cloak, unit, static)
 
 
 def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
@@ -124,22 +120,21 @@ def shaken_ends(lattice: Lattice, integrator: str) -> StressScene:
 def _odd() -> Iterator[StressCase]:
     """What hardly is a lattice any more."""
     free = posed(squares(3), NONE, [4], LinearRamp(1.0, 1.0), static=True)
-    yield StressCase("held by nothing but the driven unit", partial(equilibria, free, LOADS))
+    yield attempt("held by nothing but the driven unit", equilibria, free, LOADS)
     chain = quads(2, 1, 15.0, 2.25, 0.3)
     held = posed(chain, [0], [1], LinearRamp(0.5, 1.0), static=True)
-    yield StressCase("all units held, static", partial(equilibria, held, LOADS), "refusal")
+    yield attempt("all units held, static", equilibria, held, LOADS, wanted="refusal")
     for integrator in ("implicit", "explicit"):
         more = {"duration": 0.02, "frequency": 60.0, "integrator": integrator}
         moving = posed(chain, [0], [1], Harmonic(0.5, 60.0), **more)
-        attempt = partial(motions, moving, ASKED, 0.05)
-        yield StressCase(f"all units held, {integrator}", attempt, "refusal")
+        yield attempt(
+            f"all units held, {integrator}", motions, moving, ASKED, 0.05, wanted="refusal"
+        )
     sliding = pressed(squares(SIDE), 0.04)
     along = replace(sliding.scene, clamped=3 * 5 * np.arange(5))
-    yield StressCase(
-        "clamped along x alone", partial(equilibria, replace(sliding, scene=along), LOADS)
-    )
+    yield attempt("clamped along x alone", equilibria, replace(sliding, scene=along), LOADS)
     alone = posed(quads(1, 1, 15.0, 2.25, 0.3), NONE, [0], LinearRamp(1.0, 1.0), static=True)
-    yield StressCase("a single unit, driven", partial(equilibria, alone, LOADS), "refusal")
+    yield attempt("a single unit, driven", equilibria, alone, LOADS, wanted="refusal")
 
 
 def _cloak(unit: int, static: bool) -> Sequence[Check]:
