@@ -189,7 +189,8 @@ def motions_as_advised(case: StressScene, asked: Floats | int, error: float) -> 
 
     Args:
         case: the case.
-        asked, error: as of ``motions``.
+        asked: times of the output, or how many, as of ``motions``.
+        error: as of ``motions``.
 
     Raises:
         SimulationError: it cannot be integrated, or not without other changes.

@@ -68,7 +68,6 @@ def _kills(asked: argparse.Namespace) -> Part:
 
     with _built() as (checkout, span):
         other = checkout.copied(checkout.root.with_name("killed"))
-        other.take_kernels(checkout.root)
         wanted = kills.built(checkout)
         faults = kills.killed(other, wanted, asked.kills, asked.seed, span, tell)
     rows = [
