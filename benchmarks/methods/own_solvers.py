@@ -14,8 +14,8 @@ from sim.core import Floats
 from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
-from sim.scene import STIFFENING, make_plan, value_and_gradient
-from sim.solvers import Solver, base
+from sim.scene import STIFFENING, GradientChain, make_plan
+from sim.solvers import Solver, solve_cases
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -72,7 +72,7 @@ def _differences(name: str, apart: float, task: Task) -> Run:
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
         values = posed.values_of(design)
-        motion, *_ = base.forward(solver, values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, values, posed.scene.loads.cases)
         return np.asarray(posed.measured(motion, values)[0]), motion
 
     def run() -> Sample:
@@ -101,7 +101,7 @@ def loss_run(posed: LoadCase, solver: Solver) -> Run:
     """Makes the run of a load case's loss by a solver."""
 
     def run() -> Sample:
-        motion, _, records = base.forward(solver, posed.values, posed.scene.drives)
+        motion, _, records = solve_cases(solver, posed.values, posed.scene.loads.cases)
         work = work_of(records.records[0])
         return Sample(posed.results(*posed.measured(motion, posed.values)), work)
 
@@ -110,7 +110,9 @@ def loss_run(posed: LoadCase, solver: Solver) -> Run:
 
 def gradient_run(posed: LoadCase, solver: Solver, work: Mapping[str, int]) -> Run:
     """Makes the run of a load case's loss and gradient by a solver."""
-    evaluate = value_and_gradient(posed.of_design, posed.measure, solver, posed.scene.drives)
+    evaluate = partial(
+        GradientChain(posed.of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+    )
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> Sample:
@@ -134,7 +136,7 @@ def _stored(posed: LoadCase, by_fronts: bool) -> Topology:
 
 
 def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
-    asked = replace(posed.scene, integrator="implicit", accuracy="default")
+    asked = posed.scene.updated(integrator="implicit", accuracy="default")
     solver = make_plan(asked).solver
     assert isinstance(solver, ImplicitSolver)
     times, tolerance = (
@@ -154,9 +156,11 @@ def refined_times(times: Floats, halvings: int) -> Floats:
 def _explicit(key: str, posed: LoadCase, doublings: float) -> Solver:
     scene, splitting = posed.scene, SPLITTINGS[key]
     highest = STIFFENING * highest_frequency(scene.topology, posed.values)
-    stable = scene.duration * highest / (0.9 * splitting.stability)
+    stable = scene.loads.duration * highest / (0.9 * splitting.stability)
     n_steps = int(np.ceil(stable)) * 2 ** int(doublings)
-    return ExplicitSolver(scene.topology, scene.duration, n_steps, posed.times, splitting=splitting)
+    return ExplicitSolver(
+        scene.topology, scene.loads.duration, n_steps, posed.times, splitting=splitting
+    )
 
 
 def _static(by_fronts: bool, posed: LoadCase, relative: float) -> Solver:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,16 @@ from pipeline.runtime import ROOT
 from sim.constraints import Limits
 from sim.core import Floats, Ints
 from sim.scene import (
-    Objective,
+    Clamp,
+    Mimicking,
     Scene,
     concrete_parameters,
-    objective,
+    mimicking,
+    parameters_of_design,
     sample_times,
-    structure,
     target_motion,
 )
-from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
 from sim.structure import ConcreteParameters, Parameters, quads
 
 DIRECTION_SEED = 0
@@ -71,7 +72,7 @@ class LoadCase:
     @cached_property
     def of_design(self) -> Callable[[Array], Parameters[Array]]:
         """Maps a design (n_variables,) to parameters, differentiable."""
-        return structure(self.scene)
+        return parameters_of_design(self.scene)
 
     def values_of(self, design: Floats) -> ConcreteParameters:
         """Computes the parameters of a design (n_variables,)."""
@@ -80,9 +81,9 @@ class LoadCase:
         )
 
     @cached_property
-    def objective(self) -> Objective:
+    def objective(self) -> Mimicking:
         """Returns the loss (1,) of motions (1, n_times, n_units, 3)."""
-        return objective(self.scene, self.target)
+        return mimicking(self.scene, self.target)
 
     @cached_property
     def direction(self) -> Floats:
@@ -102,7 +103,7 @@ class LoadCase:
     def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
         """Collects what is compared: region's motion by spacings, loss, gradient and its slope."""
         spacing = self.scene.lattice.spacing
-        moved = np.asarray(motion)[0][:, self.scene.region]
+        moved = np.asarray(motion)[0][:, self.scene.objective.region]
         found = {
             "displacement": moved / np.array([spacing, spacing, 1.0]),
             "loss": np.asarray(loss),
@@ -117,14 +118,14 @@ class LoadCase:
 def case(name: str) -> LoadCase:
     """Poses the case of that name (a key of TITLES)."""
     posed = scene(name)
-    return LoadCase(posed, None if posed.reference is None else target_motion(posed))
+    return LoadCase(posed, None if posed.objective.reference is None else target_motion(posed))
 
 
 def scene(name: str) -> Scene:
     """Poses the scene of that name."""
     if name.startswith("small"):
         return _small_wave() if name == "small_wave" else _small_push()
-    whole = replace(scene_of(load(_file(name)), _file(name).parent), symmetry="none")
+    whole = scene_of(load(_file(name)), _file(name).parent).updated(symmetry="none")
     return paper_scenes.one_case(whole, 45.0) if name == "fig2" else whole
 
 
@@ -133,7 +134,7 @@ def symmetric(name: str) -> Scene:
     if name == "fig2":
         return paper_scenes.fig2(symmetry="C4")
     turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
-    return replace(scene(name), symmetry="C4", motions=turns, weights=np.full(2, 0.5))
+    return scene(name).driven_by(*turns, symmetry="C4")
 
 
 def designed(name: str) -> tuple[Scene, Limits]:
@@ -149,30 +150,29 @@ def _file(name: str) -> Path:
 
 
 def _small_wave() -> Scene:
-    return _small(
-        paper_scenes.fig2(),
-        np.array([0, 4, 20, 24]),
-        driven=np.array([12]),
-        motions=(Harmonic(1.0, 20.0, 0.3),),
-        weights=np.ones(1),
-        duration=0.05,
-        frequency=20.0,
-        samples=41,
-    )
+    drive = PrescribedMotion(np.array([12]), Harmonic(1.0, 20.0, 0.3))
+    more = {"duration": 0.05, "frequency": 20.0, "samples": 41}
+    return _small(paper_scenes.fig2(), np.array([0, 4, 20, 24]), drive, **more)
 
 
 def _small_push() -> Scene:
-    left = 5 * np.arange(5)
-    more = {"driven": left + 4, "motions": (LinearRamp(-4.0, 1.0),), "steps": 4}
-    return _small(paper_scenes.fig4(), left, material=paper_scenes.fig2().material, **more)
+    left, material = 5 * np.arange(5), paper_scenes.fig2().structure.material
+    drive = PrescribedMotion(left + 4, LinearRamp(-4.0, 1.0))
+    return _small(paper_scenes.fig4(), left, drive, material=material, steps=4)
 
 
-def _small(scene: Scene, clamped: Ints, **changes: Any) -> Scene:  # noqa: ANN401
+def _small(
+    scene: Scene,
+    clamped: Ints,
+    drive: PrescribedMotion,
+    **changes: Any,  # noqa: ANN401
+) -> Scene:
     """Poses a scene of the paper on 5 x 5 units."""
-    return replace(
-        scene,
+    return scene.updated(
         lattice=quads(5, 5, 15.0, 2.25, np.deg2rad(20.0)),
-        clamped=held_dofs(clamped, np.array([], dtype=np.int64)),
+        supports=(Clamp(clamped),),
+        cases=(drive,),
+        weights=None,
         cloak=CLOAK,
         region=REGION,
         **changes,

@@ -29,8 +29,8 @@ from benchmarks.suites import fresh_process, warm
 from sim.core import Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import evaluator, make_plan
-from sim.solvers import Harmonic, LinearRamp, Solver, base
+from sim.scene import Evaluator, make_plan
+from sim.solvers import Harmonic, LinearRamp, Solver, solve_cases
 from sim.time_integration import ImplicitSolver
 
 EXACT = 1e-12
@@ -64,11 +64,11 @@ def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
     """Compares the region with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
-    still = replace(posed.scene, motions=tuple(_still(motion) for motion in posed.scene.motions))
+    still = posed.scene.driven_by(*map(_still, posed.scene.loads.motions))
 
     def simulated() -> Sample:
-        rest, *_ = base.forward(solver, posed.values, still.drives)
-        moved, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        rest, *_ = solve_cases(solver, posed.values, still.loads.cases)
+        moved, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
 
     del task
@@ -93,12 +93,11 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     """Solves a slow load as equilibria, or as the motion that it is."""
     del task
     scene = load_cases.scene(name)
-    (ramp,) = scene.motions
+    (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
-    slow = replace(
-        scene,
+    slow = scene.driven_by(
+        ramp._replace(duration=SLOWLY),
         static=False,
-        motions=(ramp._replace(duration=SLOWLY),),
         duration=SLOWLY,
         integrator="implicit",
     )
@@ -114,7 +113,7 @@ def other_outputs(name: str, skipped: float, task: Task) -> Run:
     solver = make_plan(posed.scene).solver
 
     def run() -> Sample:
-        motion, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         if not skipped:
             observe(posed.scene.topology, posed.values, motion[0])
         return Sample(posed.results(*posed.measured(motion, posed.values)), {})
@@ -142,7 +141,7 @@ def equal_cases(name: str, skipped: float, task: Task) -> Run:
     """Solves load cases that are copies of others, turned by a quarter."""
     del task
     scene = load_cases.symmetric(name)
-    evaluate = evaluator(scene, make_plan(scene, every_case=not skipped))
+    evaluate = Evaluator(scene, make_plan(scene, every_case=not skipped))
     start = np.zeros(scene.space.n_variables)
 
     def run() -> Sample:

@@ -20,7 +20,7 @@ from benchmarks.harness import (
 )
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
-from sim.scene import evaluator, make_plan, objective, sample_times
+from sim.scene import Evaluator, make_plan, mimicking, sample_times
 from sim.structure import Symmetry
 
 ANGLES = (0.0, 45.0, 90.0, 135.0)
@@ -58,7 +58,7 @@ def _tight() -> Run:
     """Solves by our explicit integrator of order 4 at the tight accuracy, each angle by itself."""
     scene = paper_scenes.fig2(accuracy="tight")
     angles = [paper_scenes.one_case(scene, degrees) for degrees in ANGLES]
-    evaluates = [evaluator(angle, make_plan(angle)) for angle in angles]
+    evaluates = [Evaluator(angle, make_plan(angle)) for angle in angles]
     symmetric = paper_scenes.fig2(symmetry="C4").space.basis
 
     def run() -> Sample:
@@ -81,7 +81,7 @@ def _tight() -> Run:
 def _ours(symmetry: Symmetry) -> Run:
     scene = paper_scenes.fig2(symmetry=symmetry)
     plan = make_plan(scene)
-    evaluate, start = evaluator(scene, plan), np.zeros(scene.space.n_variables)
+    evaluate, start = Evaluator(scene, plan), np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, plan.solver, [int(case) for case in plan.simulated])
     name = "gradient" if symmetry == "none" else f"gradient@{symmetry}"
 
@@ -96,5 +96,5 @@ def _ours(symmetry: Symmetry) -> Run:
 def _diffrax(task: Task) -> Run:
     scene = paper_scenes.one_case(paper_scenes.fig2(), MEASURED_ANGLE)
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-4)
-    loss = jax_baseline.loss(scene, method, sample_times(scene), objective(scene))
+    loss = jax_baseline.loss(scene, method, sample_times(scene), mimicking(scene))
     return jax_baseline.prepare(loss, scene.space.n_variables, task, "@one")

@@ -23,7 +23,7 @@ from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
 from sim.core import Floats
 from sim.quasistatics import StaticSolver
-from sim.scene import structure, value_and_gradient
+from sim.scene import GradientChain, parameters_of_design
 from sim.structure import Parameters
 
 OURS, THEIRS = "ours", "pseudo-dynamics, diffrax Dopri5"
@@ -69,7 +69,9 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
         value = energy(displacement[:, -1:], values)[0]
         return value, value
 
-    evaluate = value_and_gradient(structure(scene), final, solver, scene.drives)
+    evaluate = partial(
+        GradientChain(parameters_of_design(scene), final), solver=solver, cases=scene.loads.cases
+    )
     start = np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, solver, [0])
 
@@ -84,6 +86,6 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
 def _dynamics(task: Task) -> Run:
     scene = paper_scenes.fig4_as_dynamics()
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8)
-    end = np.array([scene.duration])
+    end = np.array([scene.loads.duration])
     loss = jax_baseline.loss(scene, method, end, paper_scenes.final_energy(scene))
     return jax_baseline.prepare(loss, scene.space.n_variables, task)

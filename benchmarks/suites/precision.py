@@ -14,8 +14,8 @@ from benchmarks.harness import Method, Run, Sample, Suite, Target, error_of, in_
 from benchmarks.methods.own_solvers import SPLITTINGS, refined_times
 from benchmarks.scenes import paper_scenes
 from pipeline.runtime import ROOT
-from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, structure
-from sim.solvers import Solver, simulate
+from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, parameters_of_design
+from sim.solvers import Solver, differentiable_motion
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 SAMPLES = np.linspace(0.0, 1.0, 200)
@@ -75,28 +75,28 @@ def _scene() -> Scene:
 
 
 def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
-    asked = replace(scene, accuracy=accuracy, integrator="implicit")
-    solver = make_plan(asked, asked=SAMPLES).solver
+    asked = scene.updated(accuracy=accuracy, integrator="implicit")
+    solver = make_plan(asked, times=SAMPLES).solver
     assert isinstance(solver, ImplicitSolver)
     return replace(solver, times=refined_times(solver.times, halvings))
 
 
 def _explicit(method: str, n_steps: int, scene: Scene) -> Solver:
     return ExplicitSolver(
-        scene.topology, scene.duration, n_steps, SAMPLES, splitting=SPLITTINGS[method]
+        scene.topology, scene.loads.duration, n_steps, SAMPLES, splitting=SPLITTINGS[method]
     )
 
 
 def _run_with(make: partial[Solver], warm: bool = True) -> Run:
     scene = _scene()
     solver = make(scene)
-    of_design, spacing = structure(scene), scene.lattice.spacing
-    measure = jax.jit(DisplacementMimicking(scene.region, spacing, np.ones(200)).__call__)
+    of_design, spacing = parameters_of_design(scene), scene.lattice.spacing
+    measure = jax.jit(DisplacementMimicking(scene.objective.region, spacing, np.ones(200)).__call__)
     scale = np.array([spacing, spacing, 1.0])
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        displacement = simulate(solver, values, scene.drives).displacement
+        displacement = differentiable_motion(solver, values, scene.loads.cases).displacement
         return measure(displacement, values)[0], displacement[0]
 
     evaluate = jax.value_and_grad(loss, has_aux=True)
@@ -106,7 +106,7 @@ def _run_with(make: partial[Solver], warm: bool = True) -> Run:
     def run() -> Sample:
         (value, motion), gradient = evaluate(start)
         values = {
-            "rms": np.asarray(motion)[:, scene.region] / scale,
+            "rms": np.asarray(motion)[:, scene.objective.region] / scale,
             "loss": np.asarray(value),
             "gradient": np.asarray(gradient),
         }

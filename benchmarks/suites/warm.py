@@ -22,7 +22,7 @@ from benchmarks.harness import (
 from benchmarks.scenes import paper_scenes
 from sim.core import Floats
 from sim.quasistatics import StaticRecord, StaticSolver
-from sim.scene import Scene, evaluator, make_plan
+from sim.scene import Evaluator, Scene, make_plan
 
 COLD, WARM = "from rest", "from the last design"
 STEPS, DESIGNS = 10, 10
@@ -82,7 +82,7 @@ class WarmStart:
 
 
 def _walk(relative: float, warm: bool) -> Run:
-    return walk(replace(paper_scenes.fig4(), steps=STEPS), relative, warm)
+    return walk(paper_scenes.fig4().updated(steps=STEPS), relative, warm)
 
 
 def walk(scene: Scene, relative: float, warm: bool) -> Run:
@@ -91,7 +91,7 @@ def walk(scene: Scene, relative: float, warm: bool) -> Run:
     assert isinstance(plan.solver, StaticSolver)
     memory = WarmStart(warm)
     strict = replace(plan, solver=replace(plan.solver, relative=relative))
-    evaluate = evaluator(scene, strict, memory)
+    evaluate = Evaluator(scene, strict, memory)
     rng = np.random.default_rng(0)
     walk = np.cumsum(rng.uniform(-STEP, STEP, (DESIGNS, scene.space.n_variables)), axis=0)
 

@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 
 from benchmarks.scenes import MATERIAL
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     NONE,
     Answer,
     Check,
@@ -33,7 +33,7 @@ from benchmarks.stress import (
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, Solver, TimeSeries, held_values
-from sim.structure import Lattice, listed
+from sim.structure import ContactModel, Lattice, listed
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 EXACT = 1e-10
@@ -71,19 +71,19 @@ def symmetry(small: bool) -> Iterator[StressCase]:
     draws = RandomDesigns(squares(COLUMNS), np.zeros(0, dtype=np.int64), 2.0, 0.8)
     for seed in range(1 if small else 6):
         for kind in ("all",) if small else KINDS:
-            for law, distance in (("angles", None), ("distances", DISTANCE)):
+            for law, contact in LAWS.items():
                 for solver in ("static", "implicit", "explicit"):
                     name = f"design {seed}, {kind}, {solver}, contact on {law}"
-                    yield attempt(name, _equivalent, draws, seed, kind, solver, distance)
+                    yield attempt(name, _equivalent, draws, seed, kind, solver, contact)
 
 
 def _equivalent(
-    draws: RandomDesigns, seed: int, kind: str, solver: str, distance: float | None
+    draws: RandomDesigns, seed: int, kind: str, solver: str, contact: ContactModel
 ) -> Sequence[Check]:
     lattice = replace(squares(COLUMNS), vertices=draws(seed))
     telling = _telling(kind, lattice, np.random.default_rng(seed))
-    one = _posed(lattice, _same(lattice), distance)
-    other = _posed(_told(lattice, telling), telling, distance)
+    one = _posed(lattice, _same(lattice), contact)
+    other = _posed(_told(lattice, telling), telling, contact)
     first, second = (solved(case, _solver(case, solver)).displacement for case in (one, other))
     wanted = first.reshape(len(first), -1, 3)[:, telling.order]
     wanted = np.concatenate(
@@ -127,14 +127,14 @@ def _told(lattice: Lattice, telling: EquivalentProblem) -> Lattice:
     return listed(rings, placed[ends].tolist(), lattice.spacing)
 
 
-def _posed(lattice: Lattice, telling: EquivalentProblem, distance: float | None) -> StressScene:
+def _posed(lattice: Lattice, telling: EquivalentProblem, contact: ContactModel) -> StressScene:
     """The left column clamped, the right one pushed, turned and sheared."""
     column = telling.order % COLUMNS
     push = np.concatenate([telling.turn @ MOVED[:2], [np.linalg.det(telling.turn) * MOVED[2]]])
     share = (1.0 - np.cos(np.pi * TIMES / DURATION)) / 2.0
     motion = TimeSeries(TIMES, share[:, None] * push)
     left, right = (np.flatnonzero(column == end) for end in (0, COLUMNS - 1))
-    return posed(lattice, left, right, motion, duration=DURATION, contact_distance=distance)
+    return posed(lattice, left, right, motion, duration=DURATION, contact=contact)
 
 
 def _solver(case: StressScene, name: str) -> Solver:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     StressCase,
     StressScene,
@@ -32,7 +32,6 @@ from sim.time_integration import ExplicitSolver, ImplicitSolver
 HARD = Harmonic(8.0, 30.0, 0.6)
 CHAOS = 0.1
 """What half the steps may change where units collide again and again."""
-LAWS = {"angles": None, "distances": DISTANCE}
 
 
 @family(
@@ -45,14 +44,14 @@ def barrier(small: bool) -> Iterator[StressCase]:
     side = 5 if small else 9
     yield from _starts((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
     for share in (0.25,) if small else (0.05, 0.1, 0.15, 0.2, 0.25):
-        for law, distance in LAWS.items():
+        for law, contact in LAWS.items():
             for n_loads in (1,) if small else (1, 10):
-                case = pressed(squares(side), share, contact_distance=distance)
+                case = pressed(squares(side), share, contact=contact)
                 loads = np.arange(1, n_loads + 1) / n_loads
                 name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
                 yield attempt(name, equilibria, case, loads)
-    for law, distance in LAWS.items():
-        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact_distance=distance)
+    for law, contact in LAWS.items():
+        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact=contact)
         yield attempt(f"8 mm at 30 Hz, contact on {law}", motions, case, 101, CHAOS)
     case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
     for n_steps in (1,) if small else (1, 10, 100):
@@ -74,7 +73,7 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
             )
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
-            case = replace(gentle, scene=replace(gentle.scene, integrator=integrator))
+            case = replace(gentle, scene=gentle.scene.updated(integrator=integrator))
             name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
             yield attempt(name, motions, case, 101, CHAOS, wanted="refusal" if beyond else "either")
     yield from _jolts()
@@ -95,8 +94,8 @@ def _jolts() -> Iterator[StressCase]:
 
 
 def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
-    asked = np.array([case.scene.duration])
-    solver = ExplicitSolver(case.topology, case.scene.duration, n_steps, asked)
+    asked = np.array([case.scene.loads.duration])
+    solver = ExplicitSolver(case.topology, case.scene.loads.duration, n_steps, asked)
     return motions(case, asked, CHAOS, solver)
 
 

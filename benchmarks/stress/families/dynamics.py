@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.scenes import MATERIAL
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Answer,
     Check,
     StressCase,
@@ -182,7 +182,7 @@ def balances(small: bool) -> Iterator[StressCase]:
     for n_steps in (2_000,) if small else (2_000, 20_000, 100_000):
         for bias, kind in ((20.0, "without contact"), (46.0, "with contact")):
             yield attempt(f"undamped for {n_steps} steps, {kind}", _kept, _pushed(bias), n_steps)
-    touching = _pushed(46.0, contact_distance=DISTANCE)
+    touching = _pushed(46.0, contact=LAWS["distances"])
     yield attempt("undamped, contact on distances", _kept, touching, 2_000)
     for bias in (46.0,) if small else (20.0, 46.0):
         yield attempt(f"damped, squares turned by {bias:g} deg", _spent, _pushed(bias))
@@ -190,7 +190,7 @@ def balances(small: bool) -> Iterator[StressCase]:
         yield attempt(f"free, squares turned by {bias:g} deg", _momentum, _pushed(bias, []))
 
 
-def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> StressScene:
+def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: Any) -> StressScene:  # noqa: ANN401
     """Undamped squares, the middle one pushed and turned within PUSHED, then held."""
     times = np.linspace(0.0, PUSHED, 41)
     share = (1.0 - np.cos(np.pi * times / PUSHED)) / 2.0

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     RandomDesigns,
     StressCase,
@@ -41,7 +41,7 @@ def designs(small: bool) -> Iterator[StressCase]:
     lattice = squares(SIDE)
     draws = RandomDesigns(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
     plate = pressed(lattice, 0.1)
-    touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+    touching = pressed(lattice, 0.1, contact=LAWS["distances"])
     slow = shaken(lattice, Harmonic(4.5, 2.0, 0.8), duration=0.25, frequency=2.0)
     fast = shaken(lattice, Harmonic(2.0, 60.0, 0.8), duration=0.02, frequency=60.0)
     attempts = (
@@ -96,6 +96,6 @@ def _slender(draws: RandomDesigns, seed: int, case: StressScene) -> Sequence[Che
     vertices = draws(seed)
     margin = Check("smallest margin, mm", draws.at_bounds(vertices), AT_BOUNDS)
     made = replace(case, vertices=vertices)
-    if case.scene.static:
+    if case.scene.loads.static:
         return [margin, *equilibria(made, np.array([0.5, 1.0]))]
     return [margin, *motions_as_advised(made, 26, 0.05)]

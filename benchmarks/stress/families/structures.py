@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     NONE,
     Check,
     StressCase,
@@ -24,7 +24,7 @@ from benchmarks.stress import (
     squares,
 )
 from sim.core import Ints
-from sim.scene import evaluator, make_plan
+from sim.scene import Clamp, Evaluator, make_plan
 from sim.solvers import Harmonic, LinearRamp
 from sim.structure import Lattice, quads
 from sim.time_integration import ExplicitSolver, ImplicitSolver
@@ -48,7 +48,7 @@ def sizes(small: bool) -> Iterator[StressCase]:
         wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
         yield attempt(f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, wanted=wanted)
         if max(columns, rows) <= TOUCHING:
-            touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+            touching = pressed(lattice, 0.1, contact=LAWS["distances"])
             yield attempt(
                 f"{name}, contact on distances", equilibria, touching, loads, wanted=wanted
             )
@@ -59,7 +59,7 @@ def sizes(small: bool) -> Iterator[StressCase]:
 
 
 def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
-    duration, asked = case.scene.duration, np.linspace(0.0, case.scene.duration, 6)
+    duration, asked = case.scene.loads.duration, np.linspace(0.0, case.scene.loads.duration, 6)
     if integrator == "explicit":
         return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))
     times = np.linspace(0.0, duration, 41)
@@ -131,7 +131,7 @@ def _odd() -> Iterator[StressCase]:
             f"all units held, {integrator}", motions, moving, ASKED, 0.05, wanted="refusal"
         )
     sliding = pressed(squares(SIDE), 0.04)
-    along = replace(sliding.scene, clamped=3 * 5 * np.arange(5))
+    along = sliding.scene.updated(supports=(Clamp(5 * np.arange(5), ("ux",)),))
     yield attempt("clamped along x alone", equilibria, replace(sliding, scene=along), LOADS)
     alone = posed(quads(1, 1, 15.0, 2.25, 0.3), NONE, [0], LinearRamp(1.0, 1.0), static=True)
     yield attempt("a single unit, driven", equilibria, alone, LOADS, wanted="refusal")
@@ -146,9 +146,9 @@ def _cloak(unit: int, static: bool) -> Sequence[Check]:
         else shaken(lattice, Harmonic(1.0, 2.0, 0.4), duration=0.1, frequency=2.0)
     )
     one = np.array([unit])
-    scene = replace(case.scene, cloak=one, region=one, frozen=NONE, samples=21)
-    scene = replace(scene, objective="strain_energy", steps=2 if static else None)
-    evaluate = evaluator(scene, make_plan(scene))
+    scene = case.scene.updated(cloak=one, region=one, frozen=NONE, samples=21)
+    scene = scene.updated(kind="strain_energy", steps=2 if static else None)
+    evaluate = Evaluator(scene, make_plan(scene))
     direction = np.random.default_rng(unit).normal(size=scene.space.n_variables)
     start = np.zeros(scene.space.n_variables)
     slope = evaluate(start)[1] @ direction
