@@ -8,6 +8,7 @@ PAGES := all fig1 index movies calibrate benchmark
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE)
 OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
 PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
@@ -16,7 +17,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup dev reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -42,6 +43,7 @@ help:
 	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs kills places)"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
 	@echo "make setup     only make .venv from requirements.lock; with WHEELS=folder, from that folder alone"
+	@echo "make dev       the same, with the tools of tests, linters and documentation"
 	@echo "make wheels WHEELS=folder   download what make setup needs into the folder"
 	@echo "make docs      the documentation as a site: results/docs/index.html"
 	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
@@ -49,8 +51,9 @@ help:
 	@echo "make clean     remove results and caches (.venv stays)"
 
 setup: .venv/requirements.lock
+dev: .venv/requirements-dev.lock
 
-# The copy of the lock says what the environment holds; one without it was never finished.
+# The copy of a lock says what the environment holds; one without it was never finished.
 .venv/requirements.lock: requirements.lock
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
 	    echo "error: this needs Python 3.11 or newer, but '$(PYTHON)' is $$($(PYTHON) --version 2>/dev/null || echo not here)." \
@@ -60,77 +63,89 @@ setup: .venv/requirements.lock
 	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE) -r requirements.lock
+	@$(INSTALL) -r requirements.lock
 	@cp requirements.lock $@
+
+.venv/requirements-dev.lock: requirements-dev.lock | setup
+	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (a minute, once)" >&2
+	@rm -f $@
+	@$(INSTALL) -r requirements-dev.lock
+	@cp requirements-dev.lock $@
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
 wheels:
-	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements.lock \
+	@$(PYTHON) -m pip download --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock \
 	    --dest "$(or $(WHEELS),wheels)"
 
 $(STUDIES) $(PAGES): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 # what a lab builds of a study, and what it films: make fig2_fabrication, make fig2_recordings
 $(PRODUCTS): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
-	@exec $(BIN)/python -m pipeline.workflow.run "$$TARGET"
+	@exec $(BIN)/python -m pipeline run "$$TARGET"
 
 reproduce: setup
-	@$(BIN)/python -m pipeline.workflow.reproduce $(STUDY)
+	@$(BIN)/python -m pipeline reproduce $(STUDY)
 
-test: setup
+test: dev
 	$(BIN)/python -m pytest $(PYTEST)
 
 pythons:
 	@.ci/pythons
 
-docs: setup
+docs: dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
-test-slow: setup
+test-slow: dev
 	$(BIN)/python -m pytest tests/slow
 
-clients: setup
+clients: dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients
 
-cluster: setup
+cluster: dev
 	tests/cluster/start.sh
 	$(BIN)/python -m pytest tests/cluster
 
-lint: setup
+lint: dev
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/snakefmt --check $(WORKFLOW)
 	$(BIN)/snakemake --lint
 
-format: setup
+format: dev
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 	$(BIN)/snakefmt $(WORKFLOW)
 
-bench: setup
+bench: dev
 	$(BIN)/python -m benchmarks
 
-bench-tracking: setup
+bench-tracking: dev
 	$(BIN)/python -m benchmarks tracking --videos "$(VIDEOS)"
 
-stress: setup
+stress: dev
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \
 	    $(BIN)/python -m reports.products.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
 
-survive: setup
+survive: dev
 	$(BIN)/python -m tests.hostile $(PARTS)
 
+# Pins that still fit stay; those of the tools agree with those of users.
+LOCK = CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --strip-extras --allow-unsafe \
+    --generate-hashes --no-annotate --no-emit-index-url --no-emit-trusted-host --no-emit-find-links --no-emit-options
+# Extras that name others name the package itself, which no lock has to hold.
+ITSELF := '/^metacloak @/d; /^\# WARNING: pip install will/d; /^\# Consider using a hashable/d'
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }
-	CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --extra dev --strip-extras \
-	    --allow-unsafe --generate-hashes --no-annotate --no-emit-index-url --no-emit-trusted-host \
-	    --no-emit-find-links --no-emit-options --output-file requirements.lock pyproject.toml
+	$(LOCK) --extra all --output-file requirements.lock pyproject.toml
+	sed -i $(ITSELF) requirements.lock
+	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
+	sed -i $(ITSELF) requirements-dev.lock
 
 clean:
 	rm -rf results .cache .snakemake .hypothesis .mypy_cache .pytest_cache .ruff_cache

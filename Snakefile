@@ -6,56 +6,15 @@ import sys
 
 from snakemake.utils import min_version
 
-from pipeline.workflow.calibration_inputs import (
-    calibrations,
-    description,
-    measurements,
-    problems_of,
-)
-from pipeline.workflow.recordings import (
-    compared,
-    comparisons,
-    filmed,
-    recording_pages,
-    tracked,
-)
-from pipeline.runtime.source_closure import source_hash
-from pipeline.workflow.studies import FRAMED, families, figures, joints, movies, targets
-from pipeline.workflow.rule_inputs import (
-    any_of,
-    check_problems,
-    check_room,
-    chunks,
-    comparisons_of,
-)
-from pipeline.workflow.rule_inputs import (
-    copies,
-    datasets_of,
-    designs,
-    hashes_of,
-    member_hashes,
-)
-from pipeline.workflow.rule_inputs import (
-    members,
-    options,
-    packages,
-    prepare_jobs,
-    product_pages,
-)
-from pipeline.workflow.rule_inputs import (
-    robust_designs,
-    section,
-    shown,
-    shown_options,
-    start_design,
-)
+from pipeline.runtime import source_hash
+from pipeline.workflow import calibration_inputs, recordings, rule_inputs, studies
 
 min_version("9.20")
 
 
 if workflow.is_main_process:
-    check_problems(sys.argv[1:])
-prepare_jobs()
+    rule_inputs.check_problems(sys.argv[1:])
+rule_inputs.prepare_jobs()
 
 
 include: "pipeline/rules/targets.smk"

@@ -77,7 +77,7 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
             "the data of this set are computed, and have not been yet",
             file=path,
             key=f"data: {asked.name}",
-            remedy=f"run python -m pipeline.stages.calibrate synthesise {path} --out-dir FOLDER,"
+            remedy=f"run python -m pipeline calibrate synthesise {path} --out-dir FOLDER,"
             " give the calibration.yaml that it writes",
         )
     folder = path.parent

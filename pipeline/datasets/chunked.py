@@ -1,4 +1,4 @@
-"""Stages that work in parts, which are then joined: their command line, and the joining."""
+"""Runs stages that work in parts, and joins the parts."""
 
 from __future__ import annotations
 
@@ -8,27 +8,7 @@ from pathlib import Path
 
 from pipeline import datasets
 from pipeline.datasets.tables import Kind
-from pipeline.runtime import UserError, cli
-
-
-def parser(stage: str, description: str) -> argparse.ArgumentParser:
-    """A command line with the commands `run` (one part) and `gather` (all of them)."""
-    made = cli.parser(stage, description, study=False)
-    commands = made.add_subparsers(dest="command", required=True)
-    run = commands.add_parser("run", help="compute one part", allow_abbrev=False)
-    run.add_argument("--problem", type=Path, required=True, metavar="YAML")
-    run.add_argument("--preset", metavar="NAME")
-    run.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    run.add_argument("--chunk", type=int, required=True, help="number of this part, from zero")
-    run.add_argument("--chunks", type=int, required=True, help="number of parts")
-    run.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
-    gather = commands.add_parser("gather", help="join the parts", allow_abbrev=False)
-    gather.add_argument("--parts", type=Path, nargs="+", required=True, metavar="NC")
-    for command in (run, gather):
-        command.add_argument("--out", type=Path, required=True, metavar="NC")
-        command.add_argument("--log", type=Path, metavar="FILE", default=argparse.SUPPRESS)
-        command.add_argument("--quiet", action="store_true", default=argparse.SUPPRESS)
-    return made
+from pipeline.runtime import UserError
 
 
 def work(

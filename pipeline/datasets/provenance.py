@@ -11,23 +11,22 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.problem import Problem, Stage, canonical_json, section_hash
-from pipeline.runtime import UserError
+from pipeline.problem import Problem, canonical_json, section_hash
+from pipeline.runtime import INSTALLED, ROOT, UserError, version
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
-_ROOT = Path(__file__).resolve().parents[2]
 
 
 def attributes(
     problem: Problem,
-    stage: Stage,
+    stage: str,
     *,
     method: str | None = None,
     parents: Mapping[str, Path] | None = None,
@@ -37,7 +36,7 @@ def attributes(
 
     Args:
         problem: the problem; as much of it as the stage depends on is stored in full.
-        stage: the stage.
+        stage: the stage, by its name in the table.
         method: the optimisation method, where the stage runs only one.
         parents: files that the stage read, by role.
         plan: what was decided and skipped; anything that JSON can hold.
@@ -69,8 +68,9 @@ def recorded(
 
 
 def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
+    written_by = f"version {version()}" if INSTALLED else f"commit {git_commit()}"
     return {
-        "history": f"written by metacloak, commit {git_commit()}",
+        "history": f"written by metacloak, {written_by}",
         "parents": _json({name: file_hash(path) for name, path in parents.items()}),
         "packages": _json(dict(package_versions())),
         "git_commit": git_commit(),
@@ -114,8 +114,8 @@ def package_versions() -> Mapping[str, str]:
     found = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
-        except PackageNotFoundError:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
             found[name] = "absent"
     return found
 
@@ -123,7 +123,9 @@ def package_versions() -> Mapping[str, str]:
 @lru_cache(maxsize=1)
 def git_commit() -> str:
     """The commit of the sources, or "unknown" outside a git checkout."""
-    command = ["git", "-C", str(_ROOT), "rev-parse", "--verify", "HEAD"]
+    if INSTALLED:
+        return "unknown"  # a folder above site-packages may be a checkout of something else
+    command = ["git", "-C", str(ROOT), "rev-parse", "--verify", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
     except (OSError, subprocess.SubprocessError):

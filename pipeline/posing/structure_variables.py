@@ -89,7 +89,7 @@ def read_design(asked: Problem, path: Path) -> xr.Dataset:
     start, found = intact.padded(intact.vertices), design["vertices_initial"].values
     alike = found.shape == start.shape and np.allclose(found, start, atol=_ALIKE, equal_nan=True)
     if not alike or np.isnan(flat_vertices(altered_lattice_of(asked), design["vertices"])).any():
-        remedy = "give a design of this problem: run python -m pipeline.stages.design again"
+        remedy = "give a design of this problem: run python -m pipeline design again"
         raise UserError("the design is of another lattice or void", file=path, remedy=remedy)
     return design
 

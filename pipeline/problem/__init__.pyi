@@ -1,4 +1,3 @@
-from .identity import Stage as Stage
 from .identity import canonical_json as canonical_json
 from .identity import content_hash as content_hash
 from .identity import from_canonical as from_canonical

@@ -4,61 +4,28 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any, Literal
+from typing import Any
 
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.model import Problem
+from pipeline.runtime import STAGES
 
-Stage = Literal[
-    "design",
-    "simulate",
-    "sweep",
-    "scatter",
-    "verify",
-    "geometric",
-    "spectrum",
-    "fabricate",
-    "compare",
-    "report",
-]
-
-_WORDS = ("title", "doc", "report")
-_APART = (*_WORDS, "prediction", "spectrum")
-_UNUSED: dict[Stage, tuple[str, ...]] = {
-    "design": (*_APART, "response", "sweep", "robustness", "fabrication"),
-    "simulate": (*_APART, "sweep", "robustness", "fabrication"),
-    "sweep": (*_APART, "response", "robustness", "fabrication"),
-    "scatter": (*_APART, "response", "sweep", "fabrication"),
-    "verify": (*_APART, "response", "sweep", "robustness", "fabrication"),
-    "geometric": (*_APART, "response", "sweep", "robustness", "fabrication"),
-    "spectrum": (*_WORDS, "prediction", "response", "sweep", "robustness", "fabrication"),
-    "fabricate": (
-        "doc",
-        "report",
-        "solver",
-        "prediction",
-        "spectrum",
-        "response",
-        "sweep",
-        "robustness",
-    ),
-    "compare": (*_WORDS, "spectrum", "response", "sweep", "fabrication"),
-    "report": (),
-}
+REPORT = "report"
+"""What depends on all of a problem: the pages."""
 
 
-def canonical_json(problem: Problem, stage: Stage = "report", method: str | None = None) -> str:
+def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = None) -> str:
     """The problem in working units as JSON with sorted keys: equal problems, equal bytes.
 
     Args:
         problem: the problem.
-        stage: leave out what this stage does not depend on.
+        stage: leave out what this stage of the table does not depend on; `REPORT` needs all.
         method: also leave out the other optimisation methods.
     """
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
-    for name in _UNUSED[stage]:
+    for name in () if stage == REPORT else STAGES[stage].unused or ():
         data.pop(name, None)
-    if stage not in ("geometric", "report"):
+    if stage not in ("redesign", REPORT):
         data["optimiser"].pop("geometric")
     if method is not None:
         methods = data["optimiser"]["methods"]
@@ -77,7 +44,7 @@ def content_hash(problem: Problem) -> str:
     return _sha256(canonical_json(problem))
 
 
-def section_hash(problem: Problem, stage: Stage, method: str | None = None) -> str:
+def section_hash(problem: Problem, stage: str, method: str | None = None) -> str:
     """SHA-256 of what a stage depends on, in hex: equal hashes, no need to run it again."""
     return _sha256(canonical_json(problem, stage, method))
 

@@ -1,12 +1,15 @@
 # Constants of the specimens from measurements; those that are virtual are computed first.
 rule calibrate:
     input:
-        expand("results/calibration/{calibration}/fit.svg", calibration=calibrations()),
+        expand(
+            "results/calibration/{calibration}/fit.svg",
+            calibration=calibration_inputs.calibrations(),
+        ),
 
 
 rule calibrate_synthesise:
     input:
-        unpack(problems_of),
+        unpack(calibration_inputs.problems_of),
         description="experiments/calibration/{calibration}.yaml",
     output:
         directory("results/calibration/{calibration}/data"),
@@ -18,12 +21,12 @@ rule calibrate_synthesise:
     message:
         "Computing measurements for {wildcards.calibration} (synthetic)"
     shell:
-        "python -m pipeline.stages.calibrate synthesise {input.description} --out-dir {output} --log {log}"
+        "python -m pipeline calibrate synthesise {input.description} --out-dir {output} --log {log}"
 
 
 rule calibrate_fit:
     input:
-        unpack(measurements),
+        unpack(calibration_inputs.measurements),
     output:
         dataset="results/calibration/{calibration}/calibration.nc",
         material="results/calibration/{calibration}/calibration.yaml",
@@ -31,12 +34,12 @@ rule calibrate_fit:
         "results/calibration/{calibration}/logs/calibration.log",
     threads: 1
     params:
-        description=description,
+        description=calibration_inputs.description,
         source=source_hash("pipeline.stages.calibrate"),
     message:
         "Finding the constants of {wildcards.calibration}"
     shell:
-        "python -m pipeline.stages.calibrate {params.description} --out {output.dataset} --log {log}"
+        "python -m pipeline calibrate {params.description} --out {output.dataset} --log {log}"
 
 
 rule calibration_figure:

@@ -15,7 +15,7 @@ wildcard_constraints:
 
 
 onstart:
-    check_room("results")
+    rule_inputs.check_room("results")
 
 
 # What was built, and the caches of compiled solvers and plots.

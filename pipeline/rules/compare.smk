@@ -1,7 +1,7 @@
 # What was filmed beside the simulation of it, driven as the specimen was.
 rule compare:
     input:
-        unpack(compared),
+        unpack(recordings.compared),
         problem=ancient("experiments/{name}/problem.yaml"),
         design="results/{name}{preset}/design.nc",
         response="results/{name}{preset}/response.nc",
@@ -12,12 +12,12 @@ rule compare:
         "results/{name}{preset}/logs/compare_{recording}.log",
     threads: 1
     params:
-        study=options,
-        problem=section("compare"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("compare"),
         source=source_hash("pipeline.stages.compare"),
     message:
         "Comparing {wildcards.recording} of {wildcards.name}{wildcards.preset} with its simulation"
     shell:
-        "python -m pipeline.stages.compare {params.study} --design {input.design}"
+        "python -m pipeline compare {params.study} --design {input.design}"
         " --response {input.response} --recording {input.recording} --track {input.track}"
         " --out {output} --log {log}"

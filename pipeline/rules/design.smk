@@ -2,7 +2,7 @@
 rule design:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        start=start_design,
+        start=rule_inputs.start_design,
     output:
         "results/{name}{preset}/design_{method}.nc",
     log:
@@ -12,21 +12,21 @@ rule design:
         mem_mb=4000,
         runtime=480,
     params:
-        study=options,
+        study=rule_inputs.options,
         start=lambda wildcards, input: [f"--start {path}" for path in input.start],
-        problem=section("design"),
+        problem=rule_inputs.section("design"),
         source=source_hash("pipeline.stages.design"),
     message:
         "Designing {wildcards.name}{wildcards.preset} by {wildcards.method}"
     shell:
-        "python -m pipeline.stages.design {params.study} --method {wildcards.method} {params.start}"
+        "python -m pipeline design {params.study} --method {wildcards.method} {params.start}"
         " --out {output} --log {log}"
 
 
 rule select:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        designs=designs,
+        designs=rule_inputs.designs,
     output:
         "results/{name}{preset}/design.nc",
     log:
@@ -34,13 +34,13 @@ rule select:
     localrule: True
     threads: 1
     params:
-        study=options,
-        problem=section("design"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("select"),
         source=source_hash("pipeline.stages.select"),
     message:
         "Choosing the better design of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.select {params.study} --designs {input.designs}"
+        "python -m pipeline select {params.study} --designs {input.designs}"
         " --out {output} --log {log}"
 
 
@@ -59,11 +59,11 @@ rule redesign:
         mem_mb=4000,
         runtime=240,
     params:
-        study=options,
-        problem=section("geometric"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("redesign"),
         source=source_hash("pipeline.stages.redesign"),
     message:
         "Reconsidering {wildcards.name}{wildcards.preset} with contact on distance"
     shell:
-        "python -m pipeline.stages.redesign {params.study} --design {input.design}"
+        "python -m pipeline redesign {params.study} --design {input.design}"
         " --response {input.response} --out {output} --log {log}"

@@ -9,32 +9,32 @@ rule fabricate:
         "results/{name}{preset}/logs/fabricate_{structure}.log",
     threads: 1
     params:
-        study=options,
+        study=rule_inputs.options,
         folder=subpath(output[0], parent=True),
-        problem=section("fabricate"),
+        problem=rule_inputs.section("fabricate"),
         source=source_hash("pipeline.stages.fabricate"),
     message:
         "Drawing what is made of the {wildcards.structure} structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.fabricate {params.study} --design {input.design}"
+        "python -m pipeline fabricate {params.study} --design {input.design}"
         " --structure {wildcards.structure} --out-dir {params.folder} --log {log}"
 
 
 rule fabrication_page:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        packages=packages,
+        packages=rule_inputs.packages,
     output:
         "results/{name}{preset}/fabrication/index.html",
     log:
         "results/{name}{preset}/logs/fabrication_page.log",
     threads: 1
     params:
-        study=options,
+        study=rule_inputs.options,
         folders=lambda wildcards, input: [
             path.rpartition("/")[0] for path in input.packages
         ],
-        problem=section("fabricate"),
+        problem=rule_inputs.section("fabricate"),
         source=source_hash("reports.products.fabrication.build"),
     message:
         "Drawing the page of what is built of {wildcards.name}{wildcards.preset}"

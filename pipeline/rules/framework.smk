@@ -2,8 +2,8 @@
 rule fig1:
     input:
         problem=ancient("experiments/fig2/problem.yaml"),
-        datasets=lambda wildcards: datasets_of(FRAMED),
-        comparisons=lambda wildcards: comparisons_of(FRAMED),
+        datasets=lambda wildcards: rule_inputs.datasets_of(studies.FRAMED),
+        comparisons=lambda wildcards: rule_inputs.comparisons_of(studies.FRAMED),
     output:
         multiext("results/fig1/report/fig1", ".pdf", ".svg", ".png"),
         page="results/fig1/report/index.html",
@@ -12,7 +12,7 @@ rule fig1:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        problem=lambda wildcards: hashes_of(FRAMED),
+        problem=lambda wildcards: rule_inputs.hashes_of(studies.FRAMED),
         source=source_hash("reports.figures.framework.build"),
     message:
         "Drawing the framework"

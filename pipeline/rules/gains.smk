@@ -1,6 +1,6 @@
 rule robust_gains:
     input:
-        unpack(robust_designs),
+        unpack(rule_inputs.robust_designs),
     output:
         "results/{name}/gains.nc",
     log:
@@ -14,7 +14,7 @@ rule robust_gains:
     message:
         "Evaluating what the robust presets of {wildcards.name} gain"
     shell:
-        "python -m pipeline.stages.robust_gains --problem experiments/{wildcards.name}/problem.yaml"
+        "python -m pipeline robust_gains --problem experiments/{wildcards.name}/problem.yaml"
         " --designs {params.designs} --out {output} --log {log}"
 
 

@@ -1,8 +1,10 @@
 # Every figure and movie of the paper, and the page over them.
 rule all:
     input:
-        expand("results/{figure}/report/index.html", figure=["fig1", *figures()]),
-        expand("results/movies/{movie}.mp4", movie=movies()),
+        expand(
+            "results/{figure}/report/index.html", figure=["fig1", *studies.figures()]
+        ),
+        expand("results/movies/{movie}.mp4", movie=studies.movies()),
     output:
         "results/index.html",
     log:

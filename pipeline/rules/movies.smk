@@ -1,8 +1,12 @@
 # The paper's movies, of the studies that there are; every study in full, with its recordings.
 rule movie:
     input:
-        datasets=lambda wildcards: datasets_of(movies()[wildcards.movie]),
-        comparisons=lambda wildcards: comparisons_of(movies()[wildcards.movie]),
+        datasets=lambda wildcards: rule_inputs.datasets_of(
+            studies.movies()[wildcards.movie]
+        ),
+        comparisons=lambda wildcards: rule_inputs.comparisons_of(
+            studies.movies()[wildcards.movie]
+        ),
     output:
         "results/movies/{movie}.mp4",
     log:
@@ -10,9 +14,11 @@ rule movie:
     threads: 1
     params:
         problems=lambda wildcards: [
-            study.problem for study in movies()[wildcards.movie]
+            study.problem for study in studies.movies()[wildcards.movie]
         ],
-        problem=lambda wildcards: hashes_of(movies()[wildcards.movie]),
+        problem=lambda wildcards: rule_inputs.hashes_of(
+            studies.movies()[wildcards.movie]
+        ),
         source=source_hash("reports.products.movie.build"),
     message:
         "Drawing movie {wildcards.movie}"
@@ -23,4 +29,4 @@ rule movie:
 
 rule movies:
     input:
-        expand("results/movies/{movie}.mp4", movie=movies()),
+        expand("results/movies/{movie}.mp4", movie=studies.movies()),

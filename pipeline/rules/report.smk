@@ -1,8 +1,8 @@
 rule report:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        datasets=shown,
-        comparisons=comparisons,
+        datasets=rule_inputs.shown,
+        comparisons=recordings.comparisons,
     output:
         multiext(
             "results/{name}{preset}/report/{name}",
@@ -20,10 +20,10 @@ rule report:
         "results/{name}{preset}/logs/report.log",
     threads: 1
     params:
-        study=options,
-        datasets=shown_options,
+        study=rule_inputs.options,
+        datasets=rule_inputs.shown_options,
         folder=subpath(output.page, parent=True),
-        problem=section("report"),
+        problem=rule_inputs.section("report"),
         source=source_hash("reports.figures.study_report"),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
@@ -36,7 +36,7 @@ rule report:
 rule joint_report:
     input:
         figure=ancient("experiments/{name}/figure.yaml"),
-        datasets=members,
+        datasets=rule_inputs.members,
     output:
         multiext(
             "results/{name}{preset}/report/{name}",
@@ -49,12 +49,14 @@ rule joint_report:
     log:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
-        name=any_of(figure for figure in joints() if "@" not in figure),
+        name=rule_inputs.any_of(
+            figure for figure in studies.joints() if "@" not in figure
+        ),
     threads: 1
     params:
         preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),
         folder=subpath(output.page, parent=True),
-        problem=member_hashes,
+        problem=rule_inputs.member_hashes,
         source=source_hash("reports.figures.several_studies.build"),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
@@ -67,7 +69,7 @@ rule joint_report:
 rule family_report:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),
-        datasets=members,
+        datasets=rule_inputs.members,
     output:
         multiext(
             "results/{name}{preset}/report/{name}",
@@ -80,13 +82,15 @@ rule family_report:
     log:
         "results/{name}{preset}/logs/report.log",
     wildcard_constraints:
-        name=any_of(study.name for study, designs in families().items() if designs),
+        name=rule_inputs.any_of(
+            study.name for study, designs in studies.families().items() if designs
+        ),
         preset=r"(@[A-Za-z_]\w*)?",
     threads: 1
     params:
-        study=options,
+        study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
-        problem=member_hashes,
+        problem=rule_inputs.member_hashes,
         source=source_hash("reports.figures.several_designs.build"),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"

@@ -15,20 +15,20 @@ rule monte_carlo:
         mem_mb=2000,
         runtime=240,
     params:
-        study=options,
-        chunks=lambda wildcards: len(copies(wildcards, MOST_PARTS)),
-        problem=section("scatter"),
+        study=rule_inputs.options,
+        chunks=lambda wildcards: len(rule_inputs.copies(wildcards, MOST_PARTS)),
+        problem=rule_inputs.section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Simulating imperfect copies of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.stages.monte_carlo run {params.study} --design {input.design}"
+        "python -m pipeline monte_carlo run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
 rule monte_carlo_gather:
     input:
-        lambda wildcards: copies(wildcards, MOST_PARTS),
+        lambda wildcards: rule_inputs.copies(wildcards, MOST_PARTS),
     output:
         "results/{name}{preset}/scatter.nc",
     log:
@@ -36,12 +36,12 @@ rule monte_carlo_gather:
     localrule: True
     threads: 1
     params:
-        problem=section("scatter"),
+        problem=rule_inputs.section("monte_carlo"),
         source=source_hash("pipeline.stages.monte_carlo"),
     message:
         "Joining the imperfect copies of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.monte_carlo gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline monte_carlo gather --parts {input} --out {output} --log {log}"
 
 
 # Not what the design depends on: finer steps of load or time, the other contact law.
@@ -55,11 +55,11 @@ rule verify:
         "results/{name}{preset}/logs/verification.log",
     threads: 1
     params:
-        study=options,
-        problem=section("verify"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("verify"),
         source=source_hash("pipeline.stages.verify"),
     message:
         "Checking steps and contact of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.verify {params.study} --design {input.design}"
+        "python -m pipeline verify {params.study} --design {input.design}"
         " --out {output} --log {log}"

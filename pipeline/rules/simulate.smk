@@ -11,12 +11,12 @@ rule simulate:
         mem_mb=4000,
         runtime=60,
     params:
-        study=options,
+        study=rule_inputs.options,
         law=lambda wildcards: "--geometric" if wildcards.law else "",
-        problem=section("simulate"),
+        problem=rule_inputs.section("simulate"),
         source=source_hash("pipeline.stages.simulate"),
     message:
         "Simulating the altered and the cloaked structure of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.simulate {params.study} {params.law} --design {input.design}"
+        "python -m pipeline simulate {params.study} {params.law} --design {input.design}"
         " --out {output} --log {log}"

@@ -8,13 +8,13 @@ rule spectrum:
         "results/{name}{preset}/logs/spectrum.log",
     threads: 1
     params:
-        study=options,
-        problem=section("spectrum"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("spectrum"),
         source=source_hash("pipeline.stages.spectrum"),
     message:
         "Analysing small vibrations of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.spectrum {params.study} --design {input.design}"
+        "python -m pipeline spectrum {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 
@@ -33,9 +33,9 @@ rule spectrum_page:
         "results/{name}{preset}/logs/spectrum_page.log",
     threads: 1
     params:
-        study=options,
+        study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
-        problem=section("spectrum"),
+        problem=rule_inputs.section("spectrum"),
         source=source_hash("reports.products.spectrum.build"),
     message:
         "Drawing modes, transmission and waves of {wildcards.name}{wildcards.preset}"

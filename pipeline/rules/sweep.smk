@@ -15,20 +15,20 @@ rule sweep:
         mem_mb=2000,
         runtime=240,
     params:
-        study=options,
-        chunks=lambda wildcards: len(chunks(wildcards, MOST_CHUNKS)),
-        problem=section("sweep"),
+        study=rule_inputs.options,
+        chunks=lambda wildcards: len(rule_inputs.chunks(wildcards, MOST_CHUNKS)),
+        problem=rule_inputs.section("sweep"),
         source=source_hash("pipeline.stages.sweep"),
     message:
         "Sweeping parameters of {wildcards.name}{wildcards.preset}, part {wildcards.chunk}"
     shell:
-        "python -m pipeline.stages.sweep run {params.study} --design {input.design}"
+        "python -m pipeline sweep run {params.study} --design {input.design}"
         " --chunk {wildcards.chunk} --chunks {params.chunks} --out {output} --log {log}"
 
 
 rule sweep_gather:
     input:
-        lambda wildcards: chunks(wildcards, MOST_CHUNKS),
+        lambda wildcards: rule_inputs.chunks(wildcards, MOST_CHUNKS),
     output:
         "results/{name}{preset}/sweep.nc",
     log:
@@ -36,12 +36,12 @@ rule sweep_gather:
     localrule: True
     threads: 1
     params:
-        problem=section("sweep"),
+        problem=rule_inputs.section("sweep"),
         source=source_hash("pipeline.stages.sweep"),
     message:
         "Joining the parts of the sweep of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.sweep gather --parts {input} --out {output} --log {log}"
+        "python -m pipeline sweep gather --parts {input} --out {output} --log {log}"
 
 
 rule sweep_page:
@@ -57,9 +57,9 @@ rule sweep_page:
         "results/{name}{preset}/logs/sweep_page.log",
     threads: 1
     params:
-        study=options,
+        study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
-        problem=section("report"),
+        problem=rule_inputs.section("report"),
         source=source_hash("reports.products.sweep.build"),
     message:
         "Drawing the sweep of {wildcards.name}{wildcards.preset}"

@@ -1,5 +1,5 @@
 # What `snakemake TARGET` may ask for: every study with its presets, every figure of several.
-for target, built in targets().items():
+for target, built in studies.targets().items():
 
     rule:
         name:
@@ -11,28 +11,28 @@ for target, built in targets().items():
         name:
             f"{target}_fabrication"
         input:
-            product_pages(built, "fabrication"),
+            rule_inputs.product_pages(built, "fabrication"),
 
     rule:
         name:
             f"{target}_spectrum"
         input:
-            product_pages(built, "spectrum"),
+            rule_inputs.product_pages(built, "spectrum"),
 
     rule:
         name:
             f"{target}_sweep"
         input:
-            product_pages(built, "sweep"),
+            rule_inputs.product_pages(built, "sweep"),
 
     rule:
         name:
             f"{target}_recordings"
         input:
-            recording_pages(built),
+            recordings.recording_pages(built),
 
 
-for study in sorted({built.partition("@")[0] for built in targets().values()}):
+for study in sorted({built.partition("@")[0] for built in studies.targets().values()}):
 
     rule:
         name:

@@ -11,20 +11,20 @@ rule virtual_specimen:
         "results/{name}{preset}/logs/specimen_{recording}.log",
     threads: 1
     params:
-        study=options,
-        problem=section("simulate"),
+        study=rule_inputs.options,
+        problem=rule_inputs.section("virtual_specimen"),
         source=source_hash("pipeline.stages.virtual_specimen"),
     message:
         "Simulating the specimen of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.virtual_specimen {input.recording} {params.study} --design {input.design}"
+        "python -m pipeline virtual_specimen {input.recording} {params.study} --design {input.design}"
         " --out {output} --log {log}"
 
 
 rule film_weigh:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
-        response=filmed,
+        response=recordings.filmed,
     output:
         "results/{name}{preset}/recordings/{recording}_load.csv",
     log:
@@ -35,7 +35,7 @@ rule film_weigh:
     message:
         "Weighing {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.stages.film weigh {input.recording} --response {input.response}"
+        "python -m pipeline film weigh {input.recording} --response {input.response}"
         " --out {output} --log {log}"
 
 
@@ -43,7 +43,7 @@ rule film_render:
     input:
         recording="experiments/{name}/recordings/{recording}.yaml",
         design="results/{name}{preset}/design.nc",
-        response=filmed,
+        response=recordings.filmed,
     output:
         video="results/{name}{preset}/recordings/{recording}.mp4",
         recording="results/{name}{preset}/recordings/{recording}.yaml",
@@ -56,13 +56,13 @@ rule film_render:
     message:
         "Rendering {wildcards.recording} of {wildcards.name}{wildcards.preset} (synthetic)"
     shell:
-        "python -m pipeline.stages.film render {input.recording} --design {input.design}"
+        "python -m pipeline film render {input.recording} --design {input.design}"
         " --response {input.response} --out {output.video} --log {log}"
 
 
 rule track:
     input:
-        unpack(tracked),
+        unpack(recordings.tracked),
     output:
         track="results/{name}{preset}/recordings/{recording}/track.nc",
         table="results/{name}{preset}/recordings/{recording}/track.csv",
@@ -74,13 +74,13 @@ rule track:
     message:
         "Tracking {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline.stages.track {input.recording} --design {input.design}"
+        "python -m pipeline track {input.recording} --design {input.design}"
         " --out {output.track} --no-report --log {log}"
 
 
 rule track_report:
     input:
-        unpack(tracked),
+        unpack(recordings.tracked),
         track="results/{name}{preset}/recordings/{recording}/track.nc",
     output:
         page="results/{name}{preset}/recordings/{recording}/index.html",

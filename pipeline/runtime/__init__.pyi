@@ -10,8 +10,17 @@ from .environment import pin as pin
 from .errors import UserError as UserError
 from .errors import found_in as found_in
 from .errors import refusal as refusal
+from .locations import BUILD as BUILD
+from .locations import INSTALLED as INSTALLED
+from .locations import PREFIX as PREFIX
 from .locations import ROOT as ROOT
+from .locations import WORK as WORK
+from .locations import version as version
+from .old_commands import keep_old_commands as keep_old_commands
 from .pixel_loops import Picture as Picture
 from .pixel_loops import compiled as compiled
 from .pixel_loops import inlined as inlined
 from .source_closure import source_hash as source_hash
+from .stage_table import REPORTED as REPORTED
+from .stage_table import STAGES as STAGES
+from .stage_table import Stage as Stage

@@ -1,8 +1,4 @@
-"""The frame of every stage's command line: options, logs, and errors that people can read.
-
-A stage's `main` is `return cli.run(work, parser(), argv)`; what `work` needs beyond the standard
-library it imports itself, so that --help is instant.
-"""
+"""The frame of every command line: options, logs, and errors that people can read."""
 
 from __future__ import annotations
 
@@ -10,7 +6,7 @@ import argparse
 import logging
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -18,41 +14,74 @@ from types import FrameType
 from pipeline.runtime import streams
 from pipeline.runtime.errors import UserError, refusal
 from pipeline.runtime.progress import Progress as progress  # noqa: N813  (reads as a verb at its callers)
+from pipeline.runtime.stage_table import PROBLEM, Option, Stage, option
 
-__all__ = ["parser", "progress", "run"]
+__all__ = ["command_line", "parser", "progress", "run"]
 
 Work = Callable[[argparse.Namespace], None]
 
 LOG = logging.getLogger(__name__)
-_ROOMS = ("sim", "pipeline", "reports", "__main__")  # a stage that is run has the last name
+_ROOMS = ("sim", "pipeline", "reports", "metacloak", "__main__")
+
+_PROGRAM = "python -m pipeline"
+_COMMON = (
+    option("--log", type=Path, metavar="FILE", help="also write messages to this file"),
+    option("--quiet", action="store_true", help="print nothing but errors"),
+)
 
 
-def parser(stage: str, description: str, *, study: bool = True) -> argparse.ArgumentParser:
-    """A command line for `python -m <stage>` with the options that all stages share.
+def parser(command: str, description: str, *, study: bool = True) -> argparse.ArgumentParser:
+    """Makes a command line with the options that all commands share.
 
     Args:
-        stage: the module's name.
+        command: what is typed, after `python -m`.
         description: what it reads, does and writes.
         study: whether it wants --problem and --preset.
     """
+    return _framed(f"python -m {command}", description, study=study)
+
+
+def _framed(program: str, description: str, *, study: bool) -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
-        prog=f"python -m {stage}",
+        prog=program,
         description=description,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    if study:
-        made.add_argument(
-            "--problem", type=Path, required=True, metavar="YAML", help="the problem file"
-        )
-        made.add_argument("--preset", metavar="NAME", help="one of the presets in the problem file")
-    made.add_argument("--log", type=Path, metavar="FILE", help="also write messages to this file")
-    made.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    _add(made, (*(PROBLEM if study else ()), *_COMMON))
     return made
 
 
+def command_line(stage: Stage) -> argparse.ArgumentParser:
+    """Makes the command line of a stage from its row of the table."""
+    does = f"{stage.does[0].upper()}{stage.does[1:]}."
+    study = stage.unused is not None and not stage.parts
+    made = _framed(f"{_PROGRAM} {stage.name}", f"{does}\n\n{stage.about}".strip(), study=study)
+    for name in stage.inputs:
+        made.add_argument(f"--{name}", type=Path, required=True, metavar="NC", help="to read")
+    _add(made, stage.options)
+    if stage.threads:
+        told = f"{stage.threads} simulated side by side"
+        made.add_argument("--threads", type=int, default=1, help=told)
+    if stage.parts:
+        commands = made.add_subparsers(dest="command", required=True)
+        for name, options in stage.parts.items():
+            part = commands.add_parser(name, allow_abbrev=False)
+            _add(part, options)
+            for common in _COMMON:  # also after the command
+                part.add_argument(
+                    *common.names, **{**common.settings, "default": argparse.SUPPRESS}
+                )
+    return made
+
+
+def _add(made: argparse.ArgumentParser, options: Iterable[Option]) -> None:
+    for each in options:
+        made.add_argument(*each.names, **each.settings)
+
+
 def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = None) -> int:
-    """Parse the command line, do the work, and tell of errors in words.
+    """Parses the command line, does the work, and tells of errors in words.
 
     Returns:
         The exit code: 0 done, 2 a mistake in the input, 1 the machine refused or there is a bug,
@@ -71,35 +100,32 @@ def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = 
 def _guarded(work: Work, args: argparse.Namespace) -> int:
     try:
         work(args)
-    except UserError as error:
-        LOG.error("error: %s", error)
-        return 2
     except KeyboardInterrupt:
         LOG.error("interrupted: run the same command again to finish")
         return 130
-    except OSError as error:
-        LOG.error("error: %s", refusal(error.filename or ".", error))
-        _keep_traceback(args.log)
-        return 1
-    except MemoryError:
-        remedy = "ask for fewer samples, cases or units, or take a machine with more of it"
-        LOG.error("error: %s", UserError("the memory is full", remedy=remedy))
-        _keep_traceback(args.log)
-        return 1
-    except Exception as error:
-        if args.log is None:
-            LOG.exception("error: a bug: %s: %s", type(error).__name__, error)
-        else:
-            where = f"its traceback is in {args.log}"
-            LOG.error("error: a bug: %s: %s; %s", type(error).__name__, error, where)
-            _keep_traceback(args.log)
-        return 1
+    except Exception as error:  # noqa: BLE001  (told, and kept in the log)
+        return _told(error, args.log)
     return 0
 
 
-def _keep_traceback(log: Path | None) -> None:
+def _told(error: Exception, log: Path | None) -> int:
+    """Tells of an error in words, and returns the exit code."""
+    if isinstance(error, UserError):
+        LOG.error("error: %s", error)
+        return 2
+    if isinstance(error, OSError):
+        LOG.error("error: %s", refusal(error.filename or ".", error))
+    elif isinstance(error, MemoryError):
+        remedy = "ask for fewer samples, cases or units, or take a machine with more of it"
+        LOG.error("error: %s", UserError("the memory is full", remedy=remedy))
+    elif log is None:
+        LOG.error("error: a bug: %s: %s", type(error).__name__, error, exc_info=error)
+    else:
+        where = f"its traceback is in {log}"
+        LOG.error("error: a bug: %s: %s; %s", type(error).__name__, error, where)
     if log is not None:
-        LOG.debug("traceback", exc_info=True)
+        LOG.debug("traceback", exc_info=error)
+    return 1
 
 
 @contextmanager

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline import datasets
@@ -13,31 +11,10 @@ from pipeline.calibration import calibration_dataset, computed_sets, fitted, uns
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets import provenance
 from pipeline.problem.reading import section
-from pipeline.runtime import UserError, cli, write_atomically
+from pipeline.runtime import UserError, write_atomically
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
-
-DESCRIPTION = """\
-Find stiffness and damping of a specimen from measurements.
-
-  python -m pipeline.stages.calibrate CALIBRATION.yaml --out NC
-  python -m pipeline.stages.calibrate synthesise CALIBRATION.yaml --out-dir FOLDER
-
-The first writes the constants with their errors to NC, and beside it a YAML of the same name: the
-lines that a problem file takes. The second computes the sets that the calibration calls virtual,
-and writes them with a calibration.yaml that names them, which the first then takes. These are
-labelled SYNTHETIC.
-"""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.calibrate", DESCRIPTION, study=False)
-    made.add_argument("words", nargs="+", metavar="[COMMAND] FILE", help="what to read")
-    made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
-    made.add_argument("--out-dir", type=Path, metavar="FOLDER", help="of the computed files")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -83,16 +60,7 @@ def _synthesise(path: Path, args: argparse.Namespace) -> None:
 
     asked = section(path, Calibration)
     if asked.virtual is None:
-        remedy = "its data are measured: run python -m pipeline.stages.calibrate FILE --out NC"
+        remedy = "its data are measured: run python -m pipeline calibrate FILE --out NC"
         raise UserError("nothing is virtual here", file=path, key="virtual", remedy=remedy)
     computed_sets.write(asked, path, args.out_dir)
     LOG.info("%s: %s", computed_sets.LABEL, args.out_dir / computed_sets.YAML)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,9 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +24,7 @@ from pipeline.comparison import (
 )
 from pipeline.datasets import provenance
 from pipeline.posing import read_design, scene_of, structures_of
-from pipeline.runtime import UserError, cli
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built
 from pipeline.virtual_lab import of_structure
@@ -40,28 +37,6 @@ if TYPE_CHECKING:
     from pipeline.tracking.frames import Recording
 
 LOG = logging.getLogger(__name__)
-
-DESCRIPTION = """\
-Compare a recording with the simulation of what it shows.
-
-The track is brought into the design's frame and onto the time (or load) of the response by its
-drive; the design is simulated under the measured motion of the units that supports and drive hold,
-with imperfect copies for a band about it; both sides meet at the frames of the track.
-"""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.compare", DESCRIPTION)
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the study's design")
-    made.add_argument("--response", type=Path, required=True, metavar="NC", help="its response")
-    made.add_argument(
-        "--recording", type=Path, required=True, metavar="YAML", help="what was filmed"
-    )
-    made.add_argument("--track", type=Path, required=True, metavar="NC", help="its track")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    made.add_argument("--threads", type=int, default=1, help="copies simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -169,12 +144,3 @@ def _tell(told: xr.Dataset) -> None:
         json.dumps([round(100 * float(each), 1) for each in apart]),
         json.dumps([round(float(each), 4) for each in alike]),
     )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

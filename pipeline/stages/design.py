@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,10 +30,8 @@ from sim.optimise import (
     JournalInUseError,
     MmaOptions,
     SqpOptions,
-    minimise,
 )
-from sim.quasistatics import StaticSolver
-from sim.scene import Evaluator, Paths, make_plan
+from sim.scene import Paths, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 if TYPE_CHECKING:
@@ -44,28 +39,10 @@ if TYPE_CHECKING:
 
     from pipeline.problem import Problem
     from sim.core import Floats
-    from sim.optimise import Evaluate, Evaluation, MmaOptions, Result, SqpOptions
+    from sim.optimise import Evaluation, MmaOptions, Result, SqpOptions
     from sim.scene import Plan, Scene
 
 LOG = logging.getLogger(__name__)
-
-CONFIRMING = 4
-"""Loads passed for each of the loss when a design's loss is confirmed."""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.design",
-        "Optimise the cloak of a problem by one method; every evaluation goes to a journal, from"
-        " which the same command resumes after any kind of end.",
-    )
-    made.add_argument("--method", required=True, choices=("sqp", "mma"), help="optimisation method")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    told = "the design to start from, where the problem has optimiser.start: study"
-    made.add_argument("--start", type=Path, metavar="NC", help=told)
-    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -124,8 +101,6 @@ def optimise(
 
     It starts from the initial lattice, or from the design vector ``start`` (n_variables,).
     """
-    import numpy as np
-
     budget = asked.optimiser.methods.chosen.get(method)
     if budget is None:
         raise UserError(
@@ -134,15 +109,12 @@ def optimise(
             key="optimiser.methods",
             remedy=f"add optimiser.methods.{method}.evaluations",
         )
-    constraints = ConstraintVector(scene.space, limits_of(asked))
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
-    paths = Paths(folder / f"{method}.paths")
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
 
         def show(evaluation: Evaluation) -> None:
-            paths.accept(evaluation)
             bar.update(loss=evaluation.loss, violation=evaluation.violation)
 
         try:
@@ -150,31 +122,23 @@ def optimise(
                 folder / f"{method}.journal", f"{key} {source_hash('pipeline.stages.design')}"
             ) as journal:
                 return minimise(
-                    method,  # type: ignore[arg-type]
-                    journal.wrap(Evaluator(scene, plan, paths)),
-                    constraints,
-                    np.zeros(scene.space.n_variables) if start is None else start,
+                    scene,
+                    limits_of(asked),
+                    start,
                     options=_options(asked, method),
+                    plan=plan,
+                    journal=journal,
+                    paths=Paths(folder / f"{method}.paths"),
                     callback=show,
-                    confirm=_from_rest(scene, plan),
                 )
         except InfeasibleStartError as error:
+            constraints = ConstraintVector(scene.space, limits_of(asked))
             raise failures.infeasible(error, constraints, source) from error
         except SimulationError as error:
             tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
             raise failures.unsolved(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
-
-
-def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
-    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
-
-    A path that starts from that of a similar design, or steps far, may pass where it should end.
-    """
-    if not isinstance(plan.solver, StaticSolver):
-        return None
-    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
@@ -244,12 +208,3 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     for name in ("loss", "loss_case", "best_loss"):
         made[name].attrs["units"] = loss_units(asked)
     return made
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

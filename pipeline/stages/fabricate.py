@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 import shutil
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -23,17 +22,6 @@ from pipeline.runtime import cli, refusal
 LOG = logging.getLogger(__name__)
 
 STRUCTURES = ("intact", "altered", "cloaked")
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.fabricate", "Write drawings, meshes and papers of a structure."
-    )
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--structure", choices=STRUCTURES, required=True, help="what to build")
-    made.add_argument("--out-dir", type=Path, required=True, metavar="DIR", help="the package")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -93,12 +81,3 @@ def _aside(folder: Path) -> Iterator[Path]:
     finally:
         shutil.rmtree(room, ignore_errors=True)
         shutil.rmtree(former, ignore_errors=True)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

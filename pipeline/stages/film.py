@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 import logging
 import os
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,50 +33,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 SYNTHETIC = f"{WORD}: rendered from a simulation, not filmed"
-DESCRIPTION = """\
-Film a simulated response.
-
-  python -m pipeline.stages.film render RECORDING.yaml --response NC --design NC --out VIDEO.mp4
-  python -m pipeline.stages.film weigh RECORDING.yaml --response NC --out LOAD.csv
-  python -m pipeline.stages.film plan [RECORDING.yaml] --response NC [choices]
-
-The first writes the video, beside it VIDEO.yaml, which pipeline.stages.track takes, and
-VIDEO_truth.nc.
-The second writes the log of the recording's load cell, which is to lie beside the video as
-VIDEO_load.csv. Of a recording that has a specimen, both take what pipeline.stages.virtual_specimen
-wrote for the
-response. The third renders short clips with each of the choices, tracks them, and tells what noise
-to expect. Choices that are given several values are tried in every combination.
-"""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.film", DESCRIPTION, study=False)
-    commands = made.add_subparsers(dest="command", required=True)
-    render = commands.add_parser("render", help="write a video", allow_abbrev=False)
-    render.add_argument("recording", type=Path, metavar="RECORDING.yaml")
-    render.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    render.add_argument("--out", type=Path, required=True, metavar="VIDEO", help="*.mp4 or *.mkv")
-    weigh = commands.add_parser("weigh", help="write a load cell's log", allow_abbrev=False)
-    weigh.add_argument("recording", type=Path, metavar="RECORDING.yaml")
-    weigh.add_argument("--out", type=Path, required=True, metavar="CSV", help="the log")
-    plan = commands.add_parser("plan", help="what noise to expect", allow_abbrev=False)
-    plan.add_argument("recording", type=Path, nargs="?", metavar="RECORDING.yaml")
-    plan.add_argument("--structure", choices=("intact", "altered", "cloaked"))
-    plan.add_argument("--case", type=int, help="number of the load case")
-    plan.add_argument("--frames", type=int, default=24, help="of each clip (24)")
-    plan.add_argument("--specimen", nargs="+", choices=("dots", "speckle", "bare"))
-    plan.add_argument("--pixels-per-pitch", type=float, nargs="+", metavar="PX")
-    plan.add_argument("--fps", type=float, nargs="+", metavar="HZ")
-    plan.add_argument("--codec", nargs="+", metavar="NAME", help="ffv1, h264, h264-intra, h264:28")
-    plan.add_argument("--marker", type=float, nargs="+", metavar="MM", help="diameter of the dots")
-    plan.add_argument("--csv", type=Path, metavar="FILE", help="also write the table to this file")
-    for command in (render, weigh, plan):
-        command.add_argument("--response", type=Path, required=True, metavar="NC")
-        command.add_argument("--log", type=Path, metavar="FILE", default=argparse.SUPPRESS)
-        command.add_argument("--quiet", action="store_true", default=argparse.SUPPRESS)
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -153,7 +107,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
     comments = (
         SYNTHETIC,
-        "Written by pipeline.stages.film; python -m pipeline.stages.track takes it.",
+        "Written by the stage film; python -m pipeline track takes it.",
     )
     with write_atomically(out.with_suffix(".yaml")) as aside:
         text = recordings.text(_described(asked, virtual, out, design), comments)
@@ -178,9 +132,7 @@ def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     """A recording and how it is rendered."""
     asked = recordings.load(path)
     if asked.virtual is None:
-        remedy = (
-            "track it (python -m pipeline.stages.track), or say under `virtual` how to render it"
-        )
+        remedy = "track it (python -m pipeline track), or say under `virtual` how to render it"
         raise UserError("a recording that was filmed", file=path, key="video", remedy=remedy)
     return asked, asked.virtual
 
@@ -212,12 +164,3 @@ def _described(
         "load_cell": log,
         "synthetic": True,
     }
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

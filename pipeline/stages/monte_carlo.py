@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 
 import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
 from pipeline.posing import flat_vertices, perturbed, read_design, scene_of
-from pipeline.runtime import UserError, cli
+from pipeline.runtime import UserError
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    return chunked.parser("pipeline.stages.monte_carlo", "Simulate imperfect copies of a design.")
 
 
 def work(args: argparse.Namespace) -> None:
@@ -44,14 +37,5 @@ def _run(args: argparse.Namespace) -> None:
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}
-    origin = provenance.attributes(asked, "scatter", parents=parents)
+    origin = provenance.attributes(asked, "monte_carlo", parents=parents)
     datasets.write(made, args.out, "scatter", origin)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

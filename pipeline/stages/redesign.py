@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +12,6 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import design_scene, law_comparison, read_design, shipped_vector
 from pipeline.problem.sections import Method, Methods
-from pipeline.runtime import cli
 from pipeline.stages.design import design_dataset, optimise
 from pipeline.stages.select import join
 from sim.scene import make_plan
@@ -26,20 +22,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 METHOD = "sqp"
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.redesign",
-        "Evaluate a design with contact on distance; optimise it again, from there, if its loss"
-        " is another under that law. Every evaluation goes to a journal, as in the stage design.",
-    )
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--response", type=Path, required=True, metavar="NC", help="its response")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    made.add_argument("--threads", type=int, default=1, help="load cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -66,7 +48,7 @@ def work(args: argparse.Namespace) -> None:
     LOG.info("stopped: %s", result.reason)
     made = join({METHOD: design_dataset(posed, scene, result)}, METHOD)
     parents = {"design": args.design, "response": args.response}
-    origin = provenance.attributes(asked, "geometric", parents=parents, plan=plan.record())
+    origin = provenance.attributes(asked, "redesign", parents=parents, plan=plan.record())
     datasets.write(made, args.out, "design", origin)
 
 
@@ -75,12 +57,3 @@ def again(asked: Problem, evaluations: int) -> Problem:
     methods = Methods(sqp=Method(evaluations=evaluations))
     optimiser = asked.optimiser.model_copy(update={"methods": methods})
     return law_comparison.geometric(asked).model_copy(update={"optimiser": optimiser})
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

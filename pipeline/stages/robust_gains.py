@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -40,19 +39,6 @@ class Gain(NamedTuple):
     price: float
 
 
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.robust_gains",
-        "Evaluate the loss of every preset that asks for more than the study's own drive at the"
-        " study's own design and at the preset's.",
-    )
-    told = "the study's own design as plain=NC, and one for each preset"
-    made.add_argument("--designs", nargs="+", required=True, metavar="PRESET=NC", help=told)
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
-
-
 def work(args: argparse.Namespace) -> None:
     """Reads the designs, evaluates them, writes the gains.
 
@@ -66,7 +52,7 @@ def work(args: argparse.Namespace) -> None:
         remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
         raise UserError(what, key="--designs", remedy=remedy)
     made = gains(args.problem, given)
-    origin = provenance.attributes(problem.load(args.problem), "design", parents=given)
+    origin = provenance.attributes(problem.load(args.problem), "robust_gains", parents=given)
     datasets.write(made, args.out, "gains", origin)
 
 
@@ -145,12 +131,3 @@ def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
     from sim.scene import make_plan, simulate
 
     return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

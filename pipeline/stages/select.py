@@ -4,27 +4,16 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.runtime import UserError, cli
+from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.select", "Choose the feasible design with the lower loss.")
-    made.add_argument("--designs", type=Path, nargs="+", required=True, metavar="NC")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -55,7 +44,7 @@ def work(args: argparse.Namespace) -> None:
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)
     parents = {path.stem: path for path in args.designs}
-    origin = provenance.attributes(asked, "design", parents=parents, plan={"shipped": best})
+    origin = provenance.attributes(asked, "select", parents=parents, plan={"shipped": best})
     datasets.write(join(designs, best), args.out, "design", origin)
 
 
@@ -79,12 +68,3 @@ def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:
     joined = designs[best].drop_vars(["evaluation", *history]).merge(whole)
     joined.attrs = {"shipped_method": best}
     return joined
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

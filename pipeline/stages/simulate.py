@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,16 +35,6 @@ if TYPE_CHECKING:
     from sim.scene import Scene
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.simulate", "Simulate the structures of a design.")
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    made.add_argument("--geometric", action="store_true", help="with contact on distance")
-    made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -154,12 +142,3 @@ def measured_cases(
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
     return measured, plans
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -48,16 +47,6 @@ class Vibrations(NamedTuple):
     frequency: Floats
     mode_shape: Floats
     transmission: Floats
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.spectrum", "Analyse small vibrations of a design's structures."
-    )
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -179,12 +168,3 @@ def _transmission(
     excited = 2 * np.pi * np.linspace(band.start, band.stop, band.points)
     moved = transmission(made, drives, excited)[:, :, scene.objective.region, :2]
     return np.asarray(np.sqrt((np.abs(moved) ** 2).sum(axis=-1).mean(axis=-1)).T)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import hashlib
 import logging
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -26,13 +25,6 @@ if TYPE_CHECKING:
     from pipeline.runtime import Casebook, SweepResult
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    return chunked.parser(
-        "pipeline.stages.sweep", "Simulate a design at many settings of parameters."
-    )
 
 
 def work(args: argparse.Namespace) -> None:
@@ -137,12 +129,3 @@ def dataset(
     for name in ("loss", "loss_altered"):
         made[name].attrs["units"] = loss_units(asked)
     return made
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,6 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,7 @@ import numpy as np
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.runtime import UserError, cli, found_in, write_atomically
+from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
     WORD,
     frames,
@@ -42,34 +41,6 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-DESCRIPTION = """\
-Track the units of a specimen through a video.
-
-  python -m pipeline.stages.track RECORDING.yaml --out track.nc [--design NC]
-  python -m pipeline.stages.track init VIDEO --design NC [--pixel-size MM] [--out-dir FOLDER]
-  python -m pipeline.stages.track points POINTS.yaml --out track.nc [--design NC]
-  python -m pipeline.stages.track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
-
-The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
-The second proposes a recording YAML, draws the units that it found on the first frame, and says
-what it could not tell. The third reads the points of a commercial DIC system, a CSV that the YAML
-names, instead of a video. The fourth writes NAME_recording.yaml and NAME_design.nc for a described
-test video, which the first then tracks.
-"""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.stages.track", DESCRIPTION, study=False)
-    made.add_argument("words", nargs="+", metavar="[COMMAND] FILE", help="what to read")
-    made.add_argument("--out", type=Path, metavar="NC", help="dataset to write")
-    made.add_argument("--design", type=Path, metavar="NC", help="where the YAML names none")
-    made.add_argument("--no-report", action="store_true", help="neither overlay nor quality page")
-    made.add_argument("--video", type=Path, metavar="FILE", help="import: the video")
-    made.add_argument("--pixel-size", type=float, metavar="MM", help="init: roughly")
-    made.add_argument("--out-dir", type=Path, default=Path(), metavar="FOLDER", help="of the files")
-    return made
-
 
 def work(args: argparse.Namespace) -> None:
     """Imports a description, or tracks a recording.
@@ -84,7 +55,7 @@ def work(args: argparse.Namespace) -> None:
         raise UserError("no such command", value=name, remedy=remedy)
     wanted = {"": "out", "points": "out", "init": "design"}.get(name)
     if wanted is not None and getattr(args, wanted) is None:
-        usage = f"python -m pipeline.stages.track {name} {file}".replace("  ", " ")
+        usage = f"python -m pipeline track {name} {file}".replace("  ", " ")
         remedy = f"{usage} --{wanted} FILE.nc; see --help"
         raise UserError(f"--{wanted} is wanted", remedy=remedy)
     known[name](Path(file), args)
@@ -152,17 +123,13 @@ def _import(path: Path, args: argparse.Namespace) -> None:
     datasets.write(import_video.design(described), folder / f"{name}_design.nc", "design", origin)
     text = import_video.recording_text(described, shown.resolve(), f"{name}_design.nc")
     (folder / f"{name}_recording.yaml").write_text(text, encoding="utf-8")
-    LOG.info(
-        "python -m pipeline.stages.track %s --out %s", folder / f"{name}_recording.yaml", "track.nc"
-    )
+    LOG.info("python -m pipeline track %s --out %s", folder / f"{name}_recording.yaml", "track.nc")
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:
 
     if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
-        remedy = (
-            f"python -m pipeline.stages.track init {path} --design NC proposes a recording of it"
-        )
+        remedy = f"python -m pipeline track init {path} --design NC proposes a recording of it"
         raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
     asked = recordings.load(path)
     video, source = _sources(asked, path, args.design)
@@ -203,7 +170,7 @@ def _report(track: Path, video: Path) -> None:
     """Runs the stage that draws overlay and quality."""
     folder = track.with_name(f"{track.stem}_report")
     words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
-    command = [sys.executable, "-m", "reports.products.tracking.build", *words]
+    command = [sys.executable, "-m", f"{PREFIX}reports.products.tracking.build", *words]
     if subprocess.run(command, check=False).returncode:
         remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
         raise UserError("the report could not be made", file=folder, remedy=remedy)
@@ -212,7 +179,7 @@ def _report(track: Path, video: Path) -> None:
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:
     """The files of the video and of the design."""
     if asked.video is None:
-        remedy = "render it first, with pipeline.stages.film, and track the YAML beside the video"
+        remedy = "render it first (python -m pipeline film) and track the YAML beside it"
         raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
     return path.parent / asked.video, _design(asked.design, path, study)
 
@@ -256,12 +223,3 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         np.count_nonzero(track.timing),
     )
     return track
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +24,7 @@ from pipeline.posing import (
     time_refinement,
     times_of,
 )
-from pipeline.runtime import UserError, cli
+from pipeline.runtime import UserError
 from pipeline.stages.simulate import measured_cases
 
 if TYPE_CHECKING:
@@ -40,18 +38,6 @@ Table = dict[str, list[CaseResult]]
 
 FINER = (2, 10)
 """How many times more load steps the loss is checked with."""
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.verify",
-        "Check a design with finer steps of load or time, and another contact.",
-    )
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    made.add_argument("--threads", type=int, default=1, help="cases simulated side by side")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -150,12 +136,3 @@ def _numbers(cases: list[CaseResult], as_run: list[CaseResult], share: float) ->
         contact_pairs=max(int(case.observables.contact_pairs[-1]) for case in cases),
         unstable=sum(int((case.stability == UNSTABLE).sum()) for case in cases),
     )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +20,7 @@ from pipeline.posing import (
     times_of,
     unit_coordinates,
 )
-from pipeline.runtime import UserError, cli, found_in
+from pipeline.runtime import UserError, found_in
 from pipeline.tracking.frames import recording as recordings
 from pipeline.virtual_lab import specimen
 from sim.core import SimulationError
@@ -39,17 +36,6 @@ if TYPE_CHECKING:
     from sim.scene import Scene
 
 
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser(
-        "pipeline.stages.virtual_specimen", "Simulate the specimen of a virtual recording."
-    )
-    made.add_argument("recording", type=Path, metavar="RECORDING.yaml")
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--out", type=Path, required=True, metavar="NC", help="dataset to write")
-    return made
-
-
 def work(args: argparse.Namespace) -> None:
     """Reads problem, design and recording, simulates the specimen, writes what it does.
 
@@ -61,7 +47,7 @@ def work(args: argparse.Namespace) -> None:
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
-    origin = provenance.attributes(asked, "simulate", parents={"design": args.design})
+    origin = provenance.attributes(asked, "virtual_specimen", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 
@@ -154,12 +140,3 @@ def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
             f"the specimen cannot be simulated: {error}", key="virtual.specimen", remedy=remedy
         ) from error
     return response.displacement[0], response.drive_force[0]
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import argparse
 import logging
-import sys
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline import datasets
 from pipeline.fabrication.parts import labels
 from pipeline.problem.sections import Markers, Speckle, UnitAppearance
-from pipeline.runtime import UserError, cli, write_atomically
+from pipeline.runtime import UserError, write_atomically
 from pipeline.tracking.geometry import as_built, of_design
 from pipeline.virtual_lab import stickers
 from pipeline.virtual_lab.face_marks import marks
@@ -21,21 +18,6 @@ if TYPE_CHECKING:
     from pipeline.problem.sections import UnitAppearance
 
 LOG = logging.getLogger(__name__)
-
-
-def parser() -> argparse.ArgumentParser:
-    """The stage's command line."""
-    made = cli.parser("pipeline.virtual_lab.print_markers", str(__doc__), study=False)
-    made.add_argument("--design", type=Path, required=True, metavar="NC", help="the design")
-    made.add_argument("--structure", choices=("intact", "altered", "cloaked"), default="cloaked")
-    made.add_argument("--out", type=Path, required=True, metavar="PDF", help="the sheets")
-    made.add_argument("--kind", choices=("dots", "speckle"), default="dots")
-    made.add_argument("--count", type=int, choices=(1, 2, 3), default=3, help="dots per unit (3)")
-    made.add_argument("--diameter", type=float, metavar="MM", help="of a dot (2) or speckle (1.2)")
-    made.add_argument("--spread", type=float, default=7.0, metavar="MM", help="of the dots (7)")
-    made.add_argument("--faces", choices=("dark", "light"), default="dark", help="under the marks")
-    made.add_argument("--paper", choices=("A4", "Letter"), default="A4")
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -68,12 +50,3 @@ def _look(args: argparse.Namespace) -> UnitAppearance:
     return UnitAppearance(
         dots=dots, speckle=Speckle.model_construct(diameter=diameter, density=0.35)
     )
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

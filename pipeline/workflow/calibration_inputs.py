@@ -12,12 +12,12 @@ from snakemake.iocontainers import Wildcards
 
 from pipeline.calibration.inputs import Calibration, TrackedMotion
 from pipeline.problem.reading import section
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import WORK, UserError
 
 _FOLDER = "experiments/calibration"
 
 
-def calibrations(root: Path = ROOT) -> list[str]:
+def calibrations(root: Path = WORK) -> list[str]:
     """The names of all calibrations."""
     return sorted(path.stem for path in (root / _FOLDER).glob("*.yaml"))
 
@@ -51,6 +51,6 @@ def description(wildcards: Wildcards) -> str:
 def _described(source: str) -> Calibration | None:
     """The calibration; None for one that cannot be read, of which the stage will tell why."""
     try:
-        return section(ROOT / source, Calibration)
+        return section(WORK / source, Calibration)
     except UserError:
         return None

@@ -6,15 +6,13 @@ import argparse
 import logging
 import re
 import shutil
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 from textwrap import indent
 
 from pipeline import problem
 from pipeline.problem.outlines import ImageError, read_outlines
-from pipeline.runtime import UserError, cli
+from pipeline.runtime import BUILD, UserError
 
 LOG = logging.getLogger(__name__)
 
@@ -30,32 +28,6 @@ _IMAGE = (
     "loose: remove # units that the void cuts off from the rest; or refuse"
 )
 _SMALL_IMAGE = "image:\n  width: 45 mm"
-
-
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    made = cli.parser(
-        "pipeline.workflow.new_study",
-        "Make experiments/NAME/problem.yaml, commented and ready to build with `make NAME`.",
-        study=False,
-    )
-    made.add_argument("name", help="of the study: letters, digits and underscores")
-    made.add_argument(
-        "--kind",
-        choices=("static", "dynamic"),
-        default="static",
-        help="a void under slow compression, or a shaken unit (default: %(default)s)",
-    )
-    made.add_argument(
-        "--image", type=Path, metavar="FILE", help="shape of the void (PNG, JPG, SVG); is copied"
-    )
-    made.add_argument(
-        "--folder",
-        type=Path,
-        default=Path("experiments"),
-        help="where the studies are (default: %(default)s)",
-    )
-    return made
 
 
 def work(args: argparse.Namespace) -> None:
@@ -79,7 +51,7 @@ def work(args: argparse.Namespace) -> None:
         aside.rename(folder)
     finally:
         shutil.rmtree(aside, ignore_errors=True)
-    LOG.info("made %s; a draft: make %s@quick", folder / "problem.yaml", args.name)
+    LOG.info("made %s; a draft: %s %s@quick", folder / "problem.yaml", BUILD, args.name)
 
 
 def text(name: str, kind: str, image: Path | None) -> str:
@@ -91,6 +63,7 @@ def text(name: str, kind: str, image: Path | None) -> str:
     template = (TEMPLATES / f"{kind}.yaml").read_text(encoding="utf-8")
     return Template(template).substitute(
         name=name,
+        build=BUILD,
         title=name.replace("_", " ").capitalize(),
         void=indent(void, "  "),
         quick=indent(small, "      "),
@@ -117,12 +90,3 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
         read_outlines(args.image)
     except ImageError as error:
         raise UserError(error.what, file=args.image, remedy=error.remedy) from error
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    return cli.run(work, parser(), argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pipeline.problem import Problem
-from pipeline.runtime import cli
 
 DEFAULT = Path("experiments/problem.schema.json")
 _OVERLAY = "Overlay"
@@ -70,18 +67,6 @@ def _overlaid(node: Any) -> Any:  # noqa: ANN401  (any JSON)
 _STRICT = ("required", "discriminator", "default")
 
 
-def _work(args: argparse.Namespace) -> None:
+def work(args: argparse.Namespace) -> None:
+    """Writes the schema."""
     args.out.write_text(text(), encoding="utf-8")
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Write the schema; returns the exit code."""
-    parser = cli.parser("pipeline.workflow.problem_schema", str(__doc__), study=False)
-    parser.add_argument(
-        "--out", type=Path, default=DEFAULT, help="the file to write (default: %(default)s)"
-    )
-    return cli.run(_work, parser, argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -10,21 +10,21 @@ from pathlib import Path
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import WORK, UserError
 from pipeline.tracking.frames import Recording, load
 
 RECORDINGS = "_recordings"
 """Ends the targets that render and track the recordings of a study."""
 
 
-def recording_pages(study: str, root: Path = ROOT) -> list[str]:
+def recording_pages(study: str, root: Path = WORK) -> list[str]:
     """The quality reports of all recordings of a study, such as fig2 or fig2@quick."""
     folder = root / "experiments" / study.partition("@")[0] / "recordings"
     names = sorted(path.stem for path in folder.glob("*.yaml"))
     return [f"results/{study}/recordings/{name}/index.html" for name in names]
 
 
-def shown_recordings(study: str, root: Path = ROOT) -> list[str]:
+def shown_recordings(study: str, root: Path = WORK) -> list[str]:
     """Names of the recordings that the report of a study, or of a preset of it, shows.
 
     One that was filmed takes the place of those that are virtual and show the same structure under
@@ -94,7 +94,7 @@ def filmed(wildcards: Wildcards) -> str:
 
 def described(wildcards: Wildcards) -> Recording | None:
     """The recording; None for one that cannot be read, of which the stage will tell why."""
-    return _read(ROOT / _source(wildcards))
+    return _read(WORK / _source(wildcards))
 
 
 def _read(path: Path) -> Recording | None:

@@ -9,12 +9,11 @@ import argparse
 import logging
 import subprocess
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from pipeline.datasets import file_hash
-from pipeline.runtime import ROOT, UserError, cli
+from pipeline.runtime import ROOT, UserError
 
 LOG = logging.getLogger(__name__)
 
@@ -52,7 +51,12 @@ def _built(target: str, folder: Path) -> Path:
     return folder / "results"
 
 
-def _work(args: argparse.Namespace) -> None:
+def work(args: argparse.Namespace) -> None:
+    """Builds twice and compares.
+
+    Raises:
+        UserError: a build fails, or files differ.
+    """
     with TemporaryDirectory(prefix="reproduce_") as place:
         first, second = (_built(args.target, Path(place) / name) for name in ("first", "second"))
         count, apart = differences(first, second)
@@ -63,14 +67,3 @@ def _work(args: argparse.Namespace) -> None:
             remedy="tell the developers, with this list and the versions in requirements.lock",
         )
     LOG.info("%s: two builds have the same bytes (files compared: %d)", args.target, count)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Build twice and compare; returns the exit code."""
-    parser = cli.parser("pipeline.workflow.reproduce", str(__doc__), study=False)
-    parser.add_argument("target", nargs="?", default="fig2@quick", help="(%(default)s)")
-    return cli.run(_work, parser, argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -16,9 +16,9 @@ from tempfile import NamedTemporaryFile
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.problem import Problem, Stage, outputs, section_hash
+from pipeline.problem import Problem, outputs, section_hash
 from pipeline.problem.sections import group_count
-from pipeline.runtime import ROOT, RUN_MARK, UserError
+from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow.recordings import shown_recordings
 from pipeline.workflow.studies import Study, asked_for, check_names, problem_of, studies, together
 
@@ -175,7 +175,7 @@ def shown_options(wildcards: Wildcards) -> str:
     return " ".join(f"--{name.replace('_', '-')} {file}" for name, file in files)
 
 
-def section(stage: Stage) -> Callable[[Wildcards], str]:
+def section(stage: str) -> Callable[[Wildcards], str]:
     """A function from wildcards to the hash of what `stage` depends on in the problem file.
 
     A job with a wildcard `method` depends on that method's settings and not on the others'.
@@ -188,4 +188,4 @@ def section(stage: Stage) -> Callable[[Wildcards], str]:
 def prepare_jobs() -> None:
     """Makes the jobs of this workflow run with this Python, and marks them as ours."""
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    os.environ[RUN_MARK] = str(ROOT)
+    os.environ[RUN_MARK] = str(WORK)

@@ -13,10 +13,11 @@ import shutil
 import signal
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import psutil
 
-from pipeline.runtime import ROOT, RUN_MARK, UserError, streams
+from pipeline.runtime import INSTALLED, ROOT, RUN_MARK, WORK, UserError, streams
 from pipeline.workflow import stale_jobs
 from pipeline.workflow.rule_inputs import check_problems
 
@@ -24,10 +25,10 @@ _PATIENCE = 5.0  # seconds that a left-over job gets to end by itself
 _PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
-def main(arguments: list[str]) -> None:
+def work(arguments: list[str]) -> NoReturn:
     """Checks the problem files of the targets, clears what a killed run left, runs snakemake."""
     streams.complete()
-    os.chdir(ROOT)
+    os.chdir(WORK)
     check_problems(arguments)
     try:
         _clear_the_ground()
@@ -35,7 +36,15 @@ def main(arguments: list[str]) -> None:
         sys.exit(f"error: {error}")
     _end_with_parent()
     snakemake = str(Path(sys.executable).with_name("snakemake"))
-    os.execv(snakemake, [snakemake, *arguments])
+    os.execv(snakemake, [snakemake, *_places(), *arguments])
+
+
+def _places() -> list[str]:
+    """Options that name Snakefile and profile, where they are not in the folder of the work."""
+    if not INSTALLED:
+        return []
+    places = {"--snakefile": ROOT / "Snakefile", "--workflow-profile": ROOT / "profiles/default"}
+    return [str(word) for option in places.items() for word in option]
 
 
 def _clear_the_ground() -> None:
@@ -48,18 +57,18 @@ def _clear_the_ground() -> None:
     if active:
         raise UserError(
             f"snakemake is already at work in this folder (process {active[0].pid})",
-            file=ROOT,
+            file=WORK,
             remedy=f"wait for it, or end it with: kill -INT {active[0].pid}",
         )
-    for number in stale_jobs.cancel(ROOT):
+    for number in stale_jobs.cancel(WORK):
         print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
-    orphans = [process for process in _others() if _mark(process) == str(ROOT)]
+    orphans = [process for process in _others() if _mark(process) == str(WORK)]
     for process in orphans:
         process.terminate()
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
     for process in stubborn:
         process.kill()
-    shutil.rmtree(ROOT / ".snakemake/locks", ignore_errors=True)
+    shutil.rmtree(WORK / ".snakemake/locks", ignore_errors=True)
 
 
 def _others() -> list[psutil.Process]:
@@ -73,7 +82,7 @@ def _is_snakemake(process: psutil.Process) -> bool:
     """Whether the process is a snakemake in this folder."""
     try:
         names = {Path(word).name for word in process.cmdline()[:2]}
-        return "snakemake" in names and Path(process.cwd()) == ROOT
+        return "snakemake" in names and Path(process.cwd()) == WORK
     except psutil.Error:
         return False
 
@@ -90,7 +99,3 @@ def _end_with_parent() -> None:
     """Asks Linux to kill this process with its parent: a killed `make` leaves no snakemake."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

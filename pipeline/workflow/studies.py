@@ -14,7 +14,7 @@ from pathlib import Path
 from pipeline.problem import Problem
 from pipeline.problem.reading import joint_figure, load, overlaid, preset_names, yaml_file
 from pipeline.problem.sections import design_count, numbered
-from pipeline.runtime import ROOT, UserError
+from pipeline.runtime import WORK, UserError
 from pipeline.workflow.movie_list import MOVIES
 from pipeline.workflow.recordings import RECORDINGS
 
@@ -60,7 +60,7 @@ FRAMED = (Study("fig2"),)
 
 
 @cache
-def families(root: Path = ROOT) -> Mapping[Study, list[Study]]:
+def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
     """Every study below experiments/, each followed by its presets, with their several designs.
 
     A file that is no YAML counts as a study without presets: the stage that reads it tells why.
@@ -77,13 +77,13 @@ def families(root: Path = ROOT) -> Mapping[Study, list[Study]]:
     return found
 
 
-def studies(root: Path = ROOT) -> list[Study]:
+def studies(root: Path = WORK) -> list[Study]:
     """Every study with its presets and designs."""
     return [each for study, designs in families(root).items() for each in (study, *designs)]
 
 
 @cache
-def joints(root: Path = ROOT) -> Mapping[str, list[Study]]:
+def joints(root: Path = WORK) -> Mapping[str, list[Study]]:
     """The studies of every figure of several, by target; with each preset that all of them have.
 
     A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
@@ -151,7 +151,7 @@ def _without_product(word: str) -> str:
     return next((word.removesuffix(end) for end in PRODUCTS if word.endswith(end)), word)
 
 
-def check_names(study: Study, root: Path = ROOT) -> None:
+def check_names(study: Study, root: Path = WORK) -> None:
     """Refuses names that targets and files cannot have: of the study, its preset, its recordings.
 
     Raises:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import xarray as xr
@@ -14,30 +15,11 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import Kind
 from pipeline.posing import law_comparison
-from pipeline.problem import Output, Problem, Stage
-from pipeline.runtime import UserError
+from pipeline.problem import Output, Problem
+from pipeline.runtime import REPORTED, UserError
 from reports.study import draft, recorded_motion, report_scene
 from reports.study.recorded_motion import RecordedMotion
 from reports.study.report_scene import ReportScene
-
-STAGES: dict[Output, Stage] = {
-    "design": "design",
-    "response": "simulate",
-    "sweep": "sweep",
-    "scatter": "scatter",
-    "verification": "verify",
-    "geometric_design": "geometric",
-    "geometric_response": "simulate",
-}
-KINDS: dict[Output, Kind] = {
-    "design": "design",
-    "response": "response",
-    "sweep": "sweep",
-    "scatter": "scatter",
-    "verification": "verification",
-    "geometric_design": "design",
-    "geometric_response": "response",
-}
 
 
 @dataclass(frozen=True)
@@ -150,10 +132,10 @@ def load(
             file=path,
             remedy=f"give it as --{missing[0]}",
         )
-    read = {name: datasets.read(files[name], KINDS[name]) for name in wanted}
+    read = {name: datasets.read(files[name], cast(Kind, REPORTED[name].kind)) for name in wanted}
     for name, data in read.items():
         posed = law_comparison.geometric(chosen) if name == "geometric_response" else chosen
-        check_problem(posed, STAGES[name], data, files[name])
+        check_problem(posed, REPORTED[name].name, data, files[name])
     compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
     return StudyResults(
         name=path.resolve().parent.name,
@@ -194,7 +176,7 @@ def _comparison(chosen: Problem, path: Path) -> xr.Dataset:
     return data
 
 
-def check_problem(posed: Problem, stage: Stage, data: xr.Dataset, path: Path) -> None:
+def check_problem(posed: Problem, stage: str, data: xr.Dataset, path: Path) -> None:
     """Whether a dataset was made from this problem.
 
     Raises:

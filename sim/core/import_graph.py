@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
+_INSTALLED = "metacloak."  # begins their names where they are installed as one package
 
 
 def import_closure(modules: Iterable[str], root: Path, *, packages: bool = True) -> dict[str, Path]:
@@ -68,12 +69,12 @@ def _names(path: Path, package: str) -> Iterator[tuple[str, str]]:
     """Walks over the import statements of a file: what is imported from, and the name if any."""
     for node in ast.walk(ast.parse(path.read_bytes(), filename=str(path))):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, "") for alias in node.names)
+            yield from ((alias.name.removeprefix(_INSTALLED), "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             parts = package.split(".")
             above = parts[: len(parts) + 1 - node.level] if node.level else []
             base = ".".join([*above, *filter(None, [node.module])])
-            yield from ((base, alias.name) for alias in node.names)
+            yield from ((base.removeprefix(_INSTALLED), alias.name) for alias in node.names)
 
 
 def _defined_in(package: str, name: str, root: Path) -> list[str]:

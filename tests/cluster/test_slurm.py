@@ -27,7 +27,7 @@ PAUSE = 0.2  # seconds between two looks at the cluster
 # ended: long enough for a job of these to end, and no longer.
 INTERVAL = 9
 SUBMIT = (
-    *(".venv/bin/python", "-m", "pipeline.workflow.run"),
+    *(".venv/bin/python", "-m", "pipeline", "run"),
     *("--profile", "profiles/slurm", "--slurm-no-account", "--latency-wait", "5"),
     *("--slurm-status-command", "squeue"),
     *("--slurm-init-seconds-before-status-checks", str(INTERVAL), TARGET),

@@ -17,8 +17,8 @@ from typing import Any
 
 import pytest
 
-from pipeline.runtime import ROOT
-from pipeline.workflow import new_study
+from pipeline.__main__ import main, run_stage
+from pipeline.runtime import ROOT, STAGES
 from tests.docs.pages import PAGES, WALKED, Command, blocks, commands, inline
 from tests.e2e.checkout import Checkout
 
@@ -26,7 +26,7 @@ COMMANDS = list(commands())
 
 
 def is_run(command: Command) -> bool:
-    return command.words[:3] == [".venv/bin/python", "-m", "pipeline.workflow.run"]
+    return command.words[:4] == [".venv/bin/python", "-m", "pipeline", "run"]
 
 
 def is_stage(command: Command) -> bool:
@@ -42,7 +42,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     """The repository with the study that the tutorials make."""
     made = Checkout.made(tmp_path_factory.mktemp("docs") / "checkout")
     shutil.rmtree(made.root / "experiments/logo", ignore_errors=True)
-    assert new_study.main(["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
+    assert run_stage("new", ["logo", "--folder", str(made.root / "experiments"), "--quiet"]) == 0
     (made.root / "experiments/logo/recordings").mkdir()
     return made
 
@@ -101,6 +101,11 @@ def test_stages_know_their_options(command: Command, monkeypatch: pytest.MonkeyP
     if module == "pytest":  # its tests are not for here
         assert all((ROOT / word).is_file() for word in options if not word.startswith("-"))
         return
+    if module == "pipeline":
+        with pytest.raises((ReadError, SystemExit)) as ended:
+            main(options)
+        assert getattr(ended.value, "code", 0) == 0
+        return
     monkeypatch.delitem(sys.modules, module, raising=False)
     monkeypatch.setattr(sys, "argv", [module, *options])
     with pytest.raises((ReadError, SystemExit)) as ended:
@@ -120,10 +125,12 @@ def test_blocks_are_of_languages_that_are_tested() -> None:
     assert found == {"bash", "python", "yaml", "text", "bibtex", ""}
 
 
-@pytest.mark.parametrize("module", sorted(set(inline(r"python -m ([\w.]+)"))))
-def test_a_module_in_a_sentence_is_there(module: str) -> None:
-    path = ROOT.joinpath(*module.split("."))
-    assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()
+def test_a_command_in_a_sentence_is_there() -> None:
+    for command in set(inline(r"python -m ([\w.]+(?: \w+)?)")):
+        module, _, stage = command.partition(" ")
+        path = ROOT.joinpath(*module.split("."))
+        assert path.with_suffix(".py").is_file() or (path / "__main__.py").is_file()
+        assert module != "pipeline" or stage in STAGES
 
 
 def test_files_in_a_sentence_are_there() -> None:

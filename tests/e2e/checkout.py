@@ -100,7 +100,7 @@ class Checkout:
         )
 
     def module(self, module: str, *words: str, first: str = "") -> Ended:
-        return self._run([".venv/bin/python", "-m", module, *words], first)
+        return self._run([".venv/bin/python", "-m", *module.split(), *words], first)
 
     def shell(self, commands: str) -> Ended:
         """Commands as a user types them, but for `make` setting up the environment."""
@@ -137,8 +137,10 @@ class Checkout:
         }
 
     def stages(self, name: str) -> list[psutil.Process]:
-        """The running Python processes of a stage, e.g. `pipeline.stages.design`."""
-        return [process for process in self.jobs() if name in _words(process)[1:4]]
+        """The running Python processes of a stage, e.g. `design`."""
+        return [
+            process for process in self.jobs() if _words(process)[1:4] == ["-m", "pipeline", name]
+        ]
 
     def jobs(self) -> list[psutil.Process]:
         """All that the workflow of this checkout has started and that still runs."""

@@ -8,8 +8,8 @@ from pathlib import Path
 import xarray as xr
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.problem.reading import load
-from pipeline.stages import design, redesign, select, simulate, verify
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,10 @@ def build(problem: Path, preset: str | None, folder: Path) -> Built:
     study, ways = _options(problem, preset), []
     for method in load(problem, preset).optimiser.methods.chosen:
         ways.append(str(folder / f"design_{method}.nc"))
-        assert design.main([*study, "--method", method, "--out", ways[-1]]) == 0
+        assert run_stage("design", [*study, "--method", method, "--out", ways[-1]]) == 0
     shipped, response = folder / "design.nc", folder / "response.nc"
-    assert select.main([*study, "--designs", *ways, "--out", str(shipped)]) == 0
-    assert simulate.main([*study, "--design", str(shipped), "--out", str(response)]) == 0
+    assert run_stage("select", [*study, "--designs", *ways, "--out", str(shipped)]) == 0
+    assert run_stage("simulate", [*study, "--design", str(shipped), "--out", str(response)]) == 0
     return Built(datasets.read(shipped, "design"), datasets.read(response, "response"))
 
 
@@ -43,9 +43,9 @@ def build_again(problem: Path, preset: str | None, folder: Path) -> Built:
     study = _options(problem, preset)
     first = ["--design", str(folder / "design.nc"), "--response", str(folder / "response.nc")]
     second, response = folder / "geometric_design.nc", folder / "geometric_response.nc"
-    assert redesign.main([*study, *first, "--out", str(second)]) == 0
+    assert run_stage("redesign", [*study, *first, "--out", str(second)]) == 0
     moved = ["--design", str(second), "--geometric", "--out", str(response)]
-    assert simulate.main([*study, *moved]) == 0
+    assert run_stage("simulate", [*study, *moved]) == 0
     return Built(datasets.read(second, "design"), datasets.read(response, "response"))
 
 
@@ -53,7 +53,7 @@ def build_verification(problem: Path, preset: str | None, folder: Path) -> xr.Da
     """The checks of a design that was built in the folder."""
     out = folder / "verification.nc"
     given = ["--design", str(folder / "design.nc"), "--out", str(out)]
-    assert verify.main([*_options(problem, preset), *given]) == 0
+    assert run_stage("verify", [*_options(problem, preset), *given]) == 0
     return datasets.read(out, "verification")
 
 

@@ -11,10 +11,10 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import network_variables, scene_of
 from pipeline.problem.reading import overlaid
 from pipeline.runtime import ROOT
-from pipeline.stages import simulate, track
 from pipeline.tracking.frames import import_video
 from tests.e2e.checkout import Checkout
 
@@ -58,7 +58,7 @@ def _built(path: Path, results: Path) -> None:
     made = str(results / "design.nc")
     datasets.write(design, made, "design", origin)
     words = ["--problem", str(path), "--design", made, "--out", str(results / "response.nc")]
-    assert simulate.main([*words, "--quiet"]) == 0
+    assert run_stage("simulate", [*words, "--quiet"]) == 0
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def dropped(checkout: Checkout) -> Checkout:
     folder = checkout.root / "experiments" / STUDY / "recordings"
     video = shutil.copy(CLIP.with_suffix(".mp4"), folder / "lab.mp4")
     words = ["import", str(CLIP), "--video", str(video), "--out-dir", str(folder), "--quiet"]
-    assert track.main(words) == 0
+    assert run_stage("track", words) == 0
     with (folder / "lab_recording.yaml").open("a", encoding="utf-8") as file:
         file.write("structure: altered\n")
     return checkout

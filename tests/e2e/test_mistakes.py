@@ -42,7 +42,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (16 << 10, 16 << 10))
 def test_a_bad_problem(fresh: Checkout, old: str, new: str, key: str) -> None:
     fresh.edit(old, new)
     place = f"experiments/{STUDY}/problem.yaml, line"
-    for ended in (fresh.make(), fresh.stage("pipeline.stages.design", *DESIGN, "x.nc")):
+    for ended in (fresh.make(), fresh.stage("pipeline design", *DESIGN, "x.nc")):
         assert_one_message(ended, place, key, "value:")
     assert not (fresh.root / "x.nc").exists()
     assert not fresh.results.exists()
@@ -65,7 +65,7 @@ def test_a_truncated_or_foreign_design(undisturbed: Checkout, tmp_path: Path) ->
     for path in (truncated, foreign, tmp_path / "missing.nc"):
         out = tmp_path / "response.nc"
         for module, more in (
-            ("pipeline.stages.simulate", ("--out", str(out))),
+            ("pipeline simulate", ("--out", str(out))),
             ("reports.figures.study_report", ("--out-dir", str(tmp_path / "report"))),
         ):
             results = undisturbed.results
@@ -84,7 +84,7 @@ def test_a_folder_that_is_read_only(fresh: Checkout) -> None:
     (fresh.root / "results").mkdir(mode=0o555)
     for ended in (
         fresh.make(first=ORDINARY_RIGHTS),
-        fresh.stage("pipeline.stages.design", *DESIGN, "results/x/x.nc", first=ORDINARY_RIGHTS),
+        fresh.stage("pipeline design", *DESIGN, "results/x/x.nc", first=ORDINARY_RIGHTS),
     ):
         assert_one_message(ended, "results")
 
@@ -94,7 +94,7 @@ def test_a_disk_with_too_little_room(undisturbed: Checkout, tmp_path: Path) -> N
     out = tmp_path / "response.nc"
     out.write_bytes(b"what was there")
     ended = undisturbed.stage(
-        *("pipeline.stages.simulate", "--design", design, "--out", str(out)), first=LITTLE_ROOM
+        *("pipeline simulate", "--design", design, "--out", str(out)), first=LITTLE_ROOM
     )
     assert_one_message(ended, "the file would be too large", str(tmp_path))
     assert out.read_bytes() == b"what was there"

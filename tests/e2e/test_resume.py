@@ -54,7 +54,7 @@ def kill_make(run: Run, checkout: Checkout) -> None:
 
 def kill_stage(run: Run, checkout: Checkout) -> None:
     """As the kernel does when memory runs out."""
-    stages = checkout.stages("pipeline.stages.design")
+    stages = checkout.stages("design")
     for stage in stages:
         stage.kill()
     told = run.communicate()[0]

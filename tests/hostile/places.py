@@ -67,7 +67,7 @@ def stages(out: Path) -> dict[str, list[str]]:
 
 def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> str:
     """Runs a stage that must fail in words; returns its fault, or an empty text."""
-    module = "reports.figures.study_report" if name == "report" else f"pipeline.stages.{name}"
+    module = "reports.figures.study_report" if name == "report" else f"pipeline {name}"
     ended = checkout.module(module, *words, first=first)
     told = ended.stdout + ended.stderr
     if ended.returncode == 0:
@@ -128,7 +128,7 @@ def two_at_once(checkout: Checkout) -> Iterator[Tried]:
     """Runs two processes that write the same file."""
     with tempfile.TemporaryDirectory() as folder:
         words = stages(Path(folder))["simulate"]
-        command = [".venv/bin/python", "-m", "pipeline.stages.simulate", *words]
+        command = [".venv/bin/python", "-m", "pipeline", "simulate", *words]
         start = partial(subprocess.Popen, command, cwd=checkout.root, stderr=subprocess.DEVNULL)
         codes = [run.wait() for run in (start(), start())]
         paths = Path(folder, "response.nc"), checkout.results / "response.nc"

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.problem.reading import load
 from pipeline.runtime import UserError
-from pipeline.stages import design, select
 from tests.pipeline.static import HOLE, write
 
 FIG2 = Path(__file__).parents[2] / "experiments/fig2/problem.yaml"
@@ -25,8 +25,8 @@ def hole(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     folder = tmp_path_factory.mktemp("hole")
     options = ["--problem", str(write(folder, HOLE, size=5, amplitude=3.0)), "--quiet", "--out"]
     made = str(folder / "design_sqp.nc")
-    assert design.main([*options, made, "--method", "sqp"]) == 0
-    assert select.main([*options, str(folder / "design.nc"), "--designs", made]) == 0
+    assert run_stage("design", [*options, made, "--method", "sqp"]) == 0
+    assert run_stage("select", [*options, str(folder / "design.nc"), "--designs", made]) == 0
     return options
 
 

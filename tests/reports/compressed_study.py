@@ -7,7 +7,7 @@ turn in turns by `turn` at full load; the void's units are absent where they are
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -26,6 +26,7 @@ from pipeline.posing import (
 from pipeline.posing.perturbed import noises
 from pipeline.posing.to_scene import altered_lattice_of
 from pipeline.problem import Output, Problem
+from pipeline.runtime import REPORTED
 from pipeline.stages.verify import variants
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
@@ -60,11 +61,11 @@ def written(folder: Path, more: str) -> StudyResults:
     files: dict[Output, Path] = {}
     for kind in problem.outputs(chosen):
         files[kind] = folder / f"{kind}.nc"
-        stage = study_results.STAGES[kind]
+        stage = REPORTED[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
         posed = law_comparison.geometric(chosen) if kind == "geometric_response" else chosen
-        about = provenance.attributes(posed, stage, plan=plan)
-        datasets.write(made[kind], files[kind], study_results.KINDS[kind], about)
+        about = provenance.attributes(posed, stage.name, plan=plan)
+        datasets.write(made[kind], files[kind], cast(datasets.Kind, stage.kind), about)
     return study_results.load(path, None, files)
 
 

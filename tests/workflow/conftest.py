@@ -57,7 +57,7 @@ class Sandbox:
         return self._ended(self.command(*words))
 
     def resume(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return self._ended([sys.executable, "-m", "pipeline.workflow.run", *words])
+        return self._ended([sys.executable, "-m", "pipeline", "run", *words])
 
     def planned(self, *words: str) -> Counter[str]:
         """How often each rule would run."""

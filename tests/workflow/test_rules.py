@@ -99,7 +99,7 @@ def test_preset_has_its_own_target_and_folder(sandbox: Sandbox, target: str) -> 
     assert ended.returncode == 0, ended.stderr
     results = sandbox.root / "results/fig2@quick"
     assert (results / "report/fig2.pdf").exists()
-    assert "--preset quick" in (results / "response.nc").read_text()
+    assert "preset='quick'" in (results / "response.nc").read_text()
 
 
 def test_second_run_has_nothing_to_do(built: Sandbox) -> None:

@@ -36,7 +36,7 @@ def jobs(root: Path) -> list[psutil.Process]:
 def start(sandbox: Sandbox) -> subprocess.Popen[bytes]:
     """Starts the study and waits until its first jobs are at work."""
     run = subprocess.Popen(
-        [sys.executable, "-m", "pipeline.workflow.run", "fig2"],
+        [sys.executable, "-m", "pipeline", "run", "fig2"],
         cwd=sandbox.root,
         env=sandbox.environment(),
         stdout=subprocess.DEVNULL,

@@ -1,7 +1,7 @@
-"""A stand-in for every stage of a copied repository: takes any options and writes the outputs."""
+"""A stand-in for every stage and page of a copied repository: writes the outputs, empty."""
 
+import argparse
 import os
-import sys
 import time
 from pathlib import Path
 
@@ -10,24 +10,30 @@ REPORT = (
     *("design.csv", "facts.csv", "loss_history.csv"),
 )
 
-BESIDE = {"virtual_lab": ("{}.yaml", "{}_truth.nc"), "track": ("{}.csv",)}
+BESIDE = {"film": ("{}.yaml", "{}_truth.nc"), "track": ("{}.csv",)}
 """What a stage writes beside its output, by the name that this has."""
 
 
-def main(words: list[str]) -> None:
-    options = {word: words[at + 1] for at, word in enumerate(words) if word.startswith("--")}
+def work(args: argparse.Namespace) -> None:
     time.sleep(float(os.environ.get("STAGE_SECONDS", "0")))
-    if "--out" in options:
-        out = Path(options["--out"])
-        out.write_text(" ".join(words))
+    if out := getattr(args, "out", None):
+        out.write_text(str(args))
         for name in BESIDE.get(Path(__file__).stem, ()):
             out.with_name(name.format(out.stem)).write_text("")
-    if "--out-dir" in options:
-        folder = Path(options["--out-dir"])
+    elif folder := getattr(args, "out_dir", None):
         for name in REPORT:
             (folder / name).write_text("")
-    Path(options["--log"]).write_text("done\n")
+
+
+def main() -> None:
+    """As a page is made, which has options of its own."""
+    parser = argparse.ArgumentParser()
+    for name in ("--out", "--out-dir", "--log"):
+        parser.add_argument(name, type=Path)
+    args, _ = parser.parse_known_args()
+    work(args)
+    args.log.write_text("done\n")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -123,7 +123,7 @@ class LoadCell(Section):
 
 
 class TrackedMotion(Section):
-    """The motion of a whole specimen, as `pipeline.stages.track` writes it.
+    """The motion of a whole specimen, as the stage `track` writes it.
 
     Attributes:
         name: of the set.

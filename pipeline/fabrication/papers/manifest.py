@@ -12,9 +12,7 @@ from pipeline.problem import Problem, section_hash
 from pipeline.runtime import UserError
 
 NAME = "manifest.json"
-_AGAIN = (
-    "make the package again: python -m pipeline.stages.fabricate, or snakemake --forcerun fabricate"
-)
+_AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
 _READ = ("units", "letters_for_ids", "shims", "thin_walls_mm", "files")
 
 

@@ -18,7 +18,7 @@ from pipeline.workflow.reference.markdown import table
 HEAD = f"""\
 # Datasets
 
-<!-- Made by `python -m pipeline.workflow.reference` from the tables that every file is checked
+<!-- Made by `python -m pipeline reference` from the tables that every file is checked
 against. -->
 
 Every dataset is a netCDF-4 file that keeps the CF conventions, version 1.11, and that plain

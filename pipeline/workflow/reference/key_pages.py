@@ -21,7 +21,7 @@ Node = dict[str, Any]
 HEAD = """\
 # Keys of {title}
 
-<!-- Made by `python -m pipeline.workflow.reference` from the models that check the files. -->
+<!-- Made by `python -m pipeline reference` from the models that check the files. -->
 
 Quantities are text with a unit (`15 mm`, `2.5 cm`, `20 deg`, `0.35 rad`); any unit of the right
 kind does, and a number without one is refused. A key without a default has to be given. Unknown
@@ -61,7 +61,7 @@ def pages() -> dict[str, str]:
     )
     recordings = (
         File("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`"),
-        File("Points", Points, "In place of a video, for `python -m pipeline.stages.track points`"),
+        File("Points", Points, "In place of a video, for `python -m pipeline track points`"),
     )
     calibrations = (File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),)
     return {

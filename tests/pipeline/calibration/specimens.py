@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pipeline.__main__ import run_stage
 from pipeline.calibration.inputs import Calibration
 from pipeline.problem.reading import section
-from pipeline.stages import calibrate
 
 TRUTH = {
     "density": "6.18 kg/m^2",
@@ -82,5 +82,5 @@ def synthesised(folder: Path, text: dict[str, object]) -> Path:
     """The calibration of computed files."""
     source = written(folder, text)
     done = ["synthesise", str(source), "--out-dir", str(folder / "data"), "--quiet"]
-    assert calibrate.main(done) == 0
+    assert run_stage("calibrate", done) == 0
     return folder / "data/calibration.yaml"

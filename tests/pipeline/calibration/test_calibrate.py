@@ -10,12 +10,12 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.calibration import fitted
 from pipeline.calibration.fit_uncertainty import gradient, uncertainty
 from pipeline.calibration.inputs import Calibration
 from pipeline.problem.reading import section
 from pipeline.problem.sections import MaterialConstants
-from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
     decay_set,
@@ -34,7 +34,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a calibration of forces and a decay, and what was found."""
     folder = tmp_path_factory.mktemp("calibration")
     path = synthesised(folder, described([*force_sets(), decay_set()], ALL, title="A specimen"))
-    assert calibrate.main([str(path), "--out", str(folder / "found.nc"), "--quiet"]) == 0
+    assert run_stage("calibrate", [str(path), "--out", str(folder / "found.nc"), "--quiet"]) == 0
     return folder
 
 
@@ -88,7 +88,7 @@ def test_a_problem_file_takes_the_fragment(made: Path) -> None:
 
 def test_the_same_files_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
     again = ["--out", str(tmp_path / "found.nc"), "--quiet"]
-    assert calibrate.main([str(made / "data/calibration.yaml"), *again]) == 0
+    assert run_stage("calibrate", [str(made / "data/calibration.yaml"), *again]) == 0
     for name in ("found.nc", "found.yaml"):
         assert (tmp_path / name).read_bytes() == (made / name).read_bytes()
 
@@ -116,7 +116,7 @@ def test_what_the_data_do_not_tell_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = synthesised(tmp_path, described([decay_set()], ["damping_ratio", "shear_stiffness"]))
-    assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 0
+    assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 0
     assert "shear_stiffness is not determined by these data" in capsys.readouterr().err
     found = datasets.read(tmp_path / "found.nc", "calibration")
     assert found["status"].values.tolist()[:2] == [0, 2]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.runtime import ROOT
-from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import described, written
 
 SPECIMEN = ROOT / "experiments/calibration/specimens/squeezed.yaml"
@@ -43,9 +43,11 @@ def test_ratios_of_stiffness_from_motion_alone(
     text = described([track], ["bending_stiffness", "damping_ratio"], material=start)
     path = written(tmp_path, text)
     folder, out = tmp_path / "data", tmp_path / "found.nc"
-    assert calibrate.main(["synthesise", str(path), "--out-dir", str(folder), "--quiet"]) == 0
+    assert (
+        run_stage("calibrate", ["synthesise", str(path), "--out-dir", str(folder), "--quiet"]) == 0
+    )
     assert datasets.read(folder / "motion.nc", "track").attrs["synthetic"] == "yes"
-    assert calibrate.main([str(folder / "calibration.yaml"), "--out", str(out)]) == 0
+    assert run_stage("calibrate", [str(folder / "calibration.yaml"), "--out", str(out)]) == 0
     found = datasets.read(out, "calibration")
     bending = found.isel(parameter=0)
     assert bending["lower"] < 1.5 < bending["upper"]

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.calibration.experiments.experiment import MeasuredValues
 from pipeline.calibration.inputs import csv_readings
 from pipeline.problem.fields import units
 from pipeline.runtime import UserError
-from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     START,
     STIFFNESS,
@@ -81,7 +81,7 @@ def test_faulty_traces(
 ) -> None:
     clock = {k: k / 100 for k in range(64)} | change
     path = measured_decay([f"{clock[k]},{k}" for k in range(64)], tmp_path)
-    assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 2
+    assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"error: {told}")
     assert "Traceback" not in said
@@ -111,7 +111,7 @@ def test_faulty_calibrations(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = written(tmp_path, described(force_sets(), STIFFNESS) | changed)
-    assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 2
+    assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 2
     assert told in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == [path]
 
@@ -120,7 +120,7 @@ def test_computed_data_have_to_be_computed_first(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = written(tmp_path, described([decay_set()], ["damping_ratio"]))
-    assert calibrate.main([str(path), "--out", str(tmp_path / "found.nc")]) == 2
+    assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 2
     assert "synthesise" in capsys.readouterr().err
 
 

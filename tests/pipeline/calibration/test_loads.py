@@ -11,10 +11,10 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.calibration.inputs.csv_readings import read
 from pipeline.problem.fields.units import FORCE, LENGTH
 from pipeline.runtime import ROOT
-from pipeline.stages import calibrate
 from tests.pipeline.calibration.specimens import (
     TRUTH,
     described,
@@ -39,7 +39,7 @@ WANTED = ["shear_stiffness", "bending_stiffness"]
 
 def found_from(path: Path, folder: Path) -> xr.Dataset:
     out = folder / "found.nc"
-    assert calibrate.main([str(path), "--out", str(out), "--quiet"]) == 0
+    assert run_stage("calibrate", [str(path), "--out", str(out), "--quiet"]) == 0
     return datasets.read(out, "calibration").set_index(parameter="parameter")
 
 
@@ -122,10 +122,10 @@ def test_loads_that_are_refused(
     shutil.copy(SPECIMENS / problem, tmp_path)
     asked = described([track(problem=problem, **changed)], WANTED, material=START)
     path, folder = written(tmp_path, asked), tmp_path / "data"
-    failed = calibrate.main(["synthesise", str(path), "--out-dir", str(folder), "--quiet"])
+    failed = run_stage("calibrate", ["synthesise", str(path), "--out-dir", str(folder), "--quiet"])
     if not failed:
         path = folder / "calibration.yaml"
-        failed = calibrate.main([str(path), "--out", str(tmp_path / "found.nc"), "--quiet"])
+        failed = run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc"), "--quiet"])
     assert failed == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "found.nc").exists()

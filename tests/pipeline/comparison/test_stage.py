@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.comparison import measurement, pixel_size
-from pipeline.stages import compare, simulate
 from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
 Change = Callable[[xr.Dataset], xr.Dataset]
@@ -27,7 +27,7 @@ def study(hole: list[str], tmp_path_factory: pytest.TempPathFactory) -> list[str
     problem, design = hole[1], str(Path(hole[1]).with_name("design.nc"))
     response = str(tmp_path_factory.mktemp("study") / "response.nc")
     given = ["--problem", problem, "--quiet", "--design", design]
-    assert simulate.main([*given, "--out", response]) == 0
+    assert run_stage("simulate", [*given, "--out", response]) == 0
     return [*given, "--response", response]
 
 
@@ -40,7 +40,7 @@ def film(study: list[str]) -> xr.Dataset:
 
 
 def run(study: list[str], options: list[str], folder: Path) -> int:
-    return compare.main([*study, *options, "--out", str(folder / "comparison.nc")])
+    return run_stage("compare", [*study, *options, "--out", str(folder / "comparison.nc")])
 
 
 @pytest.fixture(scope="module")

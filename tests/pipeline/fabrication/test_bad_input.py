@@ -10,7 +10,7 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets
-from pipeline.stages import fabricate
+from pipeline.__main__ import run_stage
 from tests.pipeline.fabrication import built
 
 Edit = Callable[[Path], None]
@@ -105,7 +105,9 @@ def test_a_mistake_makes_one_message_and_no_package(
     edit(folder)
     out = folder / "fabrication/cloaked"
     words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
-    ended = fabricate.main([*words, "--structure", "cloaked", "--out-dir", str(out), "--quiet"])
+    ended = run_stage(
+        "fabricate", [*words, "--structure", "cloaked", "--out-dir", str(out), "--quiet"]
+    )
     told = capsys.readouterr().err
     assert ended == 2, told
     assert told.count("error:") == 1

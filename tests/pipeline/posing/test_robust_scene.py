@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.posing import design_scene
 from pipeline.problem.reading import load, overlaid
 from pipeline.runtime import UserError
-from pipeline.stages import design, robust_gains, select
 from reports.products.robust_gains import build
 from sim.solvers import Harmonic
 from tests.pipeline.static import HOLE, write
@@ -54,7 +54,7 @@ def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
 ) -> None:
     out = tmp_path / "design_sqp.nc"
     words = ["--problem", str(robust), "--preset", "quick", "--method", "sqp", "--quiet"]
-    assert design.main([*words, "--out", str(out)]) == 0
+    assert run_stage("design", [*words, "--out", str(out)]) == 0
     made = datasets.read(out, "design_method")
     assert made.sizes["case"] == 4
     assert float(made["best_loss"]) < float(made["loss"][0])
@@ -85,7 +85,7 @@ def test_the_gain_of_a_preset_is_over_the_studys_own_design(
     path = write(tmp_path, HOLE + PRESETS, size=5, amplitude=3.0)
     shipped, out = Path(hole[1]).with_name("design.nc"), tmp_path / "gains.nc"
     words = ["--problem", str(path), "--quiet", "--out", str(out), "--designs"]
-    assert robust_gains.main([*words, f"plain={shipped}", f"tolerant={shipped}"]) == 0
+    assert run_stage("robust_gains", [*words, f"plain={shipped}", f"tolerant={shipped}"]) == 0
     made = datasets.read(out, "gains").squeeze()
     counts = [made[name].item() for name in ("preset", "loads", "copies")]
     assert counts == ["tolerant", 1, 16]
@@ -98,7 +98,7 @@ def test_the_gain_of_a_preset_is_over_the_studys_own_design(
     text = (page / "index.html").read_text(encoding="utf-8")
     assert "<td>tolerant</td>" in text
     assert "<td>0.0%</td>" in text
-    assert robust_gains.main([*words, f"plain={shipped}"]) == 2
+    assert run_stage("robust_gains", [*words, f"plain={shipped}"]) == 2
     assert "one of a preset" in capsys.readouterr().err
 
 
@@ -120,10 +120,10 @@ def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path
     path.write_text(yaml.safe_dump(content))
     words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset"]
     own, chosen, out = (tmp_path / name for name in ("sqp.nc", "design.nc", "again.nc"))
-    assert design.main([*words, "quick", "--out", str(own)]) == 0
+    assert run_stage("design", [*words, "quick", "--out", str(own)]) == 0
     picked = ["--problem", str(path), "--preset", "quick", "--quiet", "--designs", str(own)]
-    assert select.main([*picked, "--out", str(chosen)]) == 0
-    assert design.main([*words, "again", "--start", str(chosen), "--out", str(out)]) == 0
+    assert run_stage("select", [*picked, "--out", str(chosen)]) == 0
+    assert run_stage("design", [*words, "again", "--start", str(chosen), "--out", str(out)]) == 0
     before, after = (datasets.read(name, "design_method") for name in (own, out))
     assert float(after["loss"][0]) == pytest.approx(float(before["best_loss"]), rel=1e-6)
     assert json.loads(after.attrs["parents"])["start"]
@@ -135,7 +135,7 @@ def test_a_start_is_given_where_one_is_asked_for(
 ) -> None:
     words = ["--problem", str(fig2), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
     more = ["--start", str(tmp_path / "design.nc")] if given else ["--preset", "worst"]
-    assert design.main([*words, *more]) == 2
+    assert run_stage("design", [*words, *more]) == 2
     assert "optimiser.start" in capsys.readouterr().err
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.problem import content_hash, section_hash
 from pipeline.problem.reading import load
 from pipeline.problem.sections import numbered
 from pipeline.problem.sections.designs import parted
 from pipeline.runtime import ROOT, UserError
-from pipeline.stages import design
 from pipeline.workflow.studies import Study, families, together
 from tests.pipeline import static
 
@@ -60,5 +60,5 @@ def test_the_workflow_knows_them() -> None:
 def test_one_of_several_has_to_be_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = static.write(tmp_path, static.HOLE + TWO)
     words = ["--problem", str(path), "--method", "sqp", "--out", str(tmp_path / "x.nc")]
-    assert design.main(words) == 2
+    assert run_stage("design", words) == 2
     assert "--preset 1" in capfd.readouterr().err

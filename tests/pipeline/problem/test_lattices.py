@@ -12,12 +12,12 @@ from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import new
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.problem import canonical_json, cloak_units, from_canonical, interest_units, void_units
 from pipeline.problem.outlines.network_files import COLUMNS
 from pipeline.problem.reading import load
 from pipeline.problem.sections import selected_units
 from pipeline.runtime import UserError
-from pipeline.stages import design, select, simulate
 from sim.structure import Lattice, quads
 from tests.pipeline.static import HOLE, MIMIC, write
 
@@ -88,9 +88,9 @@ def run(problem: Path) -> tuple[xr.Dataset, xr.Dataset]:
     made, chosen, moved = (
         str(problem.with_name(f"{name}.nc")) for name in ("design_sqp", "d", "r")
     )
-    assert design.main([*study, made, "--method", "sqp"]) == 0
-    assert select.main([*study, chosen, "--designs", made]) == 0
-    assert simulate.main([*study, moved, "--design", chosen]) == 0
+    assert run_stage("design", [*study, made, "--method", "sqp"]) == 0
+    assert run_stage("select", [*study, chosen, "--designs", made]) == 0
+    assert run_stage("simulate", [*study, moved, "--design", chosen]) == 0
     return datasets.read(chosen, "design"), datasets.read(moved, "response")
 
 

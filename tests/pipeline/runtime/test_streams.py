@@ -15,7 +15,7 @@ os.execv(sys.argv[1], [sys.argv[1], "-c", sys.argv[2], sys.argv[3]])
 STAGE = """
 import os, sys
 from pathlib import Path
-from pipeline import cli
+from pipeline.runtime import cli
 def work(args):
     with open(args.out, "w") as file:
         os.write(2, b"a library complains")

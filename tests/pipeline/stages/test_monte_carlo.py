@@ -7,9 +7,10 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of
 from pipeline.posing.perturbed import noises, simulate
-from pipeline.stages import monte_carlo, verify
+from pipeline.stages import verify
 from sim.core import SimulationError
 from tests.pipeline import static, unchanged
 
@@ -30,7 +31,7 @@ def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
         *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
         *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
     ]
-    assert monte_carlo.main(words) == 0
+    assert run_stage("monte_carlo", words) == 0
     return datasets.read(out, "scatter")
 
 
@@ -52,7 +53,7 @@ def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
     for k, part in enumerate(parts):
         run(folder, part, k, 2)
     out = tmp_path / "scatter.nc"
-    assert monte_carlo.main(["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    assert run_stage("monte_carlo", ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
     assert out.read_bytes() == (folder / "scatter.nc").read_bytes()
 
 
@@ -95,14 +96,14 @@ def test_a_problem_without_copies_is_told(
     path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
     words = ["--design", str(folder / "design.nc"), "--chunk", "0", "--chunks", "1"]
     out = ["--out", str(tmp_path / "scatter.nc")]
-    assert monte_carlo.main(["run", "--problem", str(path), *words, *out]) == 2
+    assert run_stage("monte_carlo", ["run", "--problem", str(path), *words, *out]) == 2
     assert "robustness" in capfd.readouterr().err
 
 
 def test_finer_load_steps_pass_the_same_states(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "verification.nc"
     words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
-    assert verify.main([*words, "--out", str(out)]) == 0
+    assert run_stage("verify", [*words, "--out", str(out)]) == 0
     made = datasets.read(out, "verification")
     assert list(made["check"].values)[:3] == ["as run", "2 x load steps", "10 x load steps"]
     finer = made.isel(check=slice(0, 3))

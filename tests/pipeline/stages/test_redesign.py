@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import law_comparison
-from pipeline.stages import redesign, simulate
 from tests.pipeline.static import GEOMETRIC as BUDGET
 
 
@@ -19,7 +19,7 @@ def study(hole: list[str]) -> Path:
     """Folder of a problem with design.nc and response.nc."""
     folder = Path(hole[1]).parent
     shipped, response = str(folder / "design.nc"), str(folder / "response.nc")
-    assert simulate.main([*hole, response, "--design", shipped]) == 0
+    assert run_stage("simulate", [*hole, response, "--design", shipped]) == 0
     return folder
 
 
@@ -32,8 +32,10 @@ def reconsidered(study: Path, out: Path, factor: float) -> tuple[xr.Dataset, xr.
     datasets.write(response, told, "response", response.attrs)
     options = ["--problem", str(study / "problem.yaml"), "--quiet", "--out"]
     first = ["--design", str(study / "design.nc"), "--response", str(told)]
-    assert redesign.main([*options, str(second), *first]) == 0
-    assert simulate.main([*options, str(moved), "--design", str(second), "--geometric"]) == 0
+    assert run_stage("redesign", [*options, str(second), *first]) == 0
+    assert (
+        run_stage("simulate", [*options, str(moved), "--design", str(second), "--geometric"]) == 0
+    )
     return datasets.read(second, "design"), datasets.read(moved, "response")
 
 
@@ -71,4 +73,4 @@ def test_the_budget_enters_the_hash_of_this_stage_only(study: Path) -> None:
     )
     other = asked.model_copy(update={"optimiser": optimiser})
     assert problem.section_hash(other, "design") == problem.section_hash(asked, "design")
-    assert problem.section_hash(other, "geometric") != problem.section_hash(asked, "geometric")
+    assert problem.section_hash(other, "redesign") != problem.section_hash(asked, "redesign")

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.stages import spectrum
+from pipeline.__main__ import run_stage
 from reports.products.spectrum import build
 from tests.pipeline.static import HOLE, write
 
@@ -37,7 +37,7 @@ def options(folder: Path, modes: int = 4, compression: float = 0.02) -> list[str
 def analysed(design: Path, folder: Path) -> Path:
     out = folder / "spectrum.nc"
     words = [*options(folder), "--design", str(design), "--out", str(out)]
-    assert spectrum.main(words) == 0
+    assert run_stage("spectrum", words) == 0
     return out
 
 
@@ -73,7 +73,7 @@ def test_what_cannot_be_analysed_is_one_message(
         (many, "spectrum.modes"),
         (folded, "spectrum.compressions"),
     ):
-        assert spectrum.main([*words, "--design", str(design), "--out", out]) == 2
+        assert run_stage("spectrum", [*words, "--design", str(design), "--out", out]) == 2
         told = capsys.readouterr().err
         assert f"key:    {key}" in told
         assert "problem.yaml" in told

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.posing.structure_variables import present_ligaments
-from pipeline.stages import design, select, simulate
 from sim.core import Floats, SimulationError
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
@@ -21,7 +21,7 @@ CLOSED = 12  # the unit that the void removes
 
 def simulated(hole: list[str], out: Path) -> int:
     shipped = str(Path(hole[1]).with_name("design.nc"))
-    return simulate.main([*hole, str(out), "--design", shipped])
+    return run_stage("simulate", [*hole, str(out), "--design", shipped])
 
 
 def test_from_problem_to_response(hole: list[str], tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_a_design_is_known_whatever_its_file_is_called(hole: list[str], tmp_path
     made = Path(hole[1]).with_name("design_sqp.nc")
     renamed = tmp_path / "mine.nc"
     renamed.write_bytes(made.read_bytes())
-    assert select.main([*hole, str(tmp_path / "d.nc"), "--designs", str(renamed)]) == 0
+    assert run_stage("select", [*hole, str(tmp_path / "d.nc"), "--designs", str(renamed)]) == 0
     assert datasets.read(tmp_path / "d.nc", "design").attrs["shipped_method"] == "sqp"
 
 
@@ -106,7 +106,7 @@ def test_nothing_is_kept_of_a_path_that_ends_at_once(
     stopping(0.1)
     assert simulated(hole, tmp_path / "r.nc") == 2
     assert "look at unit [3, 2]" in capsys.readouterr().err
-    assert design.main([*hole, str(tmp_path / "d.nc"), "--method", "sqp"]) == 2
+    assert run_stage("design", [*hole, str(tmp_path / "d.nc"), "--method", "sqp"]) == 2
     told = capsys.readouterr().err
     assert "the initial structure cannot be simulated" in told
     assert "drive.amplitude" in told

@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of, setting_losses
 from pipeline.problem.sections import Sweep, sweep_cases
 from pipeline.runtime import Casebook, SweepResult, UserError, case_log
-from pipeline.stages import sweep
-from sim.scene import evaluator, make_plan
+from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
 
 GRID = """sweep:
@@ -44,7 +44,7 @@ def run(folder: Path, out: Path, chunk: int = 0, chunks: int = 1) -> xr.Dataset:
         *("run", "--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")),
         *("--chunk", str(chunk), "--chunks", str(chunks), "--out", str(out)),
     ]
-    assert sweep.main(words) == 0
+    assert run_stage("sweep", words) == 0
     return datasets.read(out, "sweep")
 
 
@@ -66,7 +66,7 @@ def test_a_case_is_the_problem_with_its_setting(folder: Path, whole: xr.Dataset)
     text = (folder / "problem.yaml").read_text().partition("sweep:")[0]
     path.write_text(text.replace("bending_stiffness: 1.5", "bending_stiffness: 2"))
     scene = scene_of(problem.load(path), folder)
-    loss, _, _ = evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
+    loss, _, _ = Evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
     assert float(whole["loss_altered"][3]) == pytest.approx(loss, rel=1e-9)
     assert float(whole["loss"][3]) == pytest.approx(loss, rel=1e-9)  # of a design without a change
 
@@ -84,7 +84,7 @@ def test_parts_join_to_the_whole(folder: Path, whole: xr.Dataset, tmp_path: Path
     for k, part in enumerate(parts):
         run(folder, part, k, 4)
     out = tmp_path / "sweep.nc"
-    assert sweep.main(["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
+    assert run_stage("sweep", ["gather", "--parts", *map(str, parts), "--out", str(out)]) == 0
     assert out.read_bytes() == (folder / "sweep.nc").read_bytes()
 
 

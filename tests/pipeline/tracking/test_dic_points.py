@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
-from pipeline.stages import track
+from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
 from pipeline.tracking.geometry import of_design
 from tests.pipeline.virtual_lab.conftest import GRID
@@ -51,7 +51,7 @@ def export(tmp_path: Path) -> tuple[Path, np.ndarray]:
 def test_points_become_the_motions_of_their_units(export: tuple[Path, np.ndarray]) -> None:
     path, motion = export
     out = path.with_name("track.nc")
-    assert track.main(["points", str(path), "--out", str(out)]) == 0
+    assert run_stage("track", ["points", str(path), "--out", str(out)]) == 0
     made = datasets.read(out, "track")
     np.testing.assert_allclose(made["time"], [0.0, 1.0])
     error = made["displacement"].values - motion
@@ -80,6 +80,6 @@ def test_points_that_do_not_fit_are_refused(
 ) -> None:
     path, _ = export
     path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-    assert track.main(["points", str(path), "--out", str(path.with_name("track.nc"))]) == 2
+    assert run_stage("track", ["points", str(path), "--out", str(path.with_name("track.nc"))]) == 2
     assert told in capsys.readouterr().err
     assert not path.with_name("track.nc").exists()

@@ -1,4 +1,4 @@
-"""The first look at a video, by `pipeline.stages.track init`."""
+"""The first look at a video, by the stage `track init`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
-from pipeline.stages import track
+from pipeline.__main__ import run_stage
 from pipeline.tracking.detect import placed
 from pipeline.tracking.frames import frames, import_video, recording
 from pipeline.tracking.reference_frame import proposal
@@ -43,10 +43,12 @@ def test_a_proposal_is_a_recording_and_a_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = str(tmp_path)
-    assert track.main(["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]) == 0
+    assert (
+        run_stage("track", ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", folder]) == 0
+    )
     words = ["init", str(CLIPS / "f_silhouette.mp4"), "--out-dir", folder]
     words += ["--design", str(tmp_path / "f_silhouette_design.nc")]
-    assert track.main(words) == 0
+    assert run_stage("track", words) == 0
     assert "not told: case" in capsys.readouterr().err
     made = recording.load(tmp_path / "f_silhouette.yaml")
     assert (tmp_path / str(made.video)).resolve() == (CLIPS / "f_silhouette.mp4").resolve()
@@ -54,7 +56,7 @@ def test_a_proposal_is_a_recording_and_a_picture(
     drawn = cv2.imread(str(tmp_path / "f_silhouette_units.png"))
     assert drawn is not None
     assert drawn.shape == (1536, 1536, 3)
-    assert track.main(words) == 2
+    assert run_stage("track", words) == 2
     assert "there is a recording already" in capsys.readouterr().err
 
 

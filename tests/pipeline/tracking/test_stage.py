@@ -7,21 +7,24 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
-from pipeline.stages import track
+from pipeline.__main__ import run_stage
 from tests.pipeline.tracking.conftest import CLIPS
 
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """The bare clip, imported."""
-    assert track.main(["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)]) == 0
+    assert (
+        run_stage("track", ["import", str(CLIPS / "f_silhouette.yaml"), "--out-dir", str(tmp_path)])
+        == 0
+    )
     return tmp_path / "f_silhouette_recording.yaml"
 
 
 def refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> str:
     """What the stage says when it refuses; it must leave nothing behind."""
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out)]) == 2
+    assert run_stage("track", [str(recording), "--out", str(out)]) == 2
     assert not out.exists()
     return capsys.readouterr().err
 
@@ -38,7 +41,7 @@ def extended(recording: Path, line: str) -> None:
 
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
     design = datasets.read(recording.with_name("f_silhouette_design.nc"), "design")
     assert made["displacement"].dims == ("time", "unit", "dof")
@@ -64,7 +67,7 @@ def test_another_design_is_refused(
     changed(other, old, new)
     video = str(CLIPS / "f_silhouette.mp4")
     folder = str(recording.parent)
-    assert track.main(["import", str(other), "--video", video, "--out-dir", folder]) == 0
+    assert run_stage("track", ["import", str(other), "--video", video, "--out-dir", folder]) == 0
     words = refused(recording, capsys)
     assert "does not show this design" in words
     assert told in words
@@ -77,7 +80,7 @@ def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(recording
         asked = recording.with_name("turned.yaml")
         asked.write_text(changed_to, encoding="utf-8")
         out = recording.with_name("track.nc")
-        assert track.main([str(asked), "--out", str(out), "--no-report"]) == 0
+        assert run_stage("track", [str(asked), "--out", str(out), "--no-report"]) == 0
         made.append(datasets.read(out, "track")["displacement"].values)
     upright, turned_by_half = made
     assert np.abs(upright[-1, :, :2]).max() > 0.05
@@ -127,7 +130,7 @@ def test_the_load_cell_runs_on_the_clock_of_the_file_whatever_the_window(recordi
     log.write_text("time,force\n100,0\n101,1000\n", encoding="utf-8")
     extended(recording, "window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}")
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
     assert made["frame"].values[0] == 2
     np.testing.assert_allclose(made["load_force"], 1000 * made["frame"] / 300, atol=0.02)
@@ -142,7 +145,7 @@ def test_a_track_holds_the_displacement_of_the_driven_units(recording: Path) -> 
     datasets.write(design.assign(support=driven), path, "design", origin)
     extended(recording, "load_axis: driven displacement")
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 0
+    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
     mean = made["displacement"].isel(unit=[112, 113], dof=[0, 1]).mean("unit")
     np.testing.assert_allclose(made["drive_displacement"], mean.values, atol=1e-9)
@@ -171,7 +174,7 @@ def test_a_track_is_kept_where_its_log_is_of_another_time(
     recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
     extended(recording, "load_cell: {file: load.csv, offset: 70}")
     out = recording.with_name("track.nc")
-    assert track.main([str(recording), "--out", str(out), "--no-report"]) == 2
+    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 2
     assert "do not overlap: the track is kept" in capsys.readouterr().err
     made = datasets.read(out, "track")
     assert np.isnan(made["load_force"]).all()
@@ -184,11 +187,11 @@ def test_a_track_is_kept_where_its_log_is_of_another_time(
         (["frobnicate", "a.mp4"], "no such command"),
         (["init", "a.mp4"], "--design is wanted"),
         (["a.yaml"], "--out is wanted"),
-        (["a.mp4", "--out", "a.nc"], "pipeline.stages.track init a.mp4"),
+        (["a.mp4", "--out", "a.nc"], "pipeline track init a.mp4"),
     ],
 )
 def test_a_command_that_lacks_something_is_told_what(
     words: list[str], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert track.main(words) == 2
+    assert run_stage("track", words) == 2
     assert told in capsys.readouterr().err

@@ -10,11 +10,12 @@ import xarray as xr
 import yaml
 
 from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import Shaking
 from pipeline.runtime import UserError
-from pipeline.stages import film, track, virtual_specimen
+from pipeline.stages import virtual_specimen
 from pipeline.tracking.frames import Recording, load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
 from pipeline.virtual_lab.imperfect_specimen import Shaken, shaken
@@ -149,9 +150,9 @@ def test_an_assembled_lattice_is_recognised_and_tracked(files: Path, tmp_path: P
     words = ["render", str(asked), "--response", str(tmp_path / "made.nc"), "--quiet"]
     out = tmp_path / "run.mp4"
     design = ["--design", str(files / "design.nc")]
-    assert film.main([*words, *design, "--out", str(out)]) == 0
+    assert run_stage("film", [*words, *design, "--out", str(out)]) == 0
     found = ["--out", str(tmp_path / "track.nc"), "--no-report", "--quiet"]
-    assert track.main([str(out.with_suffix(".yaml")), *found]) == 0
+    assert run_stage("track", [str(out.with_suffix(".yaml")), *found]) == 0
     seen = datasets.read(tmp_path / "track.nc", "track")
     truth = datasets.read(tmp_path / "run_truth.nc", "truth")
     error = (seen["displacement"] - truth["displacement"]).values
@@ -167,7 +168,7 @@ def test_a_load_cell_has_a_clock_and_noise_of_its_own(files: Path, tmp_path: Pat
     asked.write_text(yaml.safe_dump({"virtual": setup}), encoding="utf-8")
     words = ["weigh", str(asked), "--response", str(files / "response.nc")]
     outs = [tmp_path / name for name in ("a.csv", "b.csv")]
-    assert [film.main([*words, "--out", str(out)]) for out in outs] == [0, 0]
+    assert [run_stage("film", [*words, "--out", str(out)]) for out in outs] == [0, 0]
     assert outs[0].read_bytes() == outs[1].read_bytes()
     assert "SYNTHETIC" in outs[0].read_text(encoding="utf-8").splitlines()[0]
     held = LoadCellLog(file="a.csv", offset=1.5)
@@ -181,4 +182,4 @@ def test_a_load_cell_has_a_clock_and_noise_of_its_own(files: Path, tmp_path: Pat
     assert found.clock[0] == -1.5
     assert found.clock[-1] > 1.1
     asked.write_text(yaml.safe_dump({"virtual": SETUP}), encoding="utf-8")
-    assert film.main([*words, "--out", str(outs[0])]) == 2
+    assert run_stage("film", [*words, "--out", str(outs[0])]) == 2

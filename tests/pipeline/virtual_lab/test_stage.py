@@ -9,8 +9,7 @@ import pytest
 import yaml
 
 from pipeline import datasets
-from pipeline.stages import film as virtual_lab
-from pipeline.stages import track
+from pipeline.__main__ import run_stage
 from pipeline.virtual_lab.filming import Filming
 from tests.pipeline.virtual_lab.conftest import SETUP
 
@@ -24,7 +23,7 @@ def recording(folder: Path, **changes: object) -> Path:
 
 def render(files: Path, asked: Path, out: Path) -> int:
     words = ["render", str(asked), "--response", str(files / "response.nc"), "--quiet"]
-    return virtual_lab.main([*words, "--design", str(files / "design.nc"), "--out", str(out)])
+    return run_stage("film", [*words, "--design", str(files / "design.nc"), "--out", str(out)])
 
 
 def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> None:
@@ -37,7 +36,10 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
     with out.with_suffix(".yaml").open("w", encoding="utf-8") as file:
         file.write(described.replace("synthetic: true\n", ""))  # the video itself says so
         file.write("load_cell: {file: load.csv, time: s, force: N, offset: 5}\n")
-    assert track.main([str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")]) == 0
+    assert (
+        run_stage("track", [str(out.with_suffix(".yaml")), "--out", str(tmp_path / "track.nc")])
+        == 0
+    )
     made = datasets.read(tmp_path / "track.nc", "track")
     truth = datasets.read(tmp_path / "run_truth.nc", "truth")
     assert made.attrs["synthetic"] == truth.attrs["synthetic"] == "yes"
@@ -97,7 +99,7 @@ def test_what_cannot_be_filmed_is_refused(
 def test_a_plan_tells_what_to_expect(files: Path, tmp_path: Path) -> None:
     words = ["plan", "--response", str(files / "response.nc"), "--frames", "16", "--quiet"]
     words += [str(recording(tmp_path)), "--codec", "ffv1", "h264:40"]
-    assert virtual_lab.main([*words, "--csv", str(tmp_path / "plan.csv")]) == 0
+    assert run_stage("film", [*words, "--csv", str(tmp_path / "plan.csv")]) == 0
     with (tmp_path / "plan.csv").open(encoding="utf-8") as file:
         lossless, coarse = csv.DictReader(file)
     assert lossless["codec"] == "ffv1"
@@ -110,8 +112,8 @@ def test_a_plan_without_sense_is_refused(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["plan", "--response", str(files / "response.nc"), "--csv", str(tmp_path / "plan.csv")]
-    assert virtual_lab.main([*words, "--codec", "vhs"]) == 2
-    assert virtual_lab.main([*words, "--fps", "-3"]) == 2
+    assert run_stage("film", [*words, "--codec", "vhs"]) == 2
+    assert run_stage("film", [*words, "--fps", "-3"]) == 2
     told = capsys.readouterr().err
     assert "no such codec" in told
     assert "greater than zero" in told

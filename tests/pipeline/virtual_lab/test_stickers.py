@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pipeline import datasets
+from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
-from pipeline.virtual_lab import print_markers
 from tests.pipeline.tracking.test_dic_points import SMALL
 
 POINT = 72 / 25.4
@@ -34,7 +34,7 @@ def test_faces_and_dots_have_their_size(design: Path, tmp_path: Path) -> None:
     outs = [tmp_path / name / "marks.pdf" for name in ("a", "b")]
     for out in outs:
         words = ["--design", str(design), "--out", str(out), "--diameter", "2.5", "--count", "2"]
-        assert print_markers.main([*words, "--spread", "5", "--quiet"]) == 0
+        assert run_stage("markers", [*words, "--spread", "5", "--quiet"]) == 0
     assert outs[0].read_bytes() == outs[1].read_bytes()
     (page,) = drawn(outs[0])
     circles = re.findall(r"([\d.]+) ([\d.]+) m((?: [\d.]+){6} c){4}", page.replace("\n", " "))
@@ -49,7 +49,7 @@ def test_faces_and_dots_have_their_size(design: Path, tmp_path: Path) -> None:
 def test_speckle_is_thrown_on_all_faces(design: Path, tmp_path: Path) -> None:
     out = tmp_path / "speckle.pdf"
     words = ["--design", str(design), "--out", str(out), "--kind", "speckle", "--faces", "light"]
-    assert print_markers.main([*words, "--quiet"]) == 0
+    assert run_stage("markers", [*words, "--quiet"]) == 0
     (page,) = drawn(out)
     assert page.count(" c ") + page.count(" c\n") > 16 * 10 * 4
 
@@ -58,6 +58,8 @@ def test_dots_that_cannot_be_printed_are_refused(
     design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "marks.pdf"
-    assert print_markers.main(["--design", str(design), "--out", str(out), "--diameter", "40"]) == 2
+    assert (
+        run_stage("markers", ["--design", str(design), "--out", str(out), "--diameter", "40"]) == 2
+    )
     assert "cannot be printed" in capsys.readouterr().err
     assert not out.exists()

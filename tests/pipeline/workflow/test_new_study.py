@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.problem import void_units
 from pipeline.problem.reading import load
-from pipeline.workflow import new_study
 
 CAT = Path(__file__).parents[3] / "experiments/shapes/cat.png"
 
 
 @pytest.mark.parametrize("kind", ["static", "dynamic"])
 def test_a_template_is_a_problem(tmp_path: Path, kind: str) -> None:
-    assert new_study.main(["my_study", "--kind", kind, "--folder", str(tmp_path)]) == 0
+    assert run_stage("new", ["my_study", "--kind", kind, "--folder", str(tmp_path)]) == 0
     path = tmp_path / "my_study/problem.yaml"
     assert load(path).title == "My study"
     assert "draft" in load(path, "quick").title
@@ -23,7 +23,7 @@ def test_a_template_is_a_problem(tmp_path: Path, kind: str) -> None:
 
 
 def test_an_image_becomes_the_void(tmp_path: Path) -> None:
-    assert new_study.main(["cat", "--image", str(CAT), "--folder", str(tmp_path)]) == 0
+    assert run_stage("new", ["cat", "--image", str(CAT), "--folder", str(tmp_path)]) == 0
     assert (tmp_path / "cat/cat.png").read_bytes() == CAT.read_bytes()
     assert len(void_units(load(tmp_path / "cat/problem.yaml"))) > 30
 
@@ -42,7 +42,7 @@ def test_a_mistake_makes_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], told: str
 ) -> None:
     (tmp_path / "taken").mkdir()
-    assert new_study.main([*words, "--folder", str(tmp_path)]) == 2
+    assert run_stage("new", [*words, "--folder", str(tmp_path)]) == 2
     error = capsys.readouterr().err
     assert told in error
     assert "remedy:" in error

@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 import yaml
 
+from pipeline.__main__ import run_stage
 from pipeline.workflow import problem_schema
 
 Problem = dict[str, Any]
@@ -30,12 +31,12 @@ def validator() -> jsonschema.Draft202012Validator:
 def test_the_committed_schema_is_up_to_date(fig2: Path) -> None:
     committed = fig2.parents[1] / problem_schema.DEFAULT.name
     assert committed.read_text(encoding="utf-8") == problem_schema.text(), (
-        "run python -m pipeline.workflow.problem_schema"
+        "run python -m pipeline schema"
     )
 
 
 def test_the_command_writes_it(tmp_path: Path) -> None:
-    assert problem_schema.main(["--out", str(tmp_path / "schema.json")]) == 0
+    assert run_stage("schema", ["--out", str(tmp_path / "schema.json")]) == 0
     assert json.loads((tmp_path / "schema.json").read_bytes()) == problem_schema.schema()
 
 

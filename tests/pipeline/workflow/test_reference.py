@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.runtime import ROOT
-from pipeline.workflow.reference.__main__ import main, pages
+from pipeline.workflow.reference.write_pages import pages
 
 NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
 
@@ -15,11 +16,11 @@ NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
 @pytest.mark.parametrize("name", NAMES)
 def test_the_committed_page_is_up_to_date(name: str) -> None:
     committed = (ROOT / "docs" / name).read_text(encoding="utf-8")
-    assert committed == pages()[name], "run python -m pipeline.workflow.reference"
+    assert committed == pages()[name], "run python -m pipeline reference"
 
 
 def test_the_command_writes_them(tmp_path: Path) -> None:
-    assert main(["--folder", str(tmp_path)]) == 0
+    assert run_stage("reference", ["--folder", str(tmp_path)]) == 0
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == pages()
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.__main__ import run_stage
 from pipeline.workflow import reproduce
 
 
@@ -35,7 +36,7 @@ def test_two_equal_builds_are_reproducible(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(reproduce, "_built", build("same"))
-    assert reproduce.main(["fig2@quick"]) == 0
+    assert run_stage("reproduce", ["fig2@quick"]) == 0
     assert (
         "fig2@quick: two builds have the same bytes (files compared: 1)" in capsys.readouterr().err
     )
@@ -45,7 +46,7 @@ def test_files_that_differ_are_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(reproduce, "_built", build(""))
-    assert reproduce.main(["fig2@quick"]) == 2
+    assert run_stage("reproduce", ["fig2@quick"]) == 2
     assert "1 of 1 files differ between two builds: design" in capsys.readouterr().err
 
 
@@ -53,5 +54,5 @@ def test_a_build_that_fails_is_told(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(reproduce, "SOURCES", ())
-    assert reproduce.main(["fig2@quick"]) == 2
+    assert run_stage("reproduce", ["fig2@quick"]) == 2
     assert "the build failed" in capsys.readouterr().err

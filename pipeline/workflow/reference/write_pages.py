@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
-from pathlib import Path
-
-from pipeline.runtime import cli
 
 
 def pages() -> dict[str, str]:
@@ -21,16 +16,3 @@ def work(args: argparse.Namespace) -> None:
     """Writes them."""
     for name, text in pages().items():
         (args.folder / name).write_text(text, encoding="utf-8")
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point."""
-    parser = cli.parser("pipeline.workflow.reference", str(__doc__), study=False)
-    parser.add_argument(
-        "--folder", type=Path, default=Path("docs"), help="where they go (default: %(default)s)"
-    )
-    return cli.run(work, parser, argv)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
