@@ -122,7 +122,7 @@ def in_turn(
 
 
 class _Point:
-    """A method at a setting under measurement; the arguments go to the worker to prepare it."""
+    """Measures a method at a setting; the arguments go to the worker to prepare it."""
 
     def __init__(
         self,

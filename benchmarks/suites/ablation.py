@@ -23,7 +23,7 @@ from benchmarks.harness import (
     measure_settings,
     result_of,
 )
-from benchmarks.methods.own_solvers import gradient_run, loss_run, warmed_up
+from benchmarks.methods import gradient_run, loss_run, warmed_up
 from benchmarks.scenes import load_cases
 from benchmarks.suites import fresh_process, warm
 from sim.core import Ints

@@ -51,6 +51,5 @@ def _no_cache() -> Iterator[None]:
 
 def _default(name: str) -> Run:
     """Prepares the loss by the scene's own plan."""
-    own = methods.own_solvers
     solver = sim_scene.make_plan(scenes.scene(name)).solver
-    return own.warmed_up(own.loss_run(scenes.case(name), solver))
+    return methods.warmed_up(methods.loss_run(scenes.case(name), solver))

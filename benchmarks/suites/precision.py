@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 
 from benchmarks.harness import Method, Run, Sample, Suite, Target, error_of, in_turn
-from benchmarks.methods.own_solvers import SPLITTINGS, refined_times
+from benchmarks.methods import SPLITTINGS, refined_times
 from benchmarks.scenes import paper_scenes
 from pipeline.runtime import ROOT
 from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, parameters_of_design

@@ -46,7 +46,7 @@ MOVED = np.array([-5.0, 2.0, 0.2])
 
 
 class EquivalentProblem(NamedTuple):
-    """Another way to tell the same problem.
+    """Poses the same problem in other coordinates and order.
 
     Attributes:
         turn: (2, 2) rotation, or rotation and mirror.
@@ -81,19 +81,19 @@ def _equivalent(
     draws: RandomDesigns, seed: int, kind: str, solver: str, contact: ContactModel
 ) -> Sequence[Check]:
     lattice = replace(squares(COLUMNS), vertices=draws(seed))
-    telling = _telling(kind, lattice, np.random.default_rng(seed))
+    restated = _restatement(kind, lattice, np.random.default_rng(seed))
     one = _posed(lattice, _same(lattice), contact)
-    other = _posed(_told(lattice, telling), telling, contact)
+    other = _posed(_restated(lattice, restated), restated, contact)
     first, second = (solved(case, _solver(case, solver)).displacement for case in (one, other))
-    wanted = first.reshape(len(first), -1, 3)[:, telling.order]
+    wanted = first.reshape(len(first), -1, 3)[:, restated.order]
     wanted = np.concatenate(
-        [wanted[..., :2] @ telling.turn.T, np.linalg.det(telling.turn) * wanted[..., 2:]], axis=-1
+        [wanted[..., :2] @ restated.turn.T, np.linalg.det(restated.turn) * wanted[..., 2:]], axis=-1
     )
     off = np.abs(wanted - second.reshape(wanted.shape)).max() / np.abs(wanted).max()
     return [Check("difference from the same told otherwise", float(off), EXACT)]
 
 
-def _telling(kind: str, lattice: Lattice, random: np.random.Generator) -> EquivalentProblem:
+def _restatement(kind: str, lattice: Lattice, random: np.random.Generator) -> EquivalentProblem:
     told = _same(lattice)
     angle = random.uniform(0.2, 6.0)
     c, s = np.cos(angle), np.sin(angle)
@@ -119,18 +119,18 @@ def _same(lattice: Lattice) -> EquivalentProblem:
     )
 
 
-def _told(lattice: Lattice, telling: EquivalentProblem) -> Lattice:
-    placed = lattice.vertices @ telling.turn.T + telling.shift
-    rings = [placed[lattice.unit == unit].tolist() for unit in telling.order]
+def _restated(lattice: Lattice, restated: EquivalentProblem) -> Lattice:
+    placed = lattice.vertices @ restated.turn.T + restated.shift
+    rings = [placed[lattice.unit == unit].tolist() for unit in restated.order]
     ends = lattice.ligaments.copy()
-    ends[telling.exchanged] = ends[telling.exchanged, ::-1]
+    ends[restated.exchanged] = ends[restated.exchanged, ::-1]
     return listed(rings, placed[ends].tolist(), lattice.spacing)
 
 
-def _posed(lattice: Lattice, telling: EquivalentProblem, contact: ContactModel) -> StressScene:
-    """The left column clamped, the right one pushed, turned and sheared."""
-    column = telling.order % COLUMNS
-    push = np.concatenate([telling.turn @ MOVED[:2], [np.linalg.det(telling.turn) * MOVED[2]]])
+def _posed(lattice: Lattice, restated: EquivalentProblem, contact: ContactModel) -> StressScene:
+    """Clamps the left column; pushes, turns and shears the right one."""
+    column = restated.order % COLUMNS
+    push = np.concatenate([restated.turn @ MOVED[:2], [np.linalg.det(restated.turn) * MOVED[2]]])
     share = (1.0 - np.cos(np.pi * TIMES / DURATION)) / 2.0
     motion = TimeSeries(TIMES, share[:, None] * push)
     left, right = (np.flatnonzero(column == end) for end in (0, COLUMNS - 1))
@@ -219,7 +219,7 @@ def _with(case: StressScene, state: Floats, free: Floats) -> Floats:
 
 
 def _at(case: StressScene, state: Floats, free: Floats) -> tuple[float, Floats]:
-    """Energy and its gradient by the free dofs."""
+    """Computes the energy and its gradient by the free dofs."""
     found = balance(case.structure, _with(case, state, free))
     return found.energy, -found.force[case.topology.free_dofs]
 

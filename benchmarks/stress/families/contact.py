@@ -80,7 +80,7 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
 
 
 def _jolts() -> Iterator[StressCase]:
-    """Held units that are beyond the barrier from the first moment, or get there."""
+    """Yields held units that are beyond the barrier from the first moment, or get there."""
     for start, sense in ((-2.0, "further"), (-2.0, "back")):
         end = -3.0 if sense == "further" else 0.0
         series = TimeSeries(np.array([0.0, 0.01]), np.array([[0, 0, start], [0, 0, end]]))
@@ -185,7 +185,7 @@ def _nonsense() -> Iterator[StressCase]:
 
 
 def _spoilt(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:
-    """One number of a field replaced."""
+    """Replaces one number of a field."""
     case = pressed(squares(5), 0.05) if name == "static" else _case()
     bad = np.array(getattr(case.values, field))
     bad.flat[len(bad.flat) // 2] = value

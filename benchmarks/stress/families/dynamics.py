@@ -80,7 +80,7 @@ def _damping(factor: float) -> dict[str, Any]:
 
 
 def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterator[StressCase]:
-    """A structure of these constants pressed, and shaken slowly and fast."""
+    """Presses a structure of these constants, and shakes it slowly and fast."""
     if stiff:
         plate = pressed(squares(SIDE), 0.08).with_material(**constants)
         yield attempt(f"{name}, pressed", equilibria, plate, LOADS)
@@ -134,7 +134,7 @@ def _small_scene() -> StressScene:
 
 
 def _implicit(n_steps: int) -> Sequence[Check]:
-    """As many steps as asked for, or more: what they say, not how well they resolve the drive."""
+    """Checks as many steps as asked for, or more, not how well they resolve the drive."""
     case, times = _small_scene(), np.linspace(0.0, DURATION, n_steps + 1)
     solver = ImplicitSolver(case.topology, times, times[-1:])
     answer = solved(case, solver)
@@ -191,7 +191,7 @@ def balances(small: bool) -> Iterator[StressCase]:
 
 
 def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: Any) -> StressScene:  # noqa: ANN401
-    """Undamped squares, the middle one pushed and turned within PUSHED, then held."""
+    """Pushes and turns the middle of undamped squares within PUSHED, then holds it."""
     times = np.linspace(0.0, PUSHED, 41)
     share = (1.0 - np.cos(np.pi * times / PUSHED)) / 2.0
     series = TimeSeries(times, share[:, None] * np.array([1.5, 0.8, 0.06]))
@@ -200,7 +200,7 @@ def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: Any) -> StressSc
 
 
 def _run(case: StressScene, n_steps: int, asked: Floats) -> Answer:
-    """Explicit steps of 20 microseconds, less than half the limit."""
+    """Takes explicit steps of 20 microseconds, less than half the limit."""
     return solved(case, ExplicitSolver(case.topology, float(asked[-1]), n_steps, asked))
 
 
@@ -223,7 +223,7 @@ def _spent(case: StressScene) -> Sequence[Check]:
 
 
 def _lost(case: StressScene) -> Sequence[Check]:
-    """An L-stable method may lose energy but never gain any."""
+    """Checks that an L-stable method never gains energy; it may lose some."""
     asked = np.linspace(0.0, 0.01, 2001)
     solver = ImplicitSolver(case.topology, asked[::4], asked, tolerance=1e-6)
     answer = solved(case, solver)
@@ -233,7 +233,7 @@ def _lost(case: StressScene) -> Sequence[Check]:
 
 
 def _momentum(case: StressScene) -> Sequence[Check]:
-    """Impulse and angular impulse of the one held unit against the momentum of all others."""
+    """Compares impulse and angular impulse of the held unit with the momentum of all others."""
     asked = np.linspace(0.0, 0.01, 2001)
     answer = _run(case, 500, asked)
     n = len(asked)

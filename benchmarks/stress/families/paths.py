@@ -126,7 +126,7 @@ def _rigid(turns: float) -> Sequence[Check]:
 
 
 def _rolled(turns: float) -> Sequence[Check]:
-    """A long chain bent into a spiral: its last unit goes where that of a closing ring would."""
+    """Bends a long chain into a spiral: its last unit goes where that of a closing ring would."""
     n_units = 41
     chain = quads(n_units, 1, 15.0, 2.25, 0.0)
     n = 121
@@ -141,7 +141,7 @@ def _rolled(turns: float) -> Sequence[Check]:
 
 
 def _arc_end(turn: Floats, n_units: int) -> Floats:
-    """Place (n, 2) of the last of units whose centres lie on a polygon with that turn at each."""
+    """Returns the end (n, 2) of units whose centres lie on a polygon with that turn at each."""
     angles = turn[:, None] * (np.arange(n_units - 1) + 0.5)
     return 15.0 * np.stack([np.cos(angles).sum(axis=1), np.sin(angles).sum(axis=1)], axis=1)
 

@@ -93,7 +93,7 @@ def pieces(small: bool) -> Iterator[StressCase]:
 
 
 def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
-    """Lattices, and whether they have a stable equilibrium under a load."""
+    """Yields lattices, and whether they have a stable equilibrium under a load."""
     whole = squares(SIDE)
     yield "a whole lattice", whole, "solution"
     yield "a floating unit", _cut(whole, np.array([12])), "refusal"
@@ -104,21 +104,21 @@ def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
 
 
 def _cut(lattice: Lattice, units: Ints, keep: int = 0) -> Lattice:
-    """Without all but ``keep`` of the ligaments between these units and the others."""
+    """Cuts all but ``keep`` of the ligaments between these units and the others."""
     inside = np.isin(lattice.ligament_units, units)
     crossing = np.flatnonzero(inside[:, 0] != inside[:, 1])[keep:]
     return replace(lattice, ligaments=np.delete(lattice.ligaments, crossing, axis=0))
 
 
 def shaken_ends(lattice: Lattice, integrator: str) -> StressScene:
-    """The left column clamped, the right one shaken."""
+    """Clamps the left column, shakes the right one."""
     left, right = (np.flatnonzero(lattice.index[:, 0] == end) for end in (0, SIDE - 1))
     motion = Harmonic(0.5, 60.0, 0.3)
     return posed(lattice, left, right, motion, duration=0.02, frequency=60.0, integrator=integrator)
 
 
 def _odd() -> Iterator[StressCase]:
-    """What hardly is a lattice any more."""
+    """Yields what hardly is a lattice any more."""
     free = posed(squares(3), NONE, [4], LinearRamp(1.0, 1.0), static=True)
     yield attempt("held by nothing but the driven unit", equilibria, free, LOADS)
     chain = quads(2, 1, 15.0, 2.25, 0.3)
@@ -138,7 +138,7 @@ def _odd() -> Iterator[StressCase]:
 
 
 def _cloak(unit: int, static: bool) -> Sequence[Check]:
-    """Slope of the loss along a random direction against differences of it."""
+    """Compares the slope of the loss along a random direction with differences of it."""
     lattice = squares(SIDE)
     case = (
         pressed(lattice, 0.05)
