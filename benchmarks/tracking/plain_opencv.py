@@ -28,7 +28,7 @@ _LIKE = 0.6
 
 
 def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float) -> Floats:
-    """Returns displacements (frames, units, 3), mm, rad; NaN where fewer than two corners are found."""
+    """Returns displacements (frames, units, 3), mm, rad; NaN where no two corners are found."""
     first = next(images)
     found = sight(first, specimen, px_per_mm)[0]
     flip = np.array([px_per_mm, -px_per_mm])
