@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -60,7 +61,7 @@ class WarmStart:
 
     def __init__(self, warm: bool) -> None:
         self.warm = warm
-        self.total: dict[str, int] = {}
+        self.total: Counter[str] = Counter()
         self._records: Sequence[StaticRecord] | None = None
 
     def start(self) -> Sequence[StaticRecord] | None:
@@ -72,8 +73,7 @@ class WarmStart:
         del design
         self._records = records
         for record in records:
-            for what, count in paper_scenes.work_of(record).items():
-                self.total[what] = self.total.get(what, 0) + count
+            self.total.update(paper_scenes.work_of(record))
 
     def forget(self) -> None:
         """Begins anew."""
