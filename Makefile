@@ -126,7 +126,7 @@ bench: dev
 	$(BIN)/python -m benchmarks
 
 bench-tracking: dev
-	$(BIN)/python -m benchmarks.tracking --folder "$(VIDEOS)"
+	$(BIN)/python -m benchmarks tracking --videos "$(VIDEOS)"
 
 stress: dev
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \

@@ -19,7 +19,7 @@ _BASELINE = ("diffrax", "pseudo-dynamics")
 
 
 class TableRow(NamedTuple):
-    """A candidate: its time, s, and its first error, relative."""
+    """Holds a method's time, s, and its first error, relative."""
 
     name: str
     time: float
@@ -27,7 +27,7 @@ class TableRow(NamedTuple):
 
 
 def tables(text: str) -> dict[str, list[TableRow]]:
-    """The tables of the page, by the names of their scenes."""
+    """Reads the tables of the page, by the names of their suites."""
     return {
         scene: [
             TableRow(name, float(time), float(error)) for name, time, error in _ROW.findall(rows)
@@ -37,7 +37,7 @@ def tables(text: str) -> dict[str, list[TableRow]]:
 
 
 def figure(measured: dict[str, list[TableRow]]) -> Figure:
-    """Time of loss and gradient beside the baselines, and time against error."""
+    """Draws the time of loss and gradient beside the baselines, and time against error."""
     drawn, (left, right) = plt.subplots(
         1, 2, figsize=(style.TWO_COLUMNS / style.MM_PER_INCH, 2.5), width_ratios=(1, 1.2)
     )

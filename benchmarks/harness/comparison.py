@@ -1,4 +1,4 @@
-"""A benchmark beside the last one that was stored: ratios to a yardstick, never seconds.
+"""Compares a suite with the last one that was stored: ratios to a yardstick, never seconds.
 
 The yardstick is a fixed job of LAPACK and of the interpreter, timed on the same core just before,
 so that another machine, or the same one with other company, is compared fairly.
@@ -15,10 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_factor
 
-from benchmarks.harness.records import BenchmarkReport, CandidateResult
-from benchmarks.harness.storage import ROOT
-from benchmarks.harness.text_table import error_columns
-from pipeline.runtime import write_atomically
+from benchmarks.harness.records import Measurement, quantities
+from pipeline.runtime import ROOT, write_atomically
 
 STORED = ROOT / "tests/data/benchmarks.json"
 WORSE = 1.15
@@ -31,7 +29,7 @@ Record = dict[str, Any]
 
 
 def yardstick() -> float:
-    """Processor time of the fixed job, the least of some runs, s."""
+    """Times the fixed job, the least processor time of some runs, s."""
     square = np.random.default_rng(0).normal(size=(_SIZE, _SIZE))
     matrix = square @ square.T + _SIZE * np.eye(_SIZE)
 
@@ -45,38 +43,39 @@ def yardstick() -> float:
     return min(job() for _ in range(_ROUNDS))
 
 
-def record(report: BenchmarkReport, yard: float) -> Record:
-    """What is kept of a report: times in yardsticks, errors, machine and commit."""
-    made = report.machine
-    kinds = error_columns(report.outcomes)
+def record(measured: list[Measurement], about: Mapping[str, Any], yard: float) -> Record:
+    """Collects what is kept of a suite: times in yardsticks, errors, machine and commit."""
     return {
-        **{key: made[key] for key in ("processor", "commit", "date")},
+        **{key: about[key] for key in ("processor", "commit", "date")},
         "candidates": {
-            one.name: {"time": one.seconds / yard, "errors": _errors(one, kinds)}
-            for one in report.outcomes
-            if one.cpu_s and not one.stored
+            one.name: {
+                "time": one.seconds / yard,
+                "errors": {
+                    name: one.error(name)
+                    for name in quantities(measured)
+                    if np.isfinite(one.error(name))
+                },
+            }
+            for one in measured
+            if one.cpu_s
         },
     }
 
 
-def _errors(one: CandidateResult, kinds: list[str]) -> dict[str, float]:
-    return {kind: one.error(kind) for kind in kinds if np.isfinite(one.error(kind))}
-
-
 def stored(path: Path = STORED) -> dict[str, Record]:
-    """The records kept, by benchmark."""
+    """Reads the records kept, by suite."""
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
 
 
 def keep(name: str, made: Record, path: Path = STORED) -> None:
-    """Stores the record of a benchmark beside those of the others."""
+    """Stores the record of a suite beside those of the others."""
     records = dict(sorted({**stored(path), name: made}.items()))
     with write_atomically(path) as aside:
         aside.write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
 
 def worse(now: Record, before: Mapping[str, Any]) -> list[str]:
-    """What got slower or less accurate by more than 15 %, a line each."""
+    """Lists what got slower or less accurate by more than 15 %, a line each."""
     lines = []
     for name, found in now["candidates"].items():
         known = before["candidates"].get(name)
@@ -91,8 +90,8 @@ def worse(now: Record, before: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def told(name: str, now: Record, path: Path = STORED) -> str:
-    """The comparison with what is stored, in words."""
+def compared(name: str, now: Record, path: Path = STORED) -> str:
+    """Tells the comparison with what is stored."""
     before = stored(path).get(name)
     if before is None:
         return "  nothing stored to compare with: --keep stores this"

@@ -1,18 +1,27 @@
-"""What a benchmark is, and what comes out of it: plain records."""
+"""Defines what is measured and what comes out of it: plain records."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from sim.core import Floats
 
+if TYPE_CHECKING:  # every worker loads this module: it stays light
+    import xarray as xr
+
+    from pipeline.datasets.tables import Kind
+
+Task = Literal["loss", "gradient"]
+Tell = Callable[[str], None]
+NAN = float("nan")
+
 
 class Sample(NamedTuple):
-    """What one run of a candidate found.
+    """Holds the results of one run of a method.
 
     Attributes:
         values: results by name. Each is compared with the reference's result of the same name; in
@@ -29,13 +38,17 @@ Run = Callable[[], Sample]
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One way to compute what a benchmark asks for.
+class Method:
+    """Names one way to compute a suite's result, and its settings.
 
     Attributes:
         name: as the table shows it.
         prepare: builds and compiles; the run that it returns is what is timed. It is sent to a
-            process of its own: a function of a module, or a ``functools.partial`` of one.
+            process of its own: a function of a module, or a ``functools.partial`` of one. It takes
+            the value of a setting and the task, or nothing where there are no settings.
+        settings: from loose to tight, by name and value.
+        own: whether it is one of ours.
+        tasks: what it can do.
         repeats: at most so many timed runs; None for as many as asked for.
         share: part of the whole job that a run does; times are divided by it (one of four load
             cases: 0.25).
@@ -45,7 +58,10 @@ class Candidate:
     """
 
     name: str
-    prepare: Callable[[], Run]
+    prepare: Callable[..., Run]
+    settings: tuple[tuple[str, float], ...] = ()
+    own: bool = True
+    tasks: tuple[Task, ...] = ("loss", "gradient")
     repeats: int | None = None
     share: float = 1.0
     timed: bool = True
@@ -54,75 +70,83 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class CandidateResult:
-    """Figures of one candidate.
+class Measurement:
+    """Holds the figures of a method at a setting.
 
     Attributes:
-        name, note: of the candidate.
+        method, setting, task, own, note: as in the method.
+        units: of the lattice.
         compile_s: wall time to build, compile and warm up, s.
         cpu_s: processor time of each run over the share of the job that it did, s.
         wall_s: the same by the clock, s; longer on a machine that others use too.
         errors: relative error of each value by its name.
         work: counts, of what one run did.
-        peak_mib: peak resident memory of the candidate's process, MiB.
+        peak_mib: peak resident memory of the process, MiB.
         failure: why it has no figures, or empty.
-        stored: date, machine and commit of an older measurement that these figures are from, or
-            empty.
     """
 
-    name: str
+    method: str
+    setting: str = ""
+    task: Task = "gradient"
+    own: bool = True
     note: str = ""
-    compile_s: float = float("nan")
+    units: int = 0
+    compile_s: float = NAN
     cpu_s: tuple[float, ...] = ()
     wall_s: tuple[float, ...] = ()
     errors: Mapping[str, float] = field(default_factory=dict)
     work: Mapping[str, int] = field(default_factory=dict)
-    peak_mib: float = float("nan")
+    peak_mib: float = NAN
     failure: str = ""
-    stored: str = ""
+
+    @property
+    def name(self) -> str:
+        """Joins method, setting and task; without a setting, the method alone."""
+        return f"{self.method}, {self.setting}, {self.task}" if self.setting else self.method
 
     @property
     def seconds(self) -> float:
-        """Median processor time of the whole job, s; nan if there is none."""
-        return float(np.median(self.cpu_s)) if self.cpu_s else float("nan")
+        """Returns the median processor time of the whole job, s; nan if there is none."""
+        return float(np.median(self.cpu_s)) if self.cpu_s else NAN
 
     @property
     def spread(self) -> float:
-        """Half the range of the runs over their median; nan for fewer than two runs."""
+        """Returns half the range of the runs over their median; nan for fewer than two runs."""
         if len(self.cpu_s) < 2:
-            return float("nan")
+            return NAN
         return (max(self.cpu_s) - min(self.cpu_s)) / 2 / self.seconds
 
-    def error(self, kind: str) -> float:
-        """Largest error of the values in the column ``kind``; nan if there is none."""
-        found = [error for name, error in self.errors.items() if column(name) == kind]
-        return max(found, default=float("nan"))
+    def error(self, quantity: str) -> float:
+        """Returns the largest error of the values in a column; nan if there is none."""
+        found = [error for name, error in self.errors.items() if column(name) == quantity]
+        return max(found, default=NAN)
 
 
-Outcomes = Mapping[str, CandidateResult]
+Measured = Mapping[str, Measurement]
+"""Measurements by the names of their methods."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A number that the benchmark must reach.
+    """Sets a limit to a number that is computed from measurements.
 
     Attributes:
         name, unit: as shown.
-        value: the number, from the outcomes by candidate; nan where something was not measured.
+        value: the number; nan where something was not measured.
         at_most, at_least: what it must keep to; one of the two.
         aim: what is hoped for.
     """
 
     name: str
-    value: Callable[[Outcomes], float]
+    value: Callable[[Measured], float]
     unit: str = ""
     at_most: float | None = None
     at_least: float | None = None
     aim: float | None = None
 
-    def verdict(self, outcomes: Outcomes) -> tuple[float, str]:
-        """The number and "met", "missed" or "not measured"."""
-        value = self.value(outcomes)
+    def verdict(self, measured: Measured) -> tuple[float, str]:
+        """Returns the number and "met", "missed" or "not measured"."""
+        value = self.value(measured)
         if np.isnan(value):
             return value, "not measured"
         low = self.at_least is None or value >= self.at_least
@@ -131,54 +155,72 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Benchmark:
-    """A named scene with the ways to compute it.
+class MeasuringLimits:
+    """Bounds the time that measurements take.
 
     Attributes:
-        name: of the scene; the stored files bear it.
-        title: a line that says what one run does.
-        reference: prepared and run once; gives the values that errors are measured against.
-        candidates: in the order of the table.
-        targets: to be met.
-        short: whether it belongs to the short benchmark.
+        repeats: runs of a point or rounds of a suite, fewer if they are long.
+        limit_s: processor time that preparing or one run of a setting may take, s.
+        skipped: methods that are not measured now.
+        stored: older figures of these, if there are any.
     """
 
-    name: str
-    title: str
-    reference: Callable[[], Run]
-    candidates: tuple[Candidate, ...]
-    targets: tuple[Target, ...] = ()
-    short: bool = True
+    repeats: int = 5
+    limit_s: float = 90.0
+    skipped: tuple[str, ...] = ()
+    stored: Measured = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class BenchmarkReport:
-    """A benchmark's figures as they are printed and stored.
+class Suite:
+    """Groups what is measured together.
 
     Attributes:
-        benchmark: what was run.
-        outcomes: in the order of its candidates.
-        machine: where and when, and from which commit.
+        name: of the suite; its dataset bears it.
+        subject: what one run computes.
+        reference: what errors are measured against.
+        measure: gives the measurements, or a dataset without its attributes.
+        kind: of the dataset.
+        targets: to be met.
+        in_turn: whether its methods run in turn on one core, and are compared with stored times.
+        short: whether it belongs to the short benchmark.
+        baselines: methods whose stored figures may stand in for new ones.
     """
 
-    benchmark: Benchmark
-    outcomes: tuple[CandidateResult, ...]
-    machine: Mapping[str, Any]
+    name: str
+    subject: str
+    reference: str
+    measure: Callable[[MeasuringLimits, Tell], list[Measurement] | xr.Dataset]
+    kind: Kind = "benchmark"
+    targets: tuple[Target, ...] = ()
+    in_turn: bool = False
+    short: bool = False
+    baselines: tuple[str, ...] = ()
 
-    @property
-    def verdicts(self) -> list[tuple[Target, float, str]]:
-        """Every target with its number and verdict."""
-        by_name = {outcome.name: outcome for outcome in self.outcomes}
-        return [(target, *target.verdict(by_name)) for target in self.benchmark.targets]
+    def verdicts(self, measurements: list[Measurement]) -> Iterator[tuple[Target, float, str]]:
+        """Yields every target with its number and verdict."""
+        by_name = {one.name: one for one in measurements}
+        for target in self.targets:
+            yield (target, *target.verdict(by_name))
+
+
+def settings_of(values: Iterable[float], unit: str = "") -> tuple[tuple[str, float], ...]:
+    """Names settings by their values."""
+    return tuple((f"{value:g}{unit}", value) for value in values)
 
 
 def column(name: str) -> str:
-    """Column of the table that a value's error stands in."""
+    """Returns the column of the table that a value's error stands in."""
     return name.partition("@")[0]
 
 
+def quantities(measurements: list[Measurement]) -> list[str]:
+    """Lists the columns of errors that any measurement has, in order of appearance."""
+    return list(dict.fromkeys(column(name) for one in measurements for name in one.errors))
+
+
 def errors(values: Mapping[str, Floats], reference: Mapping[str, Floats]) -> dict[str, float]:
-    """Relative l2 error of every value that the reference has too."""
+    """Returns the relative l2 error of every value that the reference has too."""
     return {
         name: float(np.linalg.norm(value - reference[name]) / np.linalg.norm(reference[name]))
         for name, value in values.items()
@@ -186,20 +228,20 @@ def errors(values: Mapping[str, Floats], reference: Mapping[str, Floats]) -> dic
     }
 
 
-def seconds_of(name: str) -> Callable[[Outcomes], float]:
-    """Target value: a candidate's time."""
-    return lambda outcomes: _of(outcomes, name).seconds
+def seconds_of(name: str) -> Callable[[Measured], float]:
+    """Makes the value of a target: a method's time."""
+    return lambda measured: _of(measured, name).seconds
 
 
-def error_of(name: str, kind: str) -> Callable[[Outcomes], float]:
-    """Target value: a candidate's error."""
-    return lambda outcomes: _of(outcomes, name).error(kind)
+def error_of(name: str, quantity: str) -> Callable[[Measured], float]:
+    """Makes the value of a target: a method's error."""
+    return lambda measured: _of(measured, name).error(quantity)
 
 
-def speed_up(fast: str, slow: str) -> Callable[[Outcomes], float]:
-    """Target value: how many times faster one candidate is than another."""
-    return lambda outcomes: _of(outcomes, slow).seconds / _of(outcomes, fast).seconds
+def time_ratio(slow: str, fast: str) -> Callable[[Measured], float]:
+    """Makes the value of a target: one method's time over that of another."""
+    return lambda measured: _of(measured, slow).seconds / _of(measured, fast).seconds
 
 
-def _of(outcomes: Outcomes, name: str) -> CandidateResult:
-    return outcomes.get(name, CandidateResult(name))
+def _of(measured: Measured, name: str) -> Measurement:
+    return measured.get(name, Measurement(name))

@@ -1,31 +1,33 @@
-"""Reports as files: JSON with every run, CSV with a row a candidate; and what was stored before."""
+"""Writes measurements as datasets with machine, notes and targets, and reads baselines again."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import os
 import platform
 import subprocess
-from collections.abc import Mapping
-from dataclasses import asdict, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from benchmarks.harness.records import BenchmarkReport, CandidateResult
-from benchmarks.harness.text_table import error_columns
-from pipeline.datasets import git_commit, package_versions
+import numpy as np
+import xarray as xr
 
-SCHEMA_VERSION = 1
-ROOT = Path(__file__).resolve().parents[2]
+from benchmarks.harness.records import Measurement, Suite, quantities
+from pipeline import datasets
+from pipeline.datasets import git_commit, package_versions, provenance
+from pipeline.runtime import ROOT
+from sim.core import Floats
+
+MEASURED = "measured"
 SOURCES = ("sim", "benchmarks", "pipeline", "experiments")
 
 
 def machine(core: int | None = None) -> dict[str, Any]:
-    """Where and when this is measured, from which sources; the core if it is bound to one."""
+    """Tells where and when this is measured, from which sources; the core if bound to one."""
     return {
         "processor": _processor(),
         "core": core,
@@ -40,7 +42,7 @@ def machine(core: int | None = None) -> dict[str, Any]:
 
 
 def _changed() -> list[str]:
-    """Source files that are not as the commit has them; empty outside a git checkout."""
+    """Lists source files that are not as the commit has them; empty outside a git checkout."""
     command = ["git", "-C", str(ROOT), "status", "--porcelain", "--", *SOURCES]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
     return [line[3:] for line in done.stdout.splitlines()]
@@ -53,88 +55,106 @@ def _processor() -> str:
     return platform.machine()
 
 
-def write(report: BenchmarkReport, folder: Path) -> tuple[Path, Path]:
-    """Writes ``<name>.json`` and ``<name>.csv``, and returns their paths."""
+def write(
+    suite: Suite,
+    measured: list[Measurement] | xr.Dataset,
+    about: Mapping[str, Any],
+    limits: Mapping[str, float],
+    folder: Path,
+) -> Path:
+    """Writes ``<suite>.nc``, and returns its path; targets and notes are JSON in attributes."""
+    told: dict[str, str] = {"subject": suite.subject, "reference": suite.reference}
+    told["machine"] = json.dumps(dict(about), sort_keys=True)
+    if not isinstance(measured, xr.Dataset):
+        notes = {one.name: one.note for one in measured if one.note}
+        targets = [
+            {key: getattr(target, key) for key in ("name", "unit", "at_most", "at_least", "aim")}
+            | {"value": value if math.isfinite(value) else None, "verdict": verdict}
+            for target, value, verdict in suite.verdicts(measured)
+        ]
+        lists = {"notes": notes, "targets": targets}
+        told |= {key: json.dumps(found) for key, found in lists.items() if found}
+        measured = dataset(measured)
+    path = folder / f"{suite.name}.nc"
+    rules = json.dumps({"suite": suite.name, **limits}, sort_keys=True)
+    origin = provenance.of_recording(rules, {}, synthetic=False, role="rules")
     folder.mkdir(parents=True, exist_ok=True)
-    stem = folder / report.benchmark.name
-    paths = stem.with_suffix(".json"), stem.with_suffix(".csv")
-    record = json.dumps(_without_nan(_record(report)), indent=1, allow_nan=False)
-    for path, content in zip(paths, (record + "\n", _rows(report)), strict=True):
-        aside = path.with_suffix(path.suffix + ".tmp")
-        aside.write_text(content, encoding="utf-8")
-        aside.replace(path)
-    return paths
+    datasets.write(measured.assign_attrs(told), path, suite.kind, origin)
+    return path
 
 
-def _record(report: BenchmarkReport) -> dict[str, Any]:
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "benchmark": report.benchmark.name,
-        "title": report.benchmark.title,
-        "machine": dict(report.machine),
-        "outcomes": [asdict(outcome) for outcome in report.outcomes],
-        "targets": [
-            {
-                "name": target.name,
-                "unit": target.unit,
-                "value": value,
-                "at_most": target.at_most,
-                "at_least": target.at_least,
-                "aim": target.aim,
-                "verdict": verdict,
-            }
-            for target, value, verdict in report.verdicts
-        ],
-    }
+def dataset(points: Sequence[Measurement]) -> xr.Dataset:
+    """Converts measurements to a dataset ``benchmark``, without its attributes."""
+    columns = quantities(list(points))
+    work = list(dict.fromkeys(name for one in points for name in one.work))
+    labels = {key: ("point", [getattr(one, key) for one in points]) for key in _LABELS}
+    misses = [{name: one.error(name) for name in columns} for one in points]
+    return xr.Dataset(
+        {
+            "own": ("point", np.array([one.own for one in points], dtype=np.int8)),
+            "cpu_time": (("point", "run"), padded([one.cpu_s for one in points])),
+            "wall_time": (("point", "run"), padded([one.wall_s for one in points])),
+            "compile_time": ("point", np.array([one.compile_s for one in points])),
+            "memory": ("point", np.array([one.peak_mib * 2**20 for one in points])),
+            "error": (("point", "quantity"), _by_name(misses, columns)),
+            "count": (("point", "work"), _by_name([one.work for one in points], work)),
+            "outcome": ("point", [one.failure or MEASURED for one in points]),
+        },
+        {"quantity": columns, "work": work, **labels},
+    )
 
 
-def _without_nan(node: Any) -> Any:  # noqa: ANN401  (any JSON)
-    if isinstance(node, float) and not math.isfinite(node):
-        return None
-    if isinstance(node, Mapping):
-        return {key: _without_nan(value) for key, value in node.items()}
-    if isinstance(node, list | tuple):
-        return [_without_nan(value) for value in node]
-    return node
+_LABELS = ("method", "setting", "task", "units")
 
 
-def _rows(report: BenchmarkReport) -> str:
-    kinds = error_columns(report.outcomes)
-    work = list(dict.fromkeys(what for one in report.outcomes for what in one.work))
-    out = io.StringIO()
-    rows = csv.writer(out, lineterminator="\n")
-    figures = ["candidate", "time (s)", "spread (relative)", "runs", "compile (s)"]
-    misses = [f"{kind} error (relative)" for kind in kinds]
-    rows.writerow([*figures, *misses, "peak memory (MiB)", *work, "stored", "failure"])
-    for one in report.outcomes:
-        times = (one.seconds, one.spread, len(one.cpu_s), one.compile_s)
-        errors = (one.error(kind) for kind in kinds)
-        counts = (one.work.get(what, "") for what in work)
-        rows.writerow([one.name, *times, *errors, one.peak_mib, *counts, one.stored, one.failure])
-    return out.getvalue()
-
-
-def stored_outcomes(name: str, folder: Path) -> dict[str, CandidateResult]:
-    """Figures of a benchmark that were stored before, by candidate, each marked with its origin."""
-    path = folder / f"{name}.json"
+def stored_measurements(path: Path, names: Sequence[str]) -> dict[str, Measurement]:
+    """Reads some methods' figures of an earlier run, each marked with its origin in its note."""
     if not path.exists():
         return {}
-    record = json.loads(path.read_text(encoding="utf-8"))
-    if record["schema_version"] != SCHEMA_VERSION:
-        return {}
-    made = record["machine"]
-    origin = f"{made['date']}, {made['processor']}, commit {made['commit'][:10]}"
-    return {
-        entry["name"]: _outcome(entry, origin)
-        for entry in record["outcomes"]
-        if not entry["failure"]
-    }
+    data = datasets.read(path, "benchmark")
+    about, notes = (json.loads(data.attrs.get(key, "{}")) for key in ("machine", "notes"))
+    commit = about["commit"][:10]
+    origin = f"NOT measured now, figures of {about['date']}, {about['processor']}, commit {commit}"
+    found: dict[str, Measurement] = {}
+    for k in np.flatnonzero(data["outcome"].values == MEASURED):
+        point = data.isel(point=k)
+        method, setting, task = (point[key].item() for key in _LABELS[:3])
+        one = Measurement(method, setting, task, bool(point["own"]))
+        if one.name in names:
+            note = notes.get(one.name, "")
+            found[one.name] = replace(
+                one,
+                note=note if "NOT measured" in note else "; ".join(filter(None, (note, origin))),
+                units=int(point["units"]),
+                compile_s=float(point["compile_time"]),
+                cpu_s=_known(point["cpu_time"]),
+                wall_s=_known(point["wall_time"]),
+                errors=_named(point["error"]),
+                work={name: int(count) for name, count in _named(point["count"]).items()},
+                peak_mib=float(point["memory"]) / 2**20,
+            )
+    return found
 
 
-def _outcome(entry: dict[str, Any], origin: str) -> CandidateResult:
-    made: dict[str, Any] = {
-        key: float("nan") if value is None else value for key, value in entry.items()
-    }
-    made |= {key: tuple(made[key]) for key in ("cpu_s", "wall_s")}
-    outcome = CandidateResult(**made)
-    return outcome if outcome.stored else replace(outcome, stored=origin)
+def _known(runs: xr.DataArray) -> tuple[float, ...]:
+    return tuple(runs.values[np.isfinite(runs.values)].tolist())
+
+
+def _named(values: xr.DataArray) -> dict[str, float]:
+    (dim,) = values.dims
+    pairs = zip(values[dim].values, values.values, strict=True)
+    return {str(name): float(value) for name, value in pairs if np.isfinite(value)}
+
+
+def padded(rows: Sequence[Sequence[float] | Floats]) -> Floats:
+    """Stacks rows as (n_rows, longest row), NaN where a row is shorter."""
+    filled = np.full((len(rows), max(1, *map(len, rows))), np.nan)
+    for line, row in zip(filled, rows, strict=True):
+        line[: len(row)] = row
+    return filled
+
+
+def _by_name(rows: Sequence[Mapping[str, float]], names: Sequence[str]) -> Floats:
+    return np.array([[row.get(name, np.nan) for name in names] for row in rows]).reshape(
+        len(rows), len(names)
+    )

@@ -1,4 +1,4 @@
-"""Measuring: every candidate in a process of its own, all on one core, one run at a time."""
+"""Runs methods in processes of their own, bound to one core."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ import multiprocessing
 import os
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
@@ -16,17 +15,16 @@ from typing import Any, NamedTuple
 
 import psutil
 
-from benchmarks.harness.records import Benchmark, Candidate, CandidateResult, Run, Sample, errors
-from sim.core import Floats
+from benchmarks.harness.records import Run, Sample
+from pipeline.runtime import UserError
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-Tell = Callable[[str], None]
 _PATIENCE = 1.0
 """Seconds between two looks at what a worker has spent."""
 
 
 class Timed(NamedTuple):
-    """One run: seconds of processor and of the clock, and what it found."""
+    """Holds one run: seconds of processor and of the clock, and its results."""
 
     cpu_s: float
     wall_s: float
@@ -37,27 +35,28 @@ def pin(core: int | None) -> int:
     """Binds this process and its children to one core, and returns it.
 
     Raises:
-        ValueError: the machine lends this process no such core.
+        UserError: the machine lends this process no such core.
     """
     lent = os.sched_getaffinity(0)
     chosen = max(lent) if core is None else core
     if chosen not in lent:
-        raise ValueError(f"no core {chosen}: this process may use {sorted(lent)}")
+        remedy = f"this process may use {sorted(lent)}"
+        raise UserError(f"no core {chosen}", key="core", remedy=remedy)
     os.sched_setaffinity(0, {chosen})
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     return chosen
 
 
 class CandidateError(Exception):
-    """A candidate raised; the message says what."""
+    """Reports that a method raised; the message says what."""
 
 
 class TooSlowError(CandidateError):
-    """A candidate took more processor time than it may."""
+    """Reports that a method took more processor time than it may."""
 
 
 class Worker:
-    """A process that prepares a candidate, or several one after the other, and runs it on demand.
+    """Prepares a method, or several one after the other, in a process, and runs it on demand.
 
     Args:
         prepare: builds and compiles, from the arguments that come with each wish to prepare.
@@ -95,11 +94,11 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it may be asked for more."""
+        """Tells whether it may be asked for more."""
         return self._process.is_alive()
 
     def peak_mib(self) -> float:
-        """Peak resident memory so far, MiB."""
+        """Returns the peak resident memory so far, MiB."""
         return float(self._ask("memory"))
 
     def _ask(self, *wish: object) -> Any:  # noqa: ANN401  (goes by the wish)
@@ -130,7 +129,7 @@ class Worker:
 
 
 def _serve(pipe: Connection, prepare: Callable[..., Run]) -> None:
-    """The worker's end: answers wishes until the other end closes."""
+    """Answers wishes at the worker's end until the other end closes."""
     run: Run | None = None
     while True:
         try:
@@ -154,7 +153,7 @@ def _serve(pipe: Connection, prepare: Callable[..., Run]) -> None:
 
 
 def _peak_mib() -> float:
-    """Largest resident memory of this process; rusage would count its parent's before exec too."""
+    """Returns the largest resident memory; rusage would count the parent's before exec too."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     peak = next(line for line in status.splitlines() if line.startswith("VmHWM:"))
     return int(peak.split()[1]) / 1024
@@ -164,93 +163,3 @@ def _timed(run: Run) -> Timed:
     cpu, wall = time.process_time(), time.perf_counter()
     sample = run()
     return Timed(time.process_time() - cpu, time.perf_counter() - wall, sample)
-
-
-def measure(
-    benchmark: Benchmark, chosen: Sequence[Candidate], repeats: int, tell: Tell
-) -> list[CandidateResult]:
-    """Runs the chosen candidates in turn, A B C A B C, and compares them with the reference.
-
-    Args:
-        benchmark: the benchmark.
-        chosen: its candidates that are to be measured now.
-        repeats: rounds.
-        tell: told of the progress, line by line.
-
-    Raises:
-        CandidateError: the reference could not be computed.
-    """
-    tell(f"{benchmark.name}: reference")
-    with Worker(benchmark.reference) as worker:
-        worker.prepare()
-        reference = worker.run().sample.values
-    with ExitStack() as stack:
-        at_work = [AtWork(one, stack.enter_context(Worker(one.prepare))) for one in chosen]
-        for one in at_work:
-            tell(f"{benchmark.name}: compiling {one.candidate.name}")
-            one.prepare()
-        for round_ in range(repeats):
-            for one in at_work:
-                if one.wants(round_):
-                    one.run()
-                    tell(f"{benchmark.name}: round {round_ + 1} of {repeats}: {one.line()}")
-        return [one.outcome(reference) for one in at_work]
-
-
-class AtWork:
-    """A candidate under measurement; the arguments go to the worker with the wish to prepare."""
-
-    def __init__(self, candidate: Candidate, worker: Worker, *arguments: object) -> None:
-        self.candidate = candidate
-        self._worker = worker
-        self._arguments = arguments
-        self._compile_s = float("nan")
-        self._runs: list[Timed] = []
-        self._failure = ""
-
-    @property
-    def spent_s(self) -> float:
-        """Processor time of the runs so far."""
-        return sum(run.cpu_s for run in self._runs)
-
-    def prepare(self) -> None:
-        """Builds and compiles it."""
-        try:
-            self._compile_s = self._worker.prepare(*self._arguments)
-        except CandidateError as failed:
-            self._failure = str(failed)
-
-    def wants(self, round_: int) -> bool:
-        """Whether it runs in that round."""
-        most = self.candidate.repeats if self.candidate.timed else 1
-        return not self._failure and (most is None or round_ < most)
-
-    def run(self) -> None:
-        """Runs it once."""
-        try:
-            self._runs.append(self._worker.run())
-        except CandidateError as failed:
-            self._failure = str(failed)
-
-    def line(self) -> str:
-        """What came of the last run."""
-        result = self._failure or f"{self._runs[-1].cpu_s:.3g} s"
-        return f"{self.candidate.name}: {result}"
-
-    def outcome(self, reference: Mapping[str, Floats]) -> CandidateResult:
-        """Its figures."""
-        name, note, share = self.candidate.name, self.candidate.note, self.candidate.share
-        if self._failure or not self._runs:
-            return CandidateResult(name, note, failure=self._failure or "was not run")
-        timed = self.candidate.timed
-        sample, runs = self._runs[-1].sample, self._runs if timed else []
-        return CandidateResult(
-            name=name,
-            note=note,
-            compile_s=self._compile_s if timed else float("nan"),
-            cpu_s=tuple(run.cpu_s / share for run in runs),
-            wall_s=tuple(run.wall_s / share for run in runs),
-            errors=errors(sample.values, reference),
-            work=dict(sample.work),
-            peak_mib=self._worker.peak_mib() if timed else float("nan"),
-        )

@@ -1,2 +1,9 @@
 from . import jax_baseline as jax_baseline
+from . import own_solvers as own_solvers
+from . import scipy_statics as scipy_statics
 from . import selection as selection
+from .own_solvers import SPLITTINGS as SPLITTINGS
+from .own_solvers import gradient_run as gradient_run
+from .own_solvers import loss_run as loss_run
+from .own_solvers import refined_times as refined_times
+from .own_solvers import warmed_up as warmed_up

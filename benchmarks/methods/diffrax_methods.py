@@ -1,4 +1,4 @@
-"""diffrax as ladders: what one would write in JAX, with its adjoints; statics as slow dynamics."""
+"""Lists methods of diffrax: the law in JAX, with its adjoints; statics as slow dynamics."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.harness import Run, Sample, SettingLadder, Task
+from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.methods.jax_baseline import RungeKutta, respond
 from benchmarks.scenes import LoadCase, case
 from sim.scene import Scene, parameters_of_design
@@ -25,7 +25,7 @@ DENSITY, RATIO, TOLERANCE = 1.0, 0.0186, 1e-8
 
 
 class DiffraxProblem(NamedTuple):
-    """What diffrax solves: a scene in time, by which method, and the times of the samples."""
+    """Poses a problem to diffrax: a scene in time, the method, and the times of the samples."""
 
     scene: Scene
     method: RungeKutta
@@ -36,28 +36,28 @@ Pose = Callable[[LoadCase, Array], DiffraxProblem]
 """From a case and the value of a setting."""
 
 
-def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
-    """Runge-Kutta methods with checkpointed adjoints, and one with a continuous adjoint."""
-    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
+def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
+    """Lists Runge-Kutta methods with checkpointed adjoints, and one with a continuous adjoint."""
+    settings = settings_of(tolerances)
     plain = tuple(
-        SettingLadder(f"diffrax {solver}", partial(_prepare, name, _to_tolerance(solver)), rungs)
+        Method(
+            f"diffrax {solver}",
+            partial(_prepare, name, partial(_by_steps, solver, "RecursiveCheckpointAdjoint")),
+            settings,
+            own=False,
+        )
         for solver in SOLVERS
     )
-    backsolve = partial(_prepare, name, _to_tolerance("Tsit5", "BacksolveAdjoint"))
-    continuous = SettingLadder(
-        "diffrax Tsit5, backsolve", backsolve, rungs[:2], tasks=("gradient",)
-    )
-    return (*plain, continuous)
+    backsolve = partial(_prepare, name, partial(_by_steps, "Tsit5", "BacksolveAdjoint"))
+    continuous = "diffrax Tsit5, backsolve"
+    return (*plain, Method(continuous, backsolve, settings[:2], own=False, tasks=("gradient",)))
 
 
-def at_rest(name: str, durations: tuple[float, ...]) -> tuple[SettingLadder, ...]:
-    """Pseudo-dynamics: a heavy, damped lattice pushed slowly, the longer the closer to rest."""
-    rungs = tuple((f"{duration:g} s", duration) for duration in durations)
-    return (SettingLadder("pseudo-dynamics, Dopri5", partial(_prepare, name, _slowly), rungs),)
-
-
-def _to_tolerance(solver: str, adjoint: str = "RecursiveCheckpointAdjoint") -> Pose:
-    return partial(_by_steps, solver, adjoint)
+def at_rest(name: str, durations: tuple[float, ...]) -> tuple[Method, ...]:
+    """Lists pseudo-dynamics: a heavy, damped lattice, pushed the longer the closer to rest."""
+    settings = settings_of(durations, " s")
+    prepare = partial(_prepare, name, _slowly)
+    return (Method("pseudo-dynamics, Dopri5", prepare, settings, own=False),)
 
 
 def _by_steps(solver: str, adjoint: str, posed: LoadCase, tolerance: Array) -> DiffraxProblem:
@@ -66,7 +66,7 @@ def _by_steps(solver: str, adjoint: str, posed: LoadCase, tolerance: Array) -> D
 
 
 def _slowly(posed: LoadCase, duration: Any) -> DiffraxProblem:  # noqa: ANN401  (traced in place of a float)
-    """The static scene as the authors move it; times at which their ramp passes the loads."""
+    """Moves the static scene as the authors do; samples as their ramp passes the loads."""
     scene, (ramp,) = posed.scene, posed.scene.loads.motions
     assert isinstance(ramp, LinearRamp)
     constants = scene.structure.material
@@ -92,7 +92,7 @@ def _prepare(name: str, pose: Pose, value: float, task: Task) -> Run:
     compiled = _compiled(name, pose, task)
 
     def run() -> Sample:
-        found = _in_a_line(compiled, jnp.asarray(value))
+        found = _called(compiled, jnp.asarray(value))
         (loss, (motion, counts)), gradient = found if task == "gradient" else (found, None)
         work = {what: int(count) for what, count in counts.items()}
         return Sample(posed.results(loss, motion, gradient), work)
@@ -100,8 +100,8 @@ def _prepare(name: str, pose: Pose, value: float, task: Task) -> Run:
     return run
 
 
-def _in_a_line(compiled: Callable[[Array], Any], value: Array) -> Any:  # noqa: ANN401
-    """Calls it.
+def _called(compiled: Callable[[Array], Any], value: Array) -> Any:  # noqa: ANN401
+    """Calls it and waits for the result.
 
     Raises:
         ArithmeticError: diffrax gave up; the reason alone, out of pages of traceback.

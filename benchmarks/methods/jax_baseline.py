@@ -1,9 +1,9 @@
-"""What one would write otherwise: the law in JAX, explicit Runge-Kutta by diffrax and its adjoint.
+"""Solves by the law in JAX with diffrax and its adjoint: what one would write otherwise.
 
 It is the same law (``sim.energy.ligament``), vectorised over ligaments and assembled by segment
-sums; driven
-and clamped dofs are prescribed by elimination. Statics are done as the authors do them: as damped
-dynamics of a scene whose mass is scaled up, slow enough to end near the equilibrium.
+sums; driven and clamped dofs are prescribed by elimination. Statics are done as the authors do
+them: as damped dynamics of a scene whose mass is scaled up, slow enough to end near the
+equilibrium.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.harness import Run, Sample
+from benchmarks.harness import Run, Sample, Task
 from sim.core import Floats
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
 from sim.scene import Mimicking, Scene, parameters_of_design
@@ -32,7 +32,7 @@ Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
 
 @dataclass(frozen=True)
 class RungeKutta:
-    """Settings of the baseline.
+    """Sets the baseline.
 
     Attributes:
         rtol, atol: tolerances of a step, relative and absolute (mm, mm/s, rad, rad/s alike).
@@ -49,7 +49,7 @@ class RungeKutta:
 
 
 def force(scene: Scene) -> Force:
-    """Function (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
+    """Makes (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
     pairs, angle = scene.lattice.ligament_units, scene.structure.contact
     assert isinstance(angle, VoidAngleContact)
 
@@ -58,7 +58,10 @@ def force(scene: Scene) -> Force:
         strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
         angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
         return strain + jnp.sum(
-            contact_energy(angles, ContactLaw(contact, angle.barrier, angle.cutoff))
+            contact_energy(
+                angles,
+                ContactLaw(contact, angle.barrier, angle.cutoff),
+            )
         )
 
     of_ends = jax.vmap(jax.grad(energy))
@@ -74,7 +77,7 @@ def force(scene: Scene) -> Force:
 def field(
     scene: Scene, drive: PrescribedMotion
 ) -> tuple[Callable[..., Any], Callable[[Array, Array], Array]]:
-    """Right-hand side for the free dofs, and the map from a time and free dofs to all motion."""
+    """Makes the free dofs' right-hand side, and the map from a time and free dofs to all motion."""
     top = scene.topology
     gradient, free = force(scene), np.sort(top.free_dofs)
 
@@ -95,7 +98,7 @@ def field(
 def respond(
     scene: Scene, drive: PrescribedMotion, method: RungeKutta, times: Array
 ) -> Callable[[Parameters], tuple[Array, dict[str, Array]]]:
-    """Function from parameters to the motion (n_times, n_units, 3) and the solver's counts."""
+    """Maps parameters to the motion (n_times, n_units, 3) and the solver's counts."""
     rates, motion = field(scene, drive)
     n_free = scene.topology.n_free
     zero = (jnp.zeros(n_free), jnp.zeros(n_free))
@@ -123,24 +126,17 @@ def respond(
     return of_parameters
 
 
-def loss(
-    scene: Scene,
-    case: int,
-    method: RungeKutta,
-    times: Floats,
-    measure: Mimicking,
-) -> Loss:
-    """Map from a design vector to the loss of one load case, differentiable, and counts.
+def loss(scene: Scene, method: RungeKutta, times: Floats, measure: Mimicking) -> Loss:
+    """Maps a design vector to the loss of the first load case, differentiable, and counts.
 
     Args:
         scene: the scene.
-        case: number of the load case.
         method: settings.
         times: (n_times,) of the saved samples, s.
         measure: the loss (1,) of motions (1, n_times, n_units, 3).
     """
     of_design = parameters_of_design(scene)
-    of_parameters = respond(scene, scene.loads.cases[case], method, jnp.asarray(times))
+    of_parameters = respond(scene, scene.loads.cases[0], method, jnp.asarray(times))
 
     def of_case(design: Array) -> tuple[Array, dict[str, Array]]:
         values = of_design(design)
@@ -150,30 +146,18 @@ def loss(
     return of_case
 
 
-def prepare_loss(of_case: Loss, n_variables: int) -> Run:
-    """Compiled run of the loss alone at the initial design."""
+def prepare(of_case: Loss, n_variables: int, task: Task, suffix: str = "") -> Run:
+    """Compiles the loss, or loss and gradient, at the initial design; names end in the suffix."""
     start = jnp.zeros(n_variables)
-    compiled = jax.jit(of_case).lower(start).compile()
+    wanted = jax.value_and_grad(of_case, has_aux=True) if task == "gradient" else of_case
+    compiled = jax.jit(wanted).lower(start).compile()
 
     def run() -> Sample:
-        value, counts = compiled(start)
-        return Sample({"loss": np.asarray(value)}, _numbers(counts))
+        found = compiled(start)
+        (loss, counts), gradient = found if task == "gradient" else (found, None)
+        values = {f"loss{suffix}": np.asarray(loss)}
+        if gradient is not None:
+            values[f"gradient{suffix}"] = np.asarray(gradient)
+        return Sample(values, {name: int(count) for name, count in counts.items()})
 
     return run
-
-
-def prepare_gradient(of_case: Loss, n_variables: int) -> Run:
-    """Compiled run of loss and gradient at the initial design."""
-    start = jnp.zeros(n_variables)
-    compiled = jax.jit(jax.value_and_grad(of_case, has_aux=True)).lower(start).compile()
-
-    def run() -> Sample:
-        (value, counts), gradient = compiled(start)
-        values = {"loss": np.asarray(value), "gradient": np.asarray(gradient)}
-        return Sample(values, _numbers(counts))
-
-    return run
-
-
-def _numbers(counts: dict[str, Array]) -> dict[str, int]:
-    return {name: int(count) for name, count in counts.items()}

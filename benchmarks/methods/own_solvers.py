@@ -1,23 +1,21 @@
-"""Our own solvers as ladders."""
+"""Lists our own solvers as methods."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 
-import jax.numpy as jnp
 import numpy as np
 
-from benchmarks.harness import Run, Sample, SettingLadder, Task
-from benchmarks.scenes import LoadCase, case, counted
+from benchmarks.harness import Method, Run, Sample, Task, settings_of
+from benchmarks.scenes import LoadCase, case, counted, work_of
 from sim.core import Floats
 from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
-from sim.scene import STIFFENING, GradientChain, make_plan, parameters_of_design
+from sim.scene import STIFFENING, GradientChain, make_plan
 from sim.solvers import Solver, solve_cases
-from sim.structure import ConcreteParameters
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -34,59 +32,48 @@ HALVING = 8.0
 """By which the stage tolerance falls as the steps of an order 3 are halved."""
 
 
-def in_time(name: str, halvings: int) -> tuple[SettingLadder, ...]:
-    """Implicit with either way to solve, and the explicit methods."""
+def in_time(name: str, halvings: int) -> tuple[Method, ...]:
+    """Lists the implicit method with either way to solve, and the explicit methods."""
     implicit = tuple(("steps / " + str(2**k) if k else "default", k) for k in range(halvings + 1))
     explicit = tuple((f"{2**k} × stable" if k else "stable", k) for k in range(halvings - 1))
-    return (
-        SettingLadder(
-            "ESDIRK3, band", partial(_prepare, name, partial(_implicit, False)), implicit, True
-        ),
-        SettingLadder(
-            "ESDIRK3, fronts", partial(_prepare, name, partial(_implicit, True)), implicit[:2], True
-        ),
-        *(
-            SettingLadder(
-                f"explicit {key}", partial(_prepare, name, partial(_explicit, key)), explicit, True
-            )
-            for key in SPLITTINGS
-        ),
+    makes: dict[str, tuple[Make, tuple[tuple[str, float], ...]]] = {
+        "ESDIRK3, band": (partial(_implicit, False), implicit),
+        "ESDIRK3, fronts": (partial(_implicit, True), implicit[:2]),
+        **{f"explicit {key}": (partial(_explicit, key), explicit) for key in SPLITTINGS},
+    }
+    return tuple(
+        Method(method, partial(_prepare, name, make), settings)
+        for method, (make, settings) in makes.items()
     )
 
 
-def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
-    """Newton's method along the path, with either way to solve."""
-    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
+def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
+    """Lists Newton's method along the path, with either way to solve."""
     return tuple(
-        SettingLadder(
+        Method(
             f"Newton, {way}",
             partial(_prepare, name, partial(_static, way == "fronts")),
-            rungs,
-            True,
+            settings_of(tolerances),
         )
         for way in ("band", "fronts")
     )
 
 
-def differences(name: str) -> SettingLadder:
-    """The gradient by central differences of the default solver, by their distance in mm."""
-    rungs = tuple((f"{apart:g} mm", apart) for apart in (1e-2, 1e-4, 1e-6))
-    return SettingLadder(
-        "central differences", partial(_differences, name), rungs, True, ("gradient",)
-    )
+def differences(name: str) -> Method:
+    """Takes the gradient by central differences of the default solver, by their distance in mm."""
+    settings = settings_of((1e-2, 1e-4, 1e-6), " mm")
+    return Method("central differences", partial(_differences, name), settings, tasks=("gradient",))
 
 
 def _differences(name: str, apart: float, task: Task) -> Run:
     del task
     posed = case(name)
     solver = make_plan(posed.scene).solver
-    of_design = parameters_of_design(posed.scene)
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
-        values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))
+        values = posed.values_of(design)
         motion, *_ = solve_cases(solver, values, posed.scene.loads.cases)
-        value, _ = posed.measured(motion, values)
-        return np.asarray(value), motion
+        return np.asarray(posed.measured(motion, values)[0]), motion
 
     def run() -> Sample:
         steps = apart * np.eye(posed.scene.space.n_variables)
@@ -98,49 +85,51 @@ def _differences(name: str, apart: float, task: Task) -> Run:
 
 
 def gradient_of(posed: LoadCase) -> Floats:
-    """Gradient by the adjoint of the explicit method of order 4 at a quarter of a stable step."""
-    return _gradient(posed, _explicit("Blanes-Moan", posed, 2))()["gradient"]
+    """Computes the gradient by the adjoint of order 4's explicit method at a quarter of stable."""
+    return gradient_run(posed, _explicit("Blanes-Moan", posed, 2), {})().values["gradient"]
 
 
 def _prepare(name: str, make: Make, value: float, task: Task) -> Run:
     posed = case(name)
     solver = make(posed, value)
-    work = counted(posed.scene, solver, [0])
-    run = _gradient(posed, solver) if task == "gradient" else _loss(posed, solver)
-
-    def counting() -> Sample:
-        return Sample(run(), work)
-
-    counting()
-    return counting
+    if task == "loss":
+        return warmed_up(loss_run(posed, solver))
+    return warmed_up(gradient_run(posed, solver, counted(posed.scene, solver, [0])))
 
 
-def _loss(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
-    values = posed.values
+def loss_run(posed: LoadCase, solver: Solver) -> Run:
+    """Makes the run of a load case's loss by a solver."""
 
-    def run() -> dict[str, Floats]:
-        motion, *_ = solve_cases(solver, values, posed.scene.loads.cases)
-        return posed.results(*posed.measured(motion, values))
+    def run() -> Sample:
+        motion, _, records = solve_cases(solver, posed.values, posed.scene.loads.cases)
+        work = work_of(records.records[0])
+        return Sample(posed.results(*posed.measured(motion, posed.values)), work)
 
     return run
 
 
-def _gradient(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
-    of_design = parameters_of_design(posed.scene)
+def gradient_run(posed: LoadCase, solver: Solver, work: Mapping[str, int]) -> Run:
+    """Makes the run of a load case's loss and gradient by a solver."""
     evaluate = partial(
-        GradientChain(of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+        GradientChain(posed.of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
     )
     start = np.zeros(posed.scene.space.n_variables)
 
-    def run() -> dict[str, Floats]:
+    def run() -> Sample:
         loss, gradient, motion = evaluate(start)
-        return posed.results(loss, motion, gradient)
+        return Sample(posed.results(loss, motion, gradient), work)
 
+    return run
+
+
+def warmed_up(run: Run) -> Run:
+    """Runs once, so that nothing is left to compile."""
+    run()
     return run
 
 
 def _stored(posed: LoadCase, by_fronts: bool) -> Topology:
-    """The topology with its tangent as a band or by fronts."""
+    """Returns the topology with its tangent as a band or by fronts."""
     top = replace(posed.scene.topology)
     top.__dict__["numbering"] = number_free_dofs(top.site, top.ligament_units, top.held, by_fronts)
     return top
@@ -150,11 +139,18 @@ def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
     asked = posed.scene.updated(integrator="implicit", accuracy="default")
     solver = make_plan(asked).solver
     assert isinstance(solver, ImplicitSolver)
-    times = solver.times
-    for _ in range(int(halvings)):
-        times = halved(times)
-    tolerance = solver.tolerance / HALVING**halvings
+    times, tolerance = (
+        refined_times(solver.times, int(halvings)),
+        solver.tolerance / HALVING**halvings,
+    )
     return replace(solver, topology=_stored(posed, by_fronts), times=times, tolerance=tolerance)
+
+
+def refined_times(times: Floats, halvings: int) -> Floats:
+    """Halves the steps of a grid so many times."""
+    for _ in range(halvings):
+        times = halved(times)
+    return times
 
 
 def _explicit(key: str, posed: LoadCase, doublings: float) -> Solver:

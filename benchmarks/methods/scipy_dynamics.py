@@ -1,4 +1,4 @@
-"""scipy's integrators as ladders, and the reference solution by one of them.
+"""Lists scipy's integrators as methods, and the reference solution by one of them.
 
 The right-hand side is the project's compiled force, called from Python at every stage.
 """
@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from functools import partial
 
-import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 from scipy.integrate import solve_ivp
 
-from benchmarks.harness import Run, Sample, SettingLadder, Task
+from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.methods.own_solvers import gradient_of
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats
 from sim.energy import gradient, system_of
-from sim.scene import parameters_of_design
 from sim.solvers import Harmonic
 from sim.structure import ConcreteParameters
 from sim.vibration import linearised
@@ -29,7 +27,7 @@ APART = 3e-4
 
 
 class FirstOrderSystem:
-    """The free dofs of a case in time, y = (u, v), for scipy.
+    """Integrates the free dofs of a case in time, y = (u, v), for scipy.
 
     Args:
         posed: the case; its drive must be harmonic.
@@ -50,8 +48,8 @@ class FirstOrderSystem:
         self.mass = values.mass.ravel()[self.free]
         self.damping = values.damping.ravel()[self.free]
 
-    def whole(self, time: float, free: Floats) -> Floats:
-        """All dofs (n_dofs,) at a time."""
+    def all_dofs(self, time: float, free: Floats) -> Floats:
+        """Returns all dofs (n_dofs,) at a time."""
         motion = np.zeros(self.topology.n_dofs)
         motion[self.free] = free
         moved = _harmonic(self.drive, time)
@@ -60,14 +58,14 @@ class FirstOrderSystem:
         return motion
 
     def rates(self, time: float, state: Floats) -> Floats:
-        """Velocities and accelerations (2 n_free,)."""
+        """Computes velocities and accelerations (2 n_free,)."""
         u, v = np.split(state, 2)
-        gradient(self.whole(time, u), self._system, self._turn, self._force)
+        gradient(self.all_dofs(time, u), self._system, self._turn, self._force)
         return np.concatenate([v, -(self._force[self.free] + self.damping * v) / self.mass])
 
     def jacobian(self, time: float, state: Floats) -> sp.csc_array:
-        """Derivative (2 n_free, 2 n_free) of the rates."""
-        motion = self.whole(time, np.split(state, 2)[0]).reshape(-1, 3)
+        """Computes the derivative (2 n_free, 2 n_free) of the rates."""
+        motion = self.all_dofs(time, np.split(state, 2)[0]).reshape(-1, 3)
         stiffness = linearised(self.topology, self.values, motion).stiffness
         slow, one = sp.diags_array(-self.damping / self.mass), sp.eye_array(len(self.free))
         return sp.csc_array(
@@ -82,11 +80,16 @@ def _harmonic(drive: Harmonic, time: float) -> float:
     return float(wave * rising)
 
 
-def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
-    """The explicit method and the two implicit ones; they have no gradient."""
-    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
+def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
+    """Lists the explicit method and the two implicit ones; they have no gradient."""
     return tuple(
-        SettingLadder(f"scipy {method}", partial(_prepare, name, method), rungs, tasks=("loss",))
+        Method(
+            f"scipy {method}",
+            partial(_prepare, name, method),
+            settings_of(tolerances),
+            own=False,
+            tasks=("loss",),
+        )
         for method in (REFERENCE, *IMPLICIT)
     )
 
@@ -94,26 +97,21 @@ def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ..
 def _prepare(name: str, method: str, tolerance: float, task: Task) -> Run:
     del task
     posed = case(name)
+    system, rest = FirstOrderSystem(posed, posed.values), np.zeros(2 * posed.scene.topology.n_free)
 
     def run() -> Sample:
         motion, work = _solve(posed, posed.values, method, tolerance)
         return Sample(posed.results(*posed.measured(motion, posed.values)), work)
 
-    _warm(posed)
+    system.rates(0.0, rest)
+    system.jacobian(0.0, rest)
     return run
-
-
-def _warm(posed: LoadCase) -> None:
-    rest = np.zeros(2 * posed.scene.topology.n_free)
-    motion = FirstOrderSystem(posed, posed.values)
-    motion.rates(0.0, rest)
-    motion.jacobian(0.0, rest)
 
 
 def _solve(
     posed: LoadCase, values: ConcreteParameters, method: str, tolerance: float
 ) -> tuple[Floats, dict[str, int]]:
-    """Motion (1, n_times, n_units, 3), and counts.
+    """Computes the motion (1, n_times, n_units, 3), and counts.
 
     Raises:
         ArithmeticError: scipy gave up.
@@ -133,19 +131,18 @@ def _solve(
     if not found.success:
         raise ArithmeticError(found.message)
     states = [
-        motion.whole(t, y[: len(motion.free)]) for t, y in zip(found.t, found.y.T, strict=True)
+        motion.all_dofs(t, y[: len(motion.free)]) for t, y in zip(found.t, found.y.T, strict=True)
     ]
     work = {"forces": int(found.nfev), "factorisations": int(found.nlu)}
     return np.stack(states).reshape(1, len(states), -1, 3), work
 
 
 def reference(name: str) -> Run:
-    """Motion, loss and slope by DOP853 at 1e-11; the whole gradient by our tightest adjoint."""
+    """Prepares motion, loss, slope by DOP853 at 1e-11; the gradient by our tightest adjoint."""
     posed = case(name)
-    of_design = parameters_of_design(posed.scene)
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
-        values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))
+        values = posed.values_of(design)
         motion, _ = _solve(posed, values, REFERENCE, TIGHT)
         return np.asarray(posed.objective(motion, values)[0]), motion
 

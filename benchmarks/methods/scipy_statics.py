@@ -1,4 +1,4 @@
-"""scipy's ways to an equilibrium as ladders, and the reference by one of them."""
+"""Lists scipy's ways to an equilibrium as methods, and the reference by one of them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import scipy.sparse.linalg as spla
 from jax import Array
 from scipy.optimize import NoConvergence, newton_krylov
 
-from benchmarks.harness import Run, Sample, SettingLadder, Task
+from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.methods.jax_baseline import force
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats, Ints
@@ -29,7 +29,7 @@ KRYLOV_ITERATIONS = 60
 
 
 class EquilibriumProblem:
-    """Forces on the free dofs of a case, and how often they were asked for."""
+    """Evaluates forces on the free dofs of a case, and counts the evaluations."""
 
     def __init__(self, posed: LoadCase) -> None:
         scene = posed.scene
@@ -41,7 +41,7 @@ class EquilibriumProblem:
         self._force = np.empty(self.topology.n_dofs)
 
     def residual(self, state: Floats) -> tuple[Floats, float]:
-        """Force on the free dofs (n_free,), and the largest reaction; N and N mm.
+        """Computes the force on the free dofs (n_free,), and the largest reaction; N and N mm.
 
         Raises:
             ArithmeticError: a void is closed beyond its barrier.
@@ -55,22 +55,17 @@ class EquilibriumProblem:
         return self._force[self.free], float(np.abs(self._force[self.held]).max())
 
     def tangent(self, state: Floats) -> tuple[Linear, spla.SuperLU]:
-        """The linearised structure and the factor of its stiffness."""
+        """Linearises the structure and factorises its stiffness."""
         self.work["factorisations"] += 1
         made = linearised(self.topology, self.values, state.reshape(-1, 3))
         return made, spla.splu(made.stiffness)
 
 
-def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[SettingLadder, ...]:
-    """Newton's method with SuperLU, and without a tangent; neither has a gradient."""
-    rungs = tuple((f"{tolerance:g}", tolerance) for tolerance in tolerances)
-    return (
-        SettingLadder(
-            "Newton, scipy splu", partial(_prepare, name, _newton), rungs, tasks=("loss",)
-        ),
-        SettingLadder(
-            "scipy newton_krylov", partial(_prepare, name, _krylov), rungs, tasks=("loss",)
-        ),
+def at_rest(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
+    """Lists Newton's method with SuperLU, and without a tangent; neither has a gradient."""
+    return tuple(
+        Method(method, partial(_prepare, name, solve), settings_of(tolerances), False, ("loss",))
+        for method, solve in (("Newton, scipy splu", _newton), ("scipy newton_krylov", _krylov))
     )
 
 
@@ -88,7 +83,7 @@ def _prepare(name: str, method: Callable[..., Floats], tolerance: float, task: T
 
 
 def _path(posed: LoadCase, solve: partial[Floats]) -> Floats:
-    """States (1, n_times, n_units, 3) along the loads; increments are cut where they fail.
+    """Follows the states (1, n_times, n_units, 3) along the loads; cuts increments that fail.
 
     Raises:
         ArithmeticError: not even small increments succeed.
@@ -122,7 +117,7 @@ def _between(
 
 
 def _newton(balance: EquilibriumProblem, tolerance: float, state: Floats, moved: Floats) -> Floats:
-    """Full Newton steps, the first along the path's tangent.
+    """Takes full Newton steps, the first along the path's tangent.
 
     Raises:
         ArithmeticError: no convergence.
@@ -140,7 +135,7 @@ def _newton(balance: EquilibriumProblem, tolerance: float, state: Floats, moved:
 
 
 def _krylov(balance: EquilibriumProblem, tolerance: float, state: Floats, moved: Floats) -> Floats:
-    """Without a tangent, from the last state with the held dofs moved on."""
+    """Solves without a tangent, from the last state with the held dofs moved on."""
 
     def unbalanced(free: Floats) -> Floats:
         new = state + moved
@@ -156,7 +151,7 @@ def _krylov(balance: EquilibriumProblem, tolerance: float, state: Floats, moved:
 
 
 def reference(name: str) -> Run:
-    """States by Newton with SuperLU to 1e-11; the gradient by JAX's derivatives of the law."""
+    """Prepares states by Newton with SuperLU to 1e-11; the gradient by JAX on the law."""
     posed = case(name)
     balance = EquilibriumProblem(posed)
     of_design, forces = (

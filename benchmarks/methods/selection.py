@@ -1,11 +1,11 @@
-"""Which ladders stand on which scene."""
+"""Selects the methods and the reference of a scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
 
-from benchmarks.harness import Run, SettingLadder
+from benchmarks.harness import Method, Run
 from benchmarks.methods import diffrax_methods, own_solvers, scipy_dynamics, scipy_statics
 
 IN_TIME = ("fig2", "fig7", "small_wave")
@@ -24,13 +24,13 @@ _IN_WORDS = {
 }
 
 
-def ladders(name: str) -> tuple[SettingLadder, ...]:
-    """All ladders on a scene."""
+def methods(name: str) -> tuple[Method, ...]:
+    """Lists all methods on a scene."""
     made = _in_time(name) if name in IN_TIME else _at_rest(name)
     return (*made, own_solvers.differences(name)) if name in BY_DIFFERENCES else made
 
 
-def _in_time(name: str) -> tuple[SettingLadder, ...]:
+def _in_time(name: str) -> tuple[Method, ...]:
     small = name.startswith("small")
     return (
         *own_solvers.in_time(name, 2 if small else 4),
@@ -39,7 +39,7 @@ def _in_time(name: str) -> tuple[SettingLadder, ...]:
     )
 
 
-def _at_rest(name: str) -> tuple[SettingLadder, ...]:
+def _at_rest(name: str) -> tuple[Method, ...]:
     small = name.startswith("small")
     return (
         *own_solvers.at_rest(
@@ -51,10 +51,10 @@ def _at_rest(name: str) -> tuple[SettingLadder, ...]:
 
 
 def reference(name: str) -> Callable[[], Run]:
-    """What makes the reference of a scene, in a process of its own."""
+    """Returns what prepares the reference of a scene, in a process of its own."""
     return partial(scipy_dynamics.reference if name in IN_TIME else scipy_statics.reference, name)
 
 
-def reference_in_words(name: str) -> str:
-    """How it is made."""
+def reference_described(name: str) -> str:
+    """Describes the reference of a scene."""
     return _IN_WORDS[name in IN_TIME]

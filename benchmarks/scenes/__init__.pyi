@@ -1,5 +1,6 @@
 from . import load_cases as load_cases
 from . import paper_scenes as paper_scenes
+from .load_cases import TITLES as TITLES
 from .load_cases import LoadCase as LoadCase
 from .load_cases import case as case
 from .load_cases import scene as scene

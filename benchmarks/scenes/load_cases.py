@@ -1,4 +1,4 @@
-"""The scenes that methods are compared on, each with one load case, at its initial design."""
+"""Poses the scenes that methods are compared on, each with one load case, at the initial design."""
 
 from __future__ import annotations
 
@@ -6,22 +6,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from benchmarks.scenes import paper_scenes
 from pipeline.posing import limits_of, scene_of
 from pipeline.problem.reading import load
+from pipeline.runtime import ROOT
 from sim.constraints import Limits
-from sim.core import Floats
+from sim.core import Floats, Ints
 from sim.scene import (
     Clamp,
     Mimicking,
     Scene,
     concrete_parameters,
     mimicking,
+    parameters_of_design,
     sample_times,
     target_motion,
 )
@@ -45,7 +49,7 @@ TITLES = {
 
 @dataclass(frozen=True)
 class LoadCase:
-    """A scene with what is asked of it.
+    """Holds a scene with its objective.
 
     Attributes:
         scene: with one load case.
@@ -57,36 +61,47 @@ class LoadCase:
 
     @cached_property
     def times(self) -> Floats:
-        """Times (n_times,) of the samples or load steps, s."""
+        """Returns the times (n_times,) of the samples or load steps, s."""
         return sample_times(self.scene)
 
     @cached_property
     def values(self) -> ConcreteParameters:
-        """Parameters of the initial structure."""
+        """Returns the parameters of the initial structure."""
         return concrete_parameters(self.scene, self.scene.lattice.vertices)
 
     @cached_property
+    def of_design(self) -> Callable[[Array], Parameters[Array]]:
+        """Maps a design (n_variables,) to parameters, differentiable."""
+        return parameters_of_design(self.scene)
+
+    def values_of(self, design: Floats) -> ConcreteParameters:
+        """Computes the parameters of a design (n_variables,)."""
+        return ConcreteParameters(
+            *(np.asarray(part) for part in self.of_design(jnp.asarray(design)))
+        )
+
+    @cached_property
     def objective(self) -> Mimicking:
-        """The loss (1,) of motions (1, n_times, n_units, 3)."""
+        """Returns the loss (1,) of motions (1, n_times, n_units, 3)."""
         return mimicking(self.scene, self.target)
 
     @cached_property
     def direction(self) -> Floats:
-        """Random signs (n_variables,): the direction in which slopes are compared."""
+        """Draws random signs (n_variables,): the direction in which slopes are compared."""
         rng = np.random.default_rng(DIRECTION_SEED)
         return rng.choice([-1.0, 1.0], self.scene.space.n_variables)
 
     def measure(self, motion: Array, values: Parameters[Array]) -> tuple[Array, Array]:
-        """Loss of motions (1, n_times, n_units, 3), and the motions."""
+        """Computes the loss of motions (1, n_times, n_units, 3); returns it and the motions."""
         return self.objective(motion, values)[0], motion
 
     @cached_property
     def measured(self) -> Callable[..., tuple[Array, Array]]:
-        """The same, compiled."""
+        """Compiles ``measure``."""
         return jax.jit(self.measure)
 
     def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
-        """What is compared: region's motion by spacings, loss, gradient and its slope."""
+        """Collects what is compared: region's motion by spacings, loss, gradient and its slope."""
         spacing = self.scene.lattice.spacing
         moved = np.asarray(motion)[0][:, self.scene.objective.region]
         found = {
@@ -101,13 +116,13 @@ class LoadCase:
 
 @cache
 def case(name: str) -> LoadCase:
-    """The case of that name (a key of TITLES)."""
+    """Poses the case of that name (a key of TITLES)."""
     posed = scene(name)
     return LoadCase(posed, None if posed.objective.reference is None else target_motion(posed))
 
 
 def scene(name: str) -> Scene:
-    """Its scene."""
+    """Poses the scene of that name."""
     if name.startswith("small"):
         return _small_wave() if name == "small_wave" else _small_push()
     whole = scene_of(load(_file(name)), _file(name).parent).updated(symmetry="none")
@@ -115,7 +130,7 @@ def scene(name: str) -> Scene:
 
 
 def symmetric(name: str) -> Scene:
-    """A scene in time with load cases that quarter turns take into one another."""
+    """Poses a scene in time with load cases that quarter turns take into one another."""
     if name == "fig2":
         return paper_scenes.fig2(symmetry="C4")
     turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
@@ -123,7 +138,7 @@ def symmetric(name: str) -> Scene:
 
 
 def designed(name: str) -> tuple[Scene, Limits]:
-    """A scene as it is designed, all load cases and symmetries, and what a design must keep to."""
+    """Poses a scene as it is designed, with all load cases, and the limits of a design."""
     if name.startswith("small"):
         return scene(name), Limits(edge_length=5.0, block_angle=np.deg2rad(30.0), void_angle=0.0)
     problem = load(_file(name))
@@ -131,34 +146,34 @@ def designed(name: str) -> tuple[Scene, Limits]:
 
 
 def _file(name: str) -> Path:
-    return paper_scenes.ROOT / f"experiments/{STUDIES[name]}/problem.yaml"
+    return ROOT / f"experiments/{STUDIES[name]}/problem.yaml"
 
 
 def _small_wave() -> Scene:
-    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
-    corners = np.array([0, 4, 20, 24])
-    return paper_scenes.fig2().updated(
-        lattice=lattice,
-        supports=(Clamp(corners),),
-        cases=(PrescribedMotion(np.array([12]), Harmonic(1.0, 20.0, 0.3)),),
-        weights=None,
-        duration=0.05,
-        frequency=20.0,
-        cloak=CLOAK,
-        region=REGION,
-        samples=41,
-    )
+    drive = PrescribedMotion(np.array([12]), Harmonic(1.0, 20.0, 0.3))
+    more = {"duration": 0.05, "frequency": 20.0, "samples": 41}
+    return _small(paper_scenes.fig2(), np.array([0, 4, 20, 24]), drive, **more)
 
 
 def _small_push() -> Scene:
-    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
-    left = 5 * np.arange(5)
-    return paper_scenes.fig4().updated(
-        lattice=lattice,
-        material=paper_scenes.fig2().structure.material,
-        supports=(Clamp(left),),
-        cases=(PrescribedMotion(left + 4, LinearRamp(-4.0, 1.0)),),
-        steps=4,
+    left, material = 5 * np.arange(5), paper_scenes.fig2().structure.material
+    drive = PrescribedMotion(left + 4, LinearRamp(-4.0, 1.0))
+    return _small(paper_scenes.fig4(), left, drive, material=material, steps=4)
+
+
+def _small(
+    scene: Scene,
+    clamped: Ints,
+    drive: PrescribedMotion,
+    **changes: Any,  # noqa: ANN401
+) -> Scene:
+    """Poses a scene of the paper on 5 x 5 units."""
+    return scene.updated(
+        lattice=quads(5, 5, 15.0, 2.25, np.deg2rad(20.0)),
+        supports=(Clamp(clamped),),
+        cases=(drive,),
+        weights=None,
         cloak=CLOAK,
         region=REGION,
+        **changes,
     )

@@ -1,4 +1,4 @@
-"""The paper's lattice and material, for scenes that need no problem file."""
+"""Defines the paper's lattice and material, for scenes that need no problem file."""
 
 from __future__ import annotations
 

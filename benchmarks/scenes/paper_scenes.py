@@ -1,15 +1,16 @@
-"""The scenes that are measured, at their initial designs."""
+"""Poses the paper's scenes at their initial designs."""
 
 from __future__ import annotations
 
+from collections import Counter
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipeline.posing import scene_of
 from pipeline.problem.reading import load
+from pipeline.runtime import ROOT
 from sim.core import Floats
 from sim.quasistatics import static_solver
 from sim.scene import (
@@ -26,13 +27,12 @@ from sim.solvers import LinearRamp, PrescribedMotion, Solver, TanhRamp, solve_ca
 from sim.structure import Material, damping_of_ratio, quads
 from sim.time_integration import explicit, implicit
 
-ROOT = Path(__file__).resolve().parents[2]
 PUSH = 14.999907837380967
 """Final displacement of the driven column, mm: the last value of the authors' ramp to 15 mm."""
 
 
 def fig2(**changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
-    """Figure 2 as the authors ran it, four load angles, without symmetry unless asked for."""
+    """Poses Figure 2 as the authors ran it, four load angles, without symmetry unless asked for."""
     problem = ROOT / "experiments/fig2/problem.yaml"
     scene = scene_of(load(problem), problem.parent)
     plain: dict[str, Any] = {"symmetry": "none", "accuracy": "default", "integrator": "auto"}
@@ -40,14 +40,14 @@ def fig2(**changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
 
 
 def one_case(scene: Scene, degrees: float) -> Scene:
-    """The scene with its load case of that direction alone."""
+    """Keeps the load case of that direction alone."""
     angles = [getattr(motion, "direction", np.nan) for motion in scene.loads.motions]
     return scene.alone(int(np.flatnonzero(np.isclose(angles, np.deg2rad(degrees)))[0]))
 
 
 @cache
 def fig4() -> Scene:
-    """Figure 4's setting: pushed by a column, the region around the middle to be spared of strain.
+    """Poses Figure 4's setting: pushed by a column, the region in the middle spared of strain.
 
     Radii as in the paper's text: region 3 spacings, cloak up to 5. One load: the final one.
     """
@@ -63,7 +63,7 @@ def fig4() -> Scene:
 
 
 def fig4_as_dynamics() -> Scene:
-    """The same as the authors solve it: density 1 tonne/mm^2, damped, pushed slowly over 3500 s."""
+    """Poses it as the authors solve it: density 1 tonne/mm^2, damped, pushed over 3500 s."""
     scene, duration = fig4(), 3500.0
     damping = damping_of_ratio(0.0186, 1.0, 15.0, 1.19, 1.5)
     return scene.driven_by(
@@ -75,25 +75,21 @@ def fig4_as_dynamics() -> Scene:
 
 
 def final_energy(scene: Scene) -> StrainEnergyMimicking:
-    """Strain energy of the region in the last state, N mm."""
+    """Returns the strain energy of the region in the last state, N mm."""
     ligaments = scene.region_ligaments
     units = scene.lattice.ligament_units[ligaments]
     return StrainEnergyMimicking(ligaments, units, np.ones(1))
 
 
 def counted(scene: Scene, solver: Solver, cases: list[int]) -> dict[str, int]:
-    """Work of the forward solves of some load cases at the initial design."""
+    """Counts the work of the forward solves of some load cases at the initial design."""
     values = concrete_parameters(scene, scene.lattice.vertices)
-    records = [solve_case(solver, values, scene.loads.cases[case])[2] for case in cases]
-    total: dict[str, int] = {}
-    for record in records:
-        for what, count in work_of(record).items():
-            total[what] = total.get(what, 0) + count
-    return total
+    records = (solve_case(solver, values, scene.loads.cases[case])[2] for case in cases)
+    return dict(sum((Counter(work_of(record)) for record in records), Counter()))
 
 
 def work_of(record: object) -> dict[str, int]:
-    """What the forward solve of one case did."""
+    """Counts the work of the forward solve of one case."""
     match record:
         case explicit.ExplicitRecord():
             n_steps, n_kicks, _ = record.steps.drive.shape
@@ -109,7 +105,7 @@ def work_of(record: object) -> dict[str, int]:
 
 
 def by_variable(scene: Scene, stored: dict[str, Floats]) -> Floats:
-    """The authors' gradient (n_variables,), stored by shifts of horizontal and vertical ligaments.
+    """Orders the authors' gradient (n_variables,), stored by shifts of ligaments.
 
     Shift (i, j) of the horizontal ones moves the ligament between units (i - 1, j) and (i, j), of
     the vertical ones that between (i, j - 1) and (i, j).

@@ -1,3 +1,4 @@
+from . import checks as checks
 from .checks import Answer as Answer
 from .checks import admissible as admissible
 from .checks import apart as apart
@@ -23,4 +24,8 @@ from .stress_scenes import squares as squares
 from .verdicts import Check as Check
 from .verdicts import StressCase as StressCase
 from .verdicts import StressFamily as StressFamily
+from .verdicts import Tally as Tally
 from .verdicts import Wanted as Wanted
+from .verdicts import attempt as attempt
+from .verdicts import attempted as attempted
+from .verdicts import family as family

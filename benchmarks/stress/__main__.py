@@ -1,18 +1,36 @@
-"""Command line: ``python -m benchmarks.stress [family ...]``."""
+"""Tries to break the numbers: every case must be solved, or refused in words.
+
+Command line: ``python -m benchmarks.stress [family ...]``. The counts go to JSON, which the page
+shows.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-from benchmarks.stress import registry, storage
-from benchmarks.stress.verdicts import StressFamily, StressOutcome, Tally, attempted
+from benchmarks.harness import aligned
+from benchmarks.stress import families
+from benchmarks.stress.verdicts import Check, StressFamily, Tally, attempted
+from pipeline.runtime import write_atomically
 
 ENOUGH = 0.99
 """Share of the cases in range that must be solved, of each family and of all."""
+SCHEMA_VERSION = 1
+FAMILIES: dict[str, StressFamily] = {
+    family.name: family
+    for family in (
+        *(families.barrier, families.designs, families.slender, families.constants),
+        *(families.times, families.windings, families.sizes, families.pieces, families.inputs),
+        *(families.branches, families.balances, families.symmetry, families.agreement),
+    )
+}
+"""In the order of the table."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,18 +39,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         1 if an answer is wrong or too few cases in range are solved, otherwise 0.
     """
-    asked = _parser().parse_args(arguments)
-    try:
-        families = registry.load(asked.names)
-    except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
+    args = _parser().parse_args(arguments)
+    unknown = sorted(set(args.names) - set(FAMILIES))
+    if unknown:
+        known = ", ".join(FAMILIES)
+        print(f"error: no family {', '.join(unknown)}; there are {known}", file=sys.stderr)
         return 2
-    tallies = [_tally(family, asked.small, asked.only) for family in families]
-    storage.write(tallies, asked.out)
-    print(storage.table(tallies))
+    chosen = [family for name, family in FAMILIES.items() if not args.names or name in args.names]
+    tallies = [_tally(family, args.small, args.only) for family in chosen]
+    record = {"schema_version": SCHEMA_VERSION, "families": [_record(each) for each in tallies]}
+    with write_atomically(args.out) as aside:
+        aside.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    print(table(tallies))
     failures = [line for tally in tallies for line in _failures(tally)]
     print(*failures, sep="\n")
-    return 1 if failures and not asked.tolerant else 0
+    return 1 if failures and not args.tolerant else 0
 
 
 def _tally(family: StressFamily, small: bool, only: str) -> Tally:
@@ -40,49 +61,79 @@ def _tally(family: StressFamily, small: bool, only: str) -> Tally:
     start, outcomes = time.process_time(), []
     for case in family.cases(small):
         if only in case.name:
-            outcomes.append(attempted(case))
-            _tell(family, outcomes[-1])
-    spent = time.process_time() - start
-    print(f"{family.name}: {len(outcomes)} cases, {spent:.0f} s", file=sys.stderr, flush=True)
+            outcomes.append(outcome := attempted(case))
+            if outcome.verdict != "solved":
+                _tell(f"{family.name}: {case.name}: {outcome.verdict}: {outcome.message}")
+    _tell(f"{family.name}: {len(outcomes)} cases, {time.process_time() - start:.0f} s")
     return Tally(family, tuple(outcomes))
 
 
-def _tell(family: StressFamily, outcome: StressOutcome) -> None:
-    if outcome.verdict != "solved":
-        line = f"{family.name}: {outcome.case.name}: {outcome.verdict}: {outcome.message}"
-        print(line, file=sys.stderr, flush=True)
+def _tell(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
 
 
-def _failures(tally: Tally) -> list[str]:
+def _failures(tally: Tally) -> Iterator[str]:
     tried, solved = tally.in_range
-    lines = [
-        f"wrong: {tally.family.name}: {outcome.case.name}: {outcome.message}"
-        for outcome in tally.outcomes
-        if outcome.verdict == "wrong"
-    ]
+    for outcome in tally.outcomes:
+        if outcome.verdict == "wrong":
+            yield f"wrong: {tally.family.name}: {outcome.case.name}: {outcome.message}"
     if solved < ENOUGH * tried:
-        lines.append(f"too few solved: {tally.family.name}: {solved} of {tried} in range")
-    return lines
+        yield f"too few solved: {tally.family.name}: {solved} of {tried} in range"
+
+
+def table(tallies: Sequence[Tally]) -> str:
+    """Formats the counts of each family, and of all."""
+    rows = [["family", "tried", "solved", "refused", "wrong", "in range", "of these solved", ""]]
+    rows += [[tally.family.name, *map(str, _counts(tally).values()), ""] for tally in tallies]
+    counts = [_counts(tally).values() for tally in tallies]
+    totals = [sum(column) for column in zip(*counts, strict=True)]
+    return aligned([*rows, ["all", *map(str, totals), ""]])
+
+
+def _counts(tally: Tally) -> dict[str, int]:
+    in_range, in_range_solved = tally.in_range
+    verdicts = {verdict: tally.counts[verdict] for verdict in ("solved", "refused", "wrong")}
+    of_range = {"in_range": in_range, "in_range_solved": in_range_solved}
+    return {"tried": len(tally.outcomes), **verdicts, **of_range}
+
+
+def _record(tally: Tally) -> dict[str, Any]:
+    """Collects the counts, the worst checks and the refusals of a family."""
+    return {
+        "name": tally.family.name,
+        "tried_what": tally.family.tried,
+        "judged_how": tally.family.judged,
+        **_counts(tally),
+        "worst": [_check(check) for check in tally.worst],
+        "not_solved": [
+            {
+                "case": outcome.case.name,
+                "verdict": outcome.verdict,
+                "wanted": outcome.case.wanted,
+                "message": outcome.message,
+            }
+            for outcome in tally.outcomes
+            if outcome.verdict != "solved"
+        ],
+    }
+
+
+def _check(check: Check) -> dict[str, Any]:
+    return {"name": check.name, "value": float(f"{check.value:.2e}"), "limit": float(check.limit)}
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.stress",
         description="Tries to break the numbers: every case must be solved, or refused in words.",
-        epilog=f"families: {', '.join(registry.NAMES)}",
+        epilog=f"families: {', '.join(FAMILIES)}",
     )
-    parser.add_argument("names", nargs="*", metavar="family", help="which; all by default")
-    parser.add_argument("--small", action="store_true", help="a few cases of each family")
-    parser.add_argument(
-        "--tolerant", action="store_true", help="end well whatever is found: the page shows it"
-    )
-    parser.add_argument("--only", default="", metavar="TEXT", help="cases with it in their name")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results/stress/stress.json"),
-        help="the counts (default %(default)s)",
-    )
+    add, out = parser.add_argument, Path("results/stress/stress.json")
+    add("names", nargs="*", metavar="family", help="which; all by default")
+    add("--small", action="store_true", help="a few cases of each family")
+    add("--tolerant", action="store_true", help="end well whatever is found: the page shows it")
+    add("--only", default="", metavar="TEXT", help="cases with it in their name")
+    add("--out", type=Path, default=out, help="the counts (default %(default)s)")
     return parser
 
 

@@ -1,4 +1,4 @@
-"""Independent checks of answers: balance, stability, barriers, overlaps, energy, smaller steps."""
+"""Checks answers independently: balance, stability, barriers, overlaps, energy, smaller steps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_STAGES = 24
 
 
 class Answer(NamedTuple):
-    """What a solver returned: displacement and velocity (n_times, n_dofs), and its record."""
+    """Holds a solver's answer: displacement and velocity (n_asked, n_dofs), and its record."""
 
     displacement: Floats
     velocity: Floats
@@ -37,7 +37,7 @@ class Answer(NamedTuple):
 
 
 def solved(case: StressScene, solver: Solver) -> Answer:
-    """The answer to one case, by ``sim.solvers.base.solve_case``."""
+    """Solves one case by ``sim.solvers.base.solve_case``."""
     return Answer(*solve_case(solver, case.values, case.drive))
 
 
@@ -61,7 +61,7 @@ def equilibria(case: StressScene, loads: Floats, halving: bool = False) -> list[
 
 
 def balanced(case: StressScene, answer: Answer) -> list[Check]:
-    """Distance of equilibria from those of the definition, and whether these are minima."""
+    """Checks the distance of equilibria from the definition's, and that these are minima."""
     record = answer.record
     assert isinstance(record, static_solver.StaticRecord)
     if not record.stable.all():
@@ -82,7 +82,7 @@ def balanced(case: StressScene, answer: Answer) -> list[Check]:
 
 
 def _newton(of: ReferenceStructure, state: Floats, free: Ints) -> tuple[Floats, int]:
-    """Newton's step (n_dofs,) to balance, and the number of negative pivots of the stiffness."""
+    """Returns Newton's step (n_dofs,) to balance, and the stiffness's number of negative pivots."""
     step = np.zeros_like(state)
     if len(free) == 0:
         return step, 0
@@ -93,7 +93,7 @@ def _newton(of: ReferenceStructure, state: Floats, free: Ints) -> tuple[Floats, 
 
 
 def _factor(matrix: sp.csc_array) -> spla.SuperLU:
-    """A factor whose pivots stay on the diagonal: their signs are the matrix's inertia."""
+    """Factorises with pivots on the diagonal: their signs are the matrix's inertia."""
     try:
         return spla.splu(
             matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -103,18 +103,18 @@ def _factor(matrix: sp.csc_array) -> spla.SuperLU:
 
 
 class SingularError(Exception):
-    """The stiffness that the definition has in a state is singular."""
+    """Reports that the stiffness of the definition is singular in a state."""
 
 
 def negative_pivots(factor: spla.SuperLU) -> int:
-    """Number of negative eigenvalues of a symmetric matrix, from its factor."""
+    """Counts the negative eigenvalues of a symmetric matrix, from its factor."""
     if not np.array_equal(factor.perm_r, factor.perm_c):
         raise SingularError("a pivot left the diagonal")
     return int((factor.U.diagonal() < 0).sum())
 
 
 def reached(case: StressScene, states: Floats, times: Floats) -> Check:
-    """How far the driven units are from where they should be, mm or rad."""
+    """Checks the distance of the driven units from their motion, mm or rad."""
     wanted = np.asarray(case.drive.motion(times), dtype=float)
     wanted = wanted[:, None] if wanted.ndim == 2 else wanted
     moved = states.reshape(len(states), -1, 3)[:, case.drive.units]
@@ -122,7 +122,7 @@ def reached(case: StressScene, states: Floats, times: Floats) -> Check:
 
 
 def admissible(case: StressScene, states: Floats) -> list[Check]:
-    """Finite numbers, no void beyond its barrier, no unit through another: by geometry."""
+    """Checks finite numbers, voids within their barrier, no overlap of units: by geometry."""
     motion = states.reshape(len(states), -1, 3)
     checks = [Check("numbers that are not finite", int((~np.isfinite(states)).sum()), 0)]
     if not checks[0].kept:
@@ -156,19 +156,21 @@ def _void_angles(case: StressScene, state: Floats) -> Floats:
 
 
 def motions(
-    case: StressScene, asked: Floats, error: float, solver: Solver | None = None
+    case: StressScene, asked: Floats | int, error: float, solver: Solver | None = None
 ) -> list[Check]:
     """Integrates a motion and checks it, also against one of half the steps.
 
     Args:
         case: the case.
-        asked: times of the output, s.
+        asked: times of the output, s, or how many from zero to the end.
         error: that half the steps may find, root mean square relative to that of the motion.
         solver: by default the plan's.
 
     Raises:
         SimulationError: it cannot be integrated.
     """
+    if isinstance(asked, int):
+        asked = np.linspace(0.0, case.scene.loads.duration, asked)
     used = solver or case.solver(asked)
     answer = solved(case, used)
     checks = [*admissible(case, answer.displacement), reached(case, answer.displacement, asked)]
@@ -182,12 +184,12 @@ def motions(
     ]
 
 
-def motions_as_advised(case: StressScene, asked: Floats, error: float) -> list[Check]:
-    """The same as planned by default; and if that is not enough by its own account, tight.
+def motions_as_advised(case: StressScene, asked: Floats | int, error: float) -> list[Check]:
+    """Integrates as planned by default; if that is not enough by its own account, tight.
 
     Args:
         case: the case.
-        asked: times of the output, s.
+        asked: times of the output, or how many, as of ``motions``.
         error: as of ``motions``.
 
     Raises:
@@ -207,7 +209,7 @@ def motions_as_advised(case: StressScene, asked: Floats, error: float) -> list[C
 def stages(
     case: StressScene, solver: implicit.ImplicitSolver, record: implicit.ImplicitRecord
 ) -> list[Check]:
-    """Distance of implicit stages from those of the definition, over the tolerance."""
+    """Checks the distance of implicit stages from the definition's, over the tolerance."""
     tableau, times = solver.tableau, record.times
     n_steps, n_stages = len(times) - 1, len(tableau.nodes)
     every = [(n, s) for n in range(n_steps) for s in range(1, n_stages)]
@@ -234,7 +236,7 @@ def stages(
 
 
 def energies(case: StressScene, answer: Answer) -> Floats:
-    """Kinetic and elastic energy (n_times,), N mm."""
+    """Computes kinetic and elastic energy (n_asked,), N mm."""
     rates = answer.velocity.copy()
     rates[:, case.topology.held] = 0.0
     kinetic = 0.5 * rates**2 @ case.values.mass.ravel()
@@ -242,7 +244,7 @@ def energies(case: StressScene, answer: Answer) -> Floats:
 
 
 def work(case: StressScene, answer: Answer, times: Floats) -> tuple[Floats, Floats]:
-    """Work of the drive and energy lost to damping (n_times,) up to each time, N mm.
+    """Computes work of the drive and energy lost to damping (n_asked,) up to each time, N mm.
 
     By the trapezoidal rule, so the times must resolve the motion.
     """
@@ -260,13 +262,13 @@ def _integral(values: Floats, times: Floats) -> Floats:
 
 
 def apart(case: StressScene, one: Answer, other: Answer) -> float:
-    """Largest difference of two answers over the largest displacement."""
+    """Returns the largest difference of two answers over the largest displacement."""
     size = max(_size(case, one.displacement), 1e-9)
     return _size(case, one.displacement - other.displacement) / size
 
 
 def typically_apart(case: StressScene, one: Answer, other: Answer) -> float:
-    """Root mean square difference of two answers over that of the first."""
+    """Returns the root mean square difference of two answers over that of the first."""
     scale = case.topology.scale
     off, size = (
         float(np.sqrt(np.mean((states * scale) ** 2)))
@@ -276,5 +278,5 @@ def typically_apart(case: StressScene, one: Answer, other: Answer) -> float:
 
 
 def _size(case: StressScene, states: Floats) -> float:
-    """Largest displacement, rotations times the rotation scale, mm."""
+    """Returns the largest displacement, rotations times the rotation scale, mm."""
     return float(np.abs(states * case.topology.scale).max(initial=0.0))

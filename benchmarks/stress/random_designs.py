@@ -1,4 +1,4 @@
-"""Designs drawn at random, all of which keep to what can be made."""
+"""Draws designs at random, all of which keep to what can be made."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_CUTS = 2000
 
 
 class RandomDesigns:
-    """Random shifts of all vertices of a lattice, cut back place by place until they can be made.
+    """Draws shifts of all vertices of a lattice, cut back place by place until they can be made.
 
     Args:
         lattice: with no shift, it can be made.
@@ -40,14 +40,14 @@ class RandomDesigns:
 
     @cached_property
     def _variables(self) -> tuple[Ints, Ints]:
-        """Pattern of the constraints' Jacobian: rows and the variables in them."""
+        """Returns the pattern of the constraints' Jacobian: rows and the variables in them."""
         size = self._constraints.space.n_variables
         pattern = self._constraints(np.zeros(size))[1].tocoo()
         row, variable = pattern.coords
         return row, variable
 
     def __call__(self, seed: int) -> Floats:
-        """Vertices (n_vertices, 2) of one design, mm."""
+        """Draws the vertices (n_vertices, 2) of one design, mm."""
         random = np.random.default_rng(seed)
         largest = self._largest
         design = random.uniform(-largest, largest, self._constraints.space.n_variables)
@@ -60,7 +60,7 @@ class RandomDesigns:
         raise ValueError(f"no design that can be made was found from seed {seed}")
 
     def at_bounds(self, vertices: Floats) -> float:
-        """Smallest margin of a design, mm (angles times a length)."""
+        """Returns the smallest margin of a design, mm (angles times a length)."""
         lattice = self._constraints.space.lattice
         shifts = np.zeros((lattice.n_groups, 2))
         shifts[lattice.group] = vertices - lattice.vertices

@@ -1,4 +1,4 @@
-"""The structure by the definition of its energy, not by the kernels that the solvers run.
+"""Evaluates the structure by the definition of its energy, not by the solvers' kernels.
 
 Forces and stiffness are automatic derivatives of ``sim.energy.ligament`` and
 ``sim.energy.distance_contact``, put together
@@ -38,7 +38,7 @@ from sim.structure import (
 
 
 class ReferenceStructure(NamedTuple):
-    """What the definition needs to know.
+    """Holds the inputs of the definition.
 
     Attributes:
         lattice: its polygons, all with the same number of corners.
@@ -54,14 +54,14 @@ class ReferenceStructure(NamedTuple):
 
 
 class ReferenceForces(NamedTuple):
-    """Energy (N mm) and force (n_dofs,) on the units, N and N mm."""
+    """Holds energy (N mm) and force (n_dofs,) on the units, N and N mm."""
 
     energy: float
     force: Floats
 
 
 def _ligament(motions: Array, values: ConcreteParameters, angles: Array) -> Array:
-    """Energy of one ligament, whose units move by (2, 3), and of its voids."""
+    """Computes the energy of one ligament, whose units move by (2, 3), and of its voids."""
     law = LigamentLaw(values.law[0], values.law[1], values.law[2])
     arms, vector = jnp.asarray(values.arm), jnp.asarray(values.vector)
     strain = ligament_energy(motions[0], motions[1], arms[0], arms[1], vector, law)
@@ -87,7 +87,7 @@ ROOM = 64
 
 
 def balance(of: ReferenceStructure, state: Floats) -> ReferenceForces:
-    """Energy and force in a state (n_dofs,)."""
+    """Computes energy and force in a state (n_dofs,)."""
     motion = state.reshape(-1, 3)
     units = of.lattice.ligament_units
     energy, slope = _ligaments(motion[units], of.values, _angles(of))
@@ -102,7 +102,7 @@ def balance(of: ReferenceStructure, state: Floats) -> ReferenceForces:
 
 
 def stiffness(of: ReferenceStructure, state: Floats) -> sp.csc_array:
-    """Hessian (n_dofs, n_dofs) of the energy in a state (n_dofs,)."""
+    """Computes the Hessian (n_dofs, n_dofs) of the energy in a state (n_dofs,)."""
     motion = state.reshape(-1, 3)
     units = of.lattice.ligament_units
     blocks = np.asarray(_ligament_blocks(motion[units], of.values, _angles(of)))
@@ -116,7 +116,7 @@ def stiffness(of: ReferenceStructure, state: Floats) -> sp.csc_array:
 
 
 def _angles(of: ReferenceStructure) -> Floats:
-    """Barrier and cutoff, out of reach where contact acts on the distance of units."""
+    """Returns barrier and cutoff, out of reach where contact acts on the distance of units."""
     law = of.contact
     if isinstance(law, VoidAngleContact):
         return np.array([law.barrier, law.cutoff])
@@ -126,7 +126,7 @@ def _angles(of: ReferenceStructure) -> Floats:
 def _near(
     of: ReferenceStructure, state: Floats
 ) -> tuple[Ints, tuple[Floats, Floats, Floats, DistanceLaw]]:
-    """Pairs of units in contact, and the same padded as the definition takes them."""
+    """Finds pairs of units in contact; returns them, and padded as the definition takes them."""
     assert isinstance(of.contact, DistanceContact)
     reach = of.contact.distance
     moved = displaced(of.lattice, of.vertices, state.reshape(1, -1, 3))[0]

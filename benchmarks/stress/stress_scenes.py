@@ -1,4 +1,4 @@
-"""Scenes of the stress cases: lattices of the paper's constants under whatever is asked of them."""
+"""Poses stress cases: lattices of the paper's constants under any drive."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ NONE = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class StressScene:
-    """A structure under one drive.
+    """Poses a structure under one drive.
 
     Attributes:
         scene: with a single load case.
@@ -56,37 +56,37 @@ class StressScene:
 
     @property
     def topology(self) -> Topology:
-        """Of the scene."""
+        """Returns the scene's topology."""
         return self.scene.topology
 
     @property
     def drive(self) -> PrescribedMotion:
-        """Of its load case."""
+        """Returns the drive of its load case."""
         return self.scene.loads.cases[0]
 
     @cached_property
     def values(self) -> ConcreteParameters:
-        """Parameters of the structure."""
+        """Returns the parameters of the structure."""
         return concrete_parameters(self.scene, self.vertices)
 
     @property
     def structure(self) -> ReferenceStructure:
-        """As the definition takes it."""
+        """Returns the structure as the definition takes it."""
         posed = self.scene.structure
         return ReferenceStructure(posed.lattice, self.vertices, self.values, posed.contact)
 
     def solver(self, asked: Floats) -> Solver:
-        """What the plan chooses for output at these times."""
+        """Returns the solver that the plan chooses for output at these times."""
         return make_plan(self.scene, self.vertices, asked, every_case=True).solver
 
     def with_material(self, **constants: Any) -> StressScene:  # noqa: ANN401  (numbers or arrays)
-        """The same of other constants."""
+        """Changes constants of the material."""
         material = self.scene.structure.material._replace(**constants)
         return replace(self, scene=self.scene.updated(material=material))
 
 
 def squares(columns: int, rows: int | None = None, bias: float = BIAS) -> Lattice:
-    """The paper's lattice, its squares turned by ``bias`` (deg)."""
+    """Makes the paper's lattice, its squares turned by ``bias`` (deg)."""
     return quads(columns, rows or columns, SPACING, LIGAMENT, np.deg2rad(bias))
 
 
@@ -97,7 +97,7 @@ def posed(
     motion: MotionLaw,
     **more: Any,  # noqa: ANN401
 ) -> StressScene:
-    """Units clamped and driven, in time unless the scene is said to be static.
+    """Clamps and drives units, in time unless the scene is said to be static.
 
     Args:
         lattice: at rest.
@@ -120,7 +120,7 @@ def posed(
 
 
 def pressed(lattice: Lattice, share: float, **more: Any) -> StressScene:  # noqa: ANN401
-    """Between plates, the left one clamped, the right one pushed in by a share of the width."""
+    """Presses between plates, the left one clamped, the right pushed in by a share of the width."""
     left = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].min())
     right = np.flatnonzero(lattice.index[:, 0] == lattice.index[:, 0].max())
     depth = share * (1 + np.ptp(lattice.index[:, 0])) * lattice.spacing
@@ -128,7 +128,7 @@ def pressed(lattice: Lattice, share: float, **more: Any) -> StressScene:  # noqa
 
 
 def shaken(lattice: Lattice, motion: MotionLaw, **more: Any) -> StressScene:  # noqa: ANN401
-    """Clamped at its four corners, the middle unit driven."""
+    """Shakes the middle unit of a lattice that is clamped at its four corners."""
     columns, rows = np.ptp(lattice.index, axis=0) + 1
     corners = np.array([0, columns - 1, columns * (rows - 1), columns * rows - 1])
     middle = columns * (rows // 2) + columns // 2

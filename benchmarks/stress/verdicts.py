@@ -1,6 +1,6 @@
-"""What a stress case is, and what comes out of it: plain records.
+"""Judges attempts: solved, refused or wrong.
 
-A case is attempted. It is solved if everything that is checked of its answer keeps within its
+A case is solved if everything that is checked of its answer keeps within its
 limit, refused if it ends in an error that says what to do, and wrong otherwise.
 """
 
@@ -10,8 +10,8 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal, NamedTuple
+from functools import cached_property, partial
+from typing import Any, Literal, NamedTuple
 
 from sim.core import SimulationError
 
@@ -23,7 +23,7 @@ REMEDIES = ("; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make 
 
 
 class Check(NamedTuple):
-    """One number of an answer that an independent calculation found.
+    """Checks one number of an answer by an independent calculation.
 
     Attributes:
         name: with the number's unit.
@@ -39,18 +39,18 @@ class Check(NamedTuple):
 
     @property
     def kept(self) -> bool:
-        """Whether the number is within its limit."""
+        """Tells whether the number is within its limit."""
         return self.value <= self.limit
 
     @property
     def share(self) -> float:
-        """The number over its limit; where that is zero, the number."""
+        """Returns the number over its limit; where that is zero, the number."""
         return self.value / self.limit if self.limit else self.value
 
 
 @dataclass(frozen=True)
 class StressCase:
-    """One attempt.
+    """Poses one attempt.
 
     Attributes:
         name: what is tried.
@@ -65,8 +65,18 @@ class StressCase:
     wanted: Wanted = "solution"
 
 
+def attempt(
+    name: str,
+    check: Callable[..., Sequence[Check]],
+    *arguments: Any,  # noqa: ANN401  (of the check)
+    wanted: Wanted = "solution",
+) -> StressCase:
+    """Poses an attempt whose check takes arguments."""
+    return StressCase(name, partial(check, *arguments), wanted)
+
+
 class StressOutcome(NamedTuple):
-    """What came out of one attempt: verdict, why, and what was checked."""
+    """Holds the verdict on one attempt, why, and what was checked."""
 
     case: StressCase
     verdict: Verdict
@@ -74,44 +84,45 @@ class StressOutcome(NamedTuple):
     checks: tuple[Check, ...]
 
 
-@dataclass(frozen=True)
-class StressFamily:
-    """Cases of one kind.
+Cases = Callable[[bool], Iterable[StressCase]]
+"""Makes cases; few ones if asked for a small suite."""
 
-    Attributes:
-        name: short.
-        tried: a line that says what is tried.
-        judged: a line that says how an answer is judged.
-        cases: makes them; few ones if asked for a small suite.
-    """
+
+class StressFamily(NamedTuple):
+    """Names cases of one kind, with lines that say what is tried and how an answer is judged."""
 
     name: str
     tried: str
     judged: str
-    cases: Callable[[bool], Iterable[StressCase]]
+    cases: Cases
+
+
+def family(tried: str, judged: str) -> Callable[[Cases], StressFamily]:
+    """Decorates a function that makes cases: a family of its name."""
+    return lambda cases: StressFamily(cases.__name__, tried, judged, cases)
 
 
 @dataclass(frozen=True)
 class Tally:
-    """Outcomes of one family."""
+    """Counts the outcomes of one family."""
 
     family: StressFamily
     outcomes: tuple[StressOutcome, ...]
 
     @cached_property
     def counts(self) -> Counter[Verdict]:
-        """Number of outcomes of each verdict."""
+        """Counts the outcomes of each verdict."""
         return Counter(outcome.verdict for outcome in self.outcomes)
 
     @property
     def in_range(self) -> tuple[int, int]:
-        """Numbers of cases that a study may ask for: tried, and solved."""
+        """Counts the cases that a study may ask for: tried, and solved."""
         asked = [outcome for outcome in self.outcomes if outcome.case.wanted == "solution"]
         return len(asked), sum(outcome.verdict == "solved" for outcome in asked)
 
     @property
     def worst(self) -> list[Check]:
-        """Of all solved cases, the check of each name that came closest to its limit."""
+        """Lists the check of each name that came closest to its limit in solved cases."""
         found: dict[str, Check] = {}
         for outcome in self.outcomes:
             for check in outcome.checks if outcome.verdict == "solved" else ():

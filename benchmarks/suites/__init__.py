@@ -1,4 +1,4 @@
-"""Defines one benchmark a module: each has a function ``benchmark()``."""
+"""Defines what is measured together: one suite a module, and the list of all."""
 
 import lazy_loader as lazy
 

@@ -1,2 +1,9 @@
-from . import static as static
-from . import warm as warm
+from . import sweep_growth as sweep_growth
+from .ablation import SKIPS as SKIPS
+from .ablation import Skip as Skip
+from .catalogue import VIDEOS as VIDEOS
+from .catalogue import suites as suites
+from .optimiser_contest import FEASIBLE as FEASIBLE
+from .optimiser_contest import OPTIMISERS as OPTIMISERS
+from .optimiser_contest import OptimiserBudget as OptimiserBudget
+from .optimiser_contest import prepare as prepare

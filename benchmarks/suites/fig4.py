@@ -1,4 +1,4 @@
-"""Figure 4's loss and gradient at the final load: an equilibrium, against slow damped dynamics."""
+"""Measures Figure 4's loss and gradient at the final load: equilibrium against damped dynamics."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ import numpy as np
 from jax import Array
 
 from benchmarks.harness import (
-    Benchmark,
-    Candidate,
+    Method,
     Run,
     Sample,
+    Suite,
     Target,
+    Task,
     error_of,
+    in_turn,
     seconds_of,
-    speed_up,
+    time_ratio,
 )
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
@@ -24,35 +26,33 @@ from sim.quasistatics import StaticSolver
 from sim.scene import GradientChain, parameters_of_design
 from sim.structure import Parameters
 
-OURS, THEIRS, THEIRS_FORWARD = (
-    "ours",
-    "pseudo-dynamics, diffrax Dopri5",
-    "pseudo-dynamics, loss only",
-)
+OURS, THEIRS = "ours", "pseudo-dynamics, diffrax Dopri5"
 
 
-def benchmark() -> Benchmark:
-    """The benchmark."""
-    return Benchmark(
-        name="fig4",
-        title="strain energy of a region and its gradient at the final load, 15 x 15 units",
-        reference=_strict,
-        candidates=(
-            Candidate(OURS, _ours),
-            Candidate(THEIRS, _dynamics_gradient, repeats=1, baseline=True),
-            Candidate(THEIRS_FORWARD, _dynamics_loss, repeats=2, baseline=True),
+def suite() -> Suite:
+    """Makes the suite."""
+    theirs = partial(Method, own=False, baseline=True)
+    return in_turn(
+        "fig4",
+        "strain energy of a region and its gradient at the final load, 15 x 15 units",
+        ("the same equilibrium by 25 loads, each to a hundredth of the usual residual", _strict),
+        (
+            Method(OURS, _ours),
+            theirs(THEIRS, partial(_dynamics, "gradient"), repeats=1),
+            theirs("pseudo-dynamics, loss only", partial(_dynamics, "loss"), repeats=2),
         ),
-        targets=(
+        (
             Target("final load", seconds_of(OURS), "s", at_most=0.03, aim=0.01),
             Target("loss error", error_of(OURS, "loss"), at_most=1e-9),
             Target("gradient error", error_of(OURS, "gradient"), at_most=1e-7),
-            Target("times faster than pseudo-dynamics", speed_up(OURS, THEIRS), at_least=2000),
+            Target("times faster than pseudo-dynamics", time_ratio(THEIRS, OURS), at_least=2000),
         ),
+        225,
     )
 
 
 def _strict() -> Run:
-    """Another way to the same equilibrium: 25 loads, each to a hundredth of the usual residual."""
+    """Solves for the same equilibrium by 25 loads, each to a hundredth of the usual residual."""
     return _equilibrium(np.linspace(0.0, 1.0, 26)[1:], 1e-12)
 
 
@@ -83,16 +83,9 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
     return run
 
 
-def _dynamics_gradient() -> Run:
-    return jax_baseline.prepare_gradient(_loss(), paper_scenes.fig4().space.n_variables)
-
-
-def _dynamics_loss() -> Run:
-    return jax_baseline.prepare_loss(_loss(), paper_scenes.fig4().space.n_variables)
-
-
-def _loss() -> jax_baseline.Loss:
+def _dynamics(task: Task) -> Run:
     scene = paper_scenes.fig4_as_dynamics()
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8)
     end = np.array([scene.loads.duration])
-    return jax_baseline.loss(scene, 0, method, end, paper_scenes.final_energy(scene))
+    loss = jax_baseline.loss(scene, method, end, paper_scenes.final_energy(scene))
+    return jax_baseline.prepare(loss, scene.space.n_variables, task)

@@ -1,78 +1,68 @@
-"""Work against precision of our own integrators, on Figure 2's load case at 45 deg."""
+"""Measures work against precision of our own integrators, on Figure 2's load case at 45 deg."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of
+from benchmarks.harness import Method, Run, Sample, Suite, Target, error_of, in_turn
+from benchmarks.methods import SPLITTINGS, refined_times
 from benchmarks.scenes import paper_scenes
+from pipeline.runtime import ROOT
 from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, parameters_of_design
 from sim.solvers import Solver, differentiable_motion
-from sim.time_integration import (
-    BLANES_MOAN,
-    LEAPFROG,
-    ExplicitSolver,
-    ImplicitSolver,
-    Splitting,
-    halved,
-)
+from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 SAMPLES = np.linspace(0.0, 1.0, 200)
 """The authors' samples: the loss is their plain sum over these."""
-AUTHORS = Path(__file__).resolve().parents[2] / "tests/data/reference/scene_A.npz"
+AUTHORS = ROOT / "tests/data/reference/scene_A.npz"
 AUTHORS_NAME = "authors' framework, tight"
-METHODS: dict[str, Splitting] = {"leapfrog": LEAPFROG, "Blanes-Moan": BLANES_MOAN}
-STEPS = (
-    ("leapfrog", 20_000),
-    ("leapfrog", 40_000),
-    ("Blanes-Moan", 12_000),
+AUTHORS_NOTE = (
+    "stored results (tests/data/reference), their gradient good to 1e-5: an independent check of"
+    " the reference solution"
 )
+STEPS = (("leapfrog", 20_000), ("leapfrog", 40_000), ("Blanes-Moan", 12_000))
 
 
-def benchmark() -> Benchmark:
-    """The benchmark."""
+def suite() -> Suite:
+    """Makes the suite."""
     implicit: list[tuple[Accuracy, int]] = [("draft", 0), *(("default", k) for k in range(3))]
-    return Benchmark(
-        name="precision",
-        title="time against error, loss and gradient of one load angle (45 deg)",
-        reference=partial(_run_with, partial(_explicit, "Blanes-Moan", 36_000), warm=False),
-        candidates=(
+    return in_turn(
+        "precision",
+        "time against error, loss and gradient of one load angle (45 deg)",
+        (
+            "our explicit method of order 4 with 36 000 steps",
+            partial(_run_with, partial(_explicit, "Blanes-Moan", 36_000), warm=False),
+        ),
+        (
             *(
-                Candidate(_implicit_name(*grid), partial(_run_with, partial(_implicit, *grid)))
+                Method(_implicit_name(*grid), partial(_run_with, partial(_implicit, *grid)))
                 for grid in implicit
             ),
             *(
-                Candidate(
+                Method(
                     f"explicit, {method}, {n_steps} steps",
                     partial(_run_with, partial(_explicit, method, n_steps)),
                     repeats=2,
                 )
                 for method, n_steps in STEPS
             ),
-            Candidate(
-                AUTHORS_NAME,
-                _stored,
-                timed=False,
-                note="stored results (tests/data/reference), their gradient good to 1e-5: an"
-                " independent check of the reference solution",
-            ),
+            Method(AUTHORS_NAME, _stored, own=False, timed=False, note=AUTHORS_NOTE),
         ),
-        targets=(
-            Target("loss error at default", error_of("implicit, default", "loss"), at_most=2e-4),
-            Target(
-                "gradient error at default", error_of("implicit, default", "gradient"), at_most=3e-4
-            ),
-            Target(
-                "reference against the authors' loss", error_of(AUTHORS_NAME, "loss"), at_most=1e-6
-            ),
+        tuple(
+            Target(told, error_of(name, quantity), at_most=limit)
+            for told, name, quantity, limit in (
+                ("loss error at default", "implicit, default", "loss", 2e-4),
+                ("gradient error at default", "implicit, default", "gradient", 3e-4),
+                ("reference against the authors' loss", AUTHORS_NAME, "loss", 1e-6),
+            )
         ),
+        225,
     )
 
 
@@ -88,15 +78,12 @@ def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
     asked = scene.updated(accuracy=accuracy, integrator="implicit")
     solver = make_plan(asked, times=SAMPLES).solver
     assert isinstance(solver, ImplicitSolver)
-    times = solver.times
-    for _ in range(halvings):
-        times = halved(times)
-    return replace(solver, times=times)
+    return replace(solver, times=refined_times(solver.times, halvings))
 
 
 def _explicit(method: str, n_steps: int, scene: Scene) -> Solver:
     return ExplicitSolver(
-        scene.topology, scene.loads.duration, n_steps, SAMPLES, splitting=METHODS[method]
+        scene.topology, scene.loads.duration, n_steps, SAMPLES, splitting=SPLITTINGS[method]
     )
 
 
@@ -131,18 +118,13 @@ def _run_with(make: partial[Solver], warm: bool = True) -> Run:
 
 
 def _stored() -> Run:
-    """The authors' own results for this load case."""
+    """Returns the authors' own results for this load case."""
     scene = _scene()
     spacing = scene.lattice.spacing
     with np.load(AUTHORS) as stored:
-        motion = stored["roi_displacement_tight_mm_mm_rad"] / np.array([spacing, spacing, 1.0])
         values = {
-            "rms": motion,
+            "rms": stored["roi_displacement_tight_mm_mm_rad"] / np.array([spacing, spacing, 1.0]),
             "loss": stored["loss_tight"],
             "gradient": paper_scenes.by_variable(scene, dict(stored)),
         }
-
-    def run() -> Sample:
-        return Sample(values, {})
-
-    return run
+    return partial(Sample, values, {})

@@ -1,4 +1,4 @@
-"""Growth of an equilibrium solve with the lattice: squares pushed together by a tenth at once."""
+"""Measures the growth of an equilibrium with the lattice: squares compressed by a tenth at once."""
 
 from __future__ import annotations
 
@@ -6,7 +6,20 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.harness import Benchmark, Candidate, Outcomes, Run, Sample, Target
+from benchmarks.harness import (
+    Measured,
+    Measurement,
+    MeasuringLimits,
+    Method,
+    Run,
+    Sample,
+    Suite,
+    Target,
+    Tell,
+    in_turn,
+    measure_settings,
+    result_of,
+)
 from benchmarks.scenes import work_of
 from sim.energy import Topology, observe, topology
 from sim.linalg import number_free_dofs
@@ -20,47 +33,62 @@ ALL_IN_BANDS = 60
 WAYS = {"Newton, by size": SIDES[-1], "Newton, band": ALL_IN_BANDS}
 """Ways to store the tangent, with the largest lattice that each is shown on."""
 COMPRESSION = 0.1
+REFERENCE = "two loads on the way, each to a hundredth of the usual residual"
 
 
-def benchmark() -> Benchmark:
-    """The benchmark."""
-    chosen = [Candidate(_name(side), partial(_solve, side), repeats=3) for side in SIDES]
+def suite() -> Suite:
+    """Makes the suite."""
+    chosen = [Method(_name(side), partial(_solve, side), repeats=3) for side in SIDES]
     banded = [
-        Candidate(f"{_name(side)}, band", partial(_solve, side, by_fronts=False), repeats=2)
+        Method(f"{_name(side)}, band", partial(_solve, side, by_fronts=False), repeats=2)
         for side in SIDES
         if 15 < side <= ALL_IN_BANDS
     ]
-    return Benchmark(
-        name="static",
-        title="equilibrium at 10 % compression from rest, squares of 15 to 120 units a side",
-        reference=partial(strict, SIDES),
-        candidates=(*chosen, *banded),
-        targets=(
+    return in_turn(
+        "static",
+        "equilibrium at 10 % compression from rest, squares of 15 to 120 units a side",
+        (REFERENCE, partial(strict, SIDES)),
+        (*chosen, *banded),
+        (
             Target("exponent of time by units, 30 to 120", _exponent, at_most=1.75, aim=1.5),
             Target("energy error", _worst, at_most=1e-9),
         ),
+        units=0,
         short=False,
     )
+
+
+def growth(sides: tuple[int, ...], limits: MeasuringLimits, tell: Tell) -> list[Measurement]:
+    """Measures every size by each of the WAYS, each in a process of its own."""
+    reference = result_of(partial(strict, sides))
+    measured: list[Measurement] = []
+    for way, largest in WAYS.items():
+        for side in sides:
+            if side <= largest:
+                settings = ((f"{side} × {side}", float(side)),)
+                method = Method(way, partial(grown, way), settings, tasks=("loss",), repeats=3)
+                measured += measure_settings(method, reference, side**2, limits, tell)
+    return measured
 
 
 def _name(side: int) -> str:
     return f"{side} x {side}"
 
 
-def _exponent(found: Outcomes) -> float:
+def _exponent(found: Measured) -> float:
     small, large = (
         found[_name(side)].seconds if _name(side) in found else np.nan for side in (30, 120)
     )
     return float(np.log(large / small) / np.log((120 / 30) ** 2))
 
 
-def _worst(found: Outcomes) -> float:
+def _worst(found: Measured) -> float:
     return max((outcome.error("energy") for outcome in found.values()), default=np.nan)
 
 
 @cache
 def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
-    """Ligaments 2.3 mm long, the left column clamped, the right one pushed in."""
+    """Poses a lattice: ligaments 2.3 mm long, the left column clamped, the right one pushed in."""
     lattice = quads(side, side, 15.0, 2.3, np.deg2rad(20.0))
     left = side * np.arange(side)
     right = left + side - 1
@@ -72,7 +100,7 @@ def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
 
 
 def strict(sides: tuple[int, ...]) -> Run:
-    """The same equilibria over two loads, each to a hundredth of the usual residual."""
+    """Solves for the same equilibria over two loads, each to a hundredth of the usual residual."""
 
     def run() -> Sample:
         found: dict[str, np.ndarray] = {}
@@ -87,7 +115,7 @@ def strict(sides: tuple[int, ...]) -> Run:
 
 
 def grown(way: str, side: float, task: str) -> Run:
-    """Run of one size by one of the WAYS."""
+    """Prepares one size by one of the WAYS."""
     del task
     return _solve(int(side), None if way == "Newton, by size" else False)
 

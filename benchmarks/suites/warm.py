@@ -1,13 +1,25 @@
-"""Figure 4's whole path, loss and gradient, along a walk of designs: each start of a solve."""
+"""Measures Figure 4's whole path, loss and gradient, along a walk of designs."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of, seconds_of
+from benchmarks.harness import (
+    Method,
+    Run,
+    Sample,
+    Suite,
+    Target,
+    error_of,
+    in_turn,
+    seconds_of,
+    time_ratio,
+)
 from benchmarks.scenes import paper_scenes
 from sim.core import Floats
 from sim.quasistatics import StaticRecord, StaticSolver
@@ -19,24 +31,28 @@ STEP = 0.1
 """Largest change of a vertex from one design to the next, mm; optimisers move less near the end."""
 
 
-def benchmark() -> Benchmark:
-    """The benchmark."""
-    share = float(DESIGNS)
-    return Benchmark(
-        name="warm",
-        title="loss and gradient over 10 load steps of Figure 4, mean of a walk of 10 designs",
-        reference=_strict,
-        candidates=(Candidate(COLD, _cold, share=share), Candidate(WARM, _warm, share=share)),
-        targets=(
+def suite() -> Suite:
+    """Makes the suite."""
+    method = partial(Method, share=float(DESIGNS))
+    return in_turn(
+        "warm",
+        "loss and gradient over 10 load steps of Figure 4, mean of a walk of 10 designs",
+        ("paths from rest to a thousandth of the usual residual", partial(_walk, 1e-13, False)),
+        (
+            method(COLD, partial(_walk, 1e-10, False)),
+            method(WARM, partial(_walk, 1e-10, True)),
+        ),
+        (
             Target("whole path", seconds_of(COLD), "s", at_most=0.15),
             Target(
                 "time from the last design over time from rest",
-                lambda found: seconds_of(WARM)(found) / seconds_of(COLD)(found),
+                time_ratio(WARM, COLD),
                 at_most=1.0,
             ),
             Target("loss error", error_of(WARM, "loss"), at_most=1e-9),
             Target("gradient error", error_of(WARM, "gradient"), at_most=1e-7),
         ),
+        225,
     )
 
 
@@ -45,11 +61,11 @@ class WarmStart:
 
     def __init__(self, warm: bool) -> None:
         self.warm = warm
-        self.total: dict[str, int] = {}
+        self.total: Counter[str] = Counter()
         self._records: Sequence[StaticRecord] | None = None
 
     def start(self) -> Sequence[StaticRecord] | None:
-        """The last design's path."""
+        """Returns the last design's path."""
         return self._records if self.warm else None
 
     def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
@@ -57,8 +73,7 @@ class WarmStart:
         del design
         self._records = records
         for record in records:
-            for what, count in paper_scenes.work_of(record).items():
-                self.total[what] = self.total.get(what, 0) + count
+            self.total.update(paper_scenes.work_of(record))
 
     def forget(self) -> None:
         """Begins anew."""
@@ -66,24 +81,12 @@ class WarmStart:
         self.total.clear()
 
 
-def _strict() -> Run:
-    return walk(_scene(), 1e-13, warm=False)
-
-
-def _cold() -> Run:
-    return walk(_scene(), 1e-10, warm=False)
-
-
-def _warm() -> Run:
-    return walk(_scene(), 1e-10, warm=True)
-
-
-def _scene() -> Scene:
-    return paper_scenes.fig4().updated(steps=STEPS)
+def _walk(relative: float, warm: bool) -> Run:
+    return walk(paper_scenes.fig4().updated(steps=STEPS), relative, warm)
 
 
 def walk(scene: Scene, relative: float, warm: bool) -> Run:
-    """Run of losses and gradients along a random walk of designs."""
+    """Prepares losses and gradients along a random walk of designs."""
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
     memory = WarmStart(warm)

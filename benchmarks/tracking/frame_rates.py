@@ -1,30 +1,37 @@
-"""Accuracy of tracking against frame rate, on videos with known truth."""
+"""Measures accuracy of tracking against frame rate, on videos with known truth."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy.stats import spearmanr
 
-from benchmarks.harness import Tell
+from benchmarks.harness import MeasuringLimits, Tell
 from benchmarks.tracking import plain_opencv
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
-from pipeline.tracking.motion import track_video
-from sim.core import Floats, Image, Ints
+from pipeline.tracking.motion import Track, track_video
+from sim.core import Floats, Image, Ints, Mask
 
 THINNINGS = (1, 2, 4)
 """Every so manyth frame is kept."""
-Follow = Callable[[list[Frame], SpecimenOutlines, float], Floats]
+METHODS = ("own tracker", "plain OpenCV")
+HEAD = (
+    f"{'RMSE':<38}{'x px':>8}{'y px':>8}{'rot deg':>8}{'bias mm':>10}{'gross':>7}{'lost %':>8}"
+    "   error/sigma x y rot, rank; faults, false; frames/s without decoding"
+)
+_GROSS = (0.3, 0.3, np.deg2rad(3))
+"""Errors from which a pose is grossly wrong, mm and rad."""
 
 
 class TruthVideo(NamedTuple):
-    """A video with its truth.
+    """Holds a video with its truth.
 
     Attributes:
         name, rate: of the video, Hz.
@@ -32,6 +39,8 @@ class TruthVideo(NamedTuple):
         specimen: what it shows.
         scale: px/mm, roughly.
         truth: (n_frames, n_units, 3) displacement, mm and rad.
+        visible: (n_frames, n_units) units that are to be seen.
+        fault: (n_frames,) whether frames before are missing, or the one before is shown again.
     """
 
     name: str
@@ -40,37 +49,36 @@ class TruthVideo(NamedTuple):
     specimen: SpecimenOutlines
     scale: float
     truth: Floats
+    visible: Mask
+    fault: Mask
 
 
-def _own(shown: list[Frame], specimen: SpecimenOutlines, scale: float) -> Floats:
-    return np.asarray(track_video(iter(shown), specimen, scale).displacement)
-
-
-def _plainly(shown: list[Frame], specimen: SpecimenOutlines, scale: float) -> Floats:
-    images: list[Image] = [frame.image.astype(np.uint8) for frame in shown]
-    return plain_opencv.track(iter(images), specimen, scale)
-
-
-METHODS: dict[str, Follow] = {"own tracker": _own, "plain OpenCV": _plainly}
-
-
-def measure(folder: Path, tell: Tell) -> xr.Dataset:
-    """The dataset ``tracking`` of the videos in a folder, without its attributes.
+def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
+    """Returns the dataset ``tracking`` of the videos in a folder, without its attributes.
 
     Raises:
         UserError: there are none.
     """
-    descriptions = sorted(folder.glob("*.yaml"))
-    if not descriptions:
+    del limits
+    videos = [path for path in sorted(folder.iterdir()) if path.suffix in (".mp4", ".mkv")]
+    if not videos:
         raise UserError("no described videos", file=folder, remedy="give a folder with --videos")
-    clips = [clip(path) for path in descriptions]
+    clips = [clip(path) for path in videos]
     shape = (len(clips), len(METHODS), len(THINNINGS))
     error, lost, spent = np.empty((*shape, 3)), np.empty(shape), np.empty(shape)
-    for v, one in enumerate(clips):
-        for m, (name, method) in enumerate(METHODS.items()):
-            for t, thinning in enumerate(THINNINGS):
-                error[v, m, t], lost[v, m, t], spent[v, m, t] = followed(one, method, thinning)
-            tell(f"{one.name}, {name}: {spent[v, m, 0]:.3g} s a frame")
+    tell(HEAD)
+    for place in np.ndindex(shape):
+        one, method, thinning = clips[place[0]], METHODS[place[1]], THINNINGS[place[2]]
+        shown, truth = one.frames[::thinning], one.truth[::thinning]
+        start = time.process_time()
+        displacement, line = followed(one, shown, method)
+        spent[place] = (time.process_time() - start) / len(shown)
+        missed = displacement - truth
+        known = np.isfinite(missed).all(axis=-1)
+        error[place] = np.sqrt(np.mean(missed[known] ** 2, axis=0))
+        lost[place] = 1 - known.mean()
+        if thinning == 1:
+            tell(f"{one.name:<24}{method:<14}{line()}")
     rate = np.array([[one.rate / thinning for thinning in THINNINGS] for one in clips])
     dims = ("video", "tracker", "thinning")
     return xr.Dataset(
@@ -89,23 +97,38 @@ def measure(folder: Path, tell: Tell) -> xr.Dataset:
     )
 
 
-def clip(path: Path) -> TruthVideo:
-    """The video of a description."""
-    described = import_video.description(path)
-    stem = path.stem.removesuffix("_lossless")
-    stored = np.load(next(path.parent.glob(f"{stem}*_truth.npz")))
+def clip(video: Path) -> TruthVideo:
+    """Reads a video, its description and its truth."""
+    stem = video.stem.removesuffix("_lossless")
+    described = import_video.description(
+        next(
+            path
+            for path in (video.with_suffix(".yaml"), video.with_name(f"{stem}.yaml"))
+            if path.exists()
+        )
+    )
+    stored, columns = np.load(next(video.parent.glob(f"{stem}*_truth.npz"))), described["grid"][0]
+    truth = displacement(stored, columns)
+    visible, fault = np.ones(truth.shape[:2], dtype=bool), np.zeros(len(truth), dtype=bool)
+    if "marker_visible" in stored and stored["marker_visible"].shape[2]:
+        visible = stored["marker_visible"][:, order(stored, columns)].sum(axis=2) >= 2
+    if "frame_source" in stored:
+        source = stored["frame_source"]
+        fault = np.diff(source, prepend=source[0] - 1) != 1
     return TruthVideo(
-        path.stem,
+        video.stem,
         float(described["fps"]),
-        list(read_frames(import_video.video_of(path))),
+        list(read_frames(video)),
         outlines_of_design(import_video.design(described)),
         float(described["approx_px_per_mm"]),
-        displacement(stored, described["grid"][0]),
+        truth,
+        visible,
+        fault,
     )
 
 
 def displacement(stored: np.lib.npyio.NpzFile, columns: int) -> Floats:
-    """True displacement (n_frames, n_units, 3), units in the order i + columns j."""
+    """Returns the true displacement (n_frames, n_units, 3), units in the order i + columns j."""
     if "displacement" in stored:
         return np.asarray(stored["displacement"], dtype=float)
     moved = [stored["x"] - stored["x0"], stored["y"] - stored["y0"], stored["theta"]]
@@ -113,15 +136,47 @@ def displacement(stored: np.lib.npyio.NpzFile, columns: int) -> Floats:
 
 
 def order(stored: np.lib.npyio.NpzFile, columns: int) -> Ints:
-    """Places (n_units,) of the units in the stored arrays, in the order i + columns j."""
+    """Returns the places (n_units,) of the units in stored arrays, in the order i + columns j."""
     return np.argsort(stored["unit_ij"][:, 0] + columns * stored["unit_ij"][:, 1])
 
 
-def followed(one: TruthVideo, method: Follow, thinning: int) -> tuple[Floats, float, float]:
-    """Root mean square errors (3,), share of lost poses, and processor time of a frame, s."""
-    shown, truth = one.frames[::thinning], one.truth[::thinning]
+def followed(one: TruthVideo, shown: list[Frame], method: str) -> tuple[Floats, Callable[[], str]]:
+    """Tracks frames; returns the displacement (n_frames, n_units, 3) and its line of the table."""
+    clock: list[float] = []
     start = time.process_time()
-    missed = method(shown, one.specimen, one.scale) - truth
-    spent = (time.process_time() - start) / len(shown)
-    known = np.isfinite(missed).all(axis=-1)
-    return np.sqrt(np.mean(missed[known] ** 2, axis=0)), float(1 - known.mean()), spent
+    if method == "plain OpenCV":
+        images: Iterator[Image] = (frame.image.astype(np.uint8) for frame in shown)
+        found = plain_opencv.track(images, one.specimen, one.scale)
+        rate = len(shown) / (time.process_time() - start)
+        return found, lambda: f"{accuracy(found, one, one.scale)}{'':49}{rate:10.1f}"
+    track = track_video(
+        iter(shown), one.specimen, one.scale, lambda: clock.append(time.process_time())
+    )
+    rate = (len(clock) - 1) / (clock[-1] - clock[0])
+    found, scale = np.asarray(track.displacement), 1 / track.calibration.pixel
+    return found, lambda: f"{accuracy(found, one, scale)}{honesty(track, one):<49}{rate:10.1f}"
+
+
+def accuracy(found: Floats, real: TruthVideo, px_per_mm: float) -> str:
+    """Formats root mean square errors, bias, gross errors and losses."""
+    error = found - real.truth
+    known = np.isfinite(error).all(axis=-1)
+    seen = known & real.visible
+    scale = np.array([px_per_mm, px_per_mm, 180 / np.pi])
+    rms = np.sqrt(np.mean(error[seen] ** 2, axis=0)) * scale
+    bias = np.abs(error[seen].mean(axis=0))[:2].max()
+    gross = (np.abs(error[known]) > _GROSS).any(axis=-1).sum()
+    lost = 100 * (real.visible & ~known).sum() / real.visible.sum()
+    return f"{rms[0]:8.4f}{rms[1]:8.4f}{rms[2]:8.3f}{bias:10.5f}{gross:7d}{lost:8.2f}"
+
+
+def honesty(track: Track, real: TruthVideo) -> str:
+    """Formats spread of error over sigma, their least rank correlation, faults found and false."""
+    seen = real.visible & np.isfinite(track.displacement).all(axis=-1)
+    seen[0] = False
+    error, sigma = (track.displacement - real.truth)[seen], track.sigma[seen]
+    spread = " ".join(f"{value:.2f}" for value in (error / sigma).std(axis=0))
+    rank = min(spearmanr(np.abs(error[:, dof]), sigma[:, dof]).statistic for dof in range(3))
+    flagged = track.timing != 0
+    right, wrong = int((flagged & real.fault).sum()), int((flagged & ~real.fault).sum())
+    return f"   {spread}{rank:7.2f}   {right} of {int(real.fault.sum())}, {wrong}"

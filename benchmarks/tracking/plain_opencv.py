@@ -1,4 +1,4 @@
-"""Tracking by plain OpenCV, to measure against: thresholds, centroids and matched corners.
+"""Tracks by plain OpenCV, to measure against: thresholds, centroids and matched corners.
 
 Patches above a local threshold are the units in the first frame, matched one to one with the
 design: the same as for the tracker itself, so that both have all units. What is seen at each corner
@@ -28,7 +28,7 @@ _LIKE = 0.6
 
 
 def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float) -> Floats:
-    """Displacements (frames, units, 3), mm and rad; NaN where fewer than two corners are found."""
+    """Returns displacements (frames, units, 3), mm, rad; NaN where no two corners are found."""
     first = next(images)
     found = detect_lattice(first, specimen, px_per_mm)[0]
     flip = np.array([px_per_mm, -px_per_mm])
@@ -45,7 +45,7 @@ def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float)
 
 
 class _Follower:
-    """The corners of one unit, from frame to frame."""
+    """Follows the corners of one unit, from frame to frame."""
 
     def __init__(self, image: Image, centre: Floats, corners: Floats, pitch: float) -> None:
         self._half, self._reach = int(_HALF * pitch), int(_REACH * pitch)
@@ -54,7 +54,7 @@ class _Follower:
         self._turn, self._shift = 0.0, np.zeros(2)
 
     def step(self, image: Image) -> tuple[float, float, float]:
-        """Shift in px and turn in rad since the first frame, y down; NaN if it is lost."""
+        """Returns shift in px and turn in rad since the first frame, y down; NaN if it is lost."""
         cos, sin = np.cos(self._turn), np.sin(self._turn)
         turn = np.array([[cos, -sin], [sin, cos]])
         expected = (self._corners - self._centre) @ turn.T + self._centre + self._shift
@@ -71,7 +71,7 @@ class _Follower:
         return float(shift[0]), float(shift[1]), more
 
     def _matched(self, image: Image, corner: Floats, place: Floats, turn: Floats) -> Floats | None:
-        """Where in a frame the surroundings of a corner are, about a place; None if nowhere."""
+        """Finds the surroundings of a corner in a frame, about a place; None if nowhere."""
         patch = _turned(self._image, corner, turn, self._half)
         middle = np.round(place)
         window = _turned(image, middle, np.eye(2), self._half + self._reach)
@@ -84,7 +84,7 @@ class _Follower:
 
 
 def _turned(image: Image, middle: Floats, turn: Floats, half: int) -> Image:
-    """A square of the image about a pixel, turned."""
+    """Cuts a turned square of the image about a pixel."""
     there = np.column_stack([turn.T, middle - turn.T @ np.full(2, half)])
     size = (2 * half + 1, 2 * half + 1)
     kind = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
@@ -93,7 +93,7 @@ def _turned(image: Image, middle: Floats, turn: Floats, half: int) -> Image:
 
 
 def _peak(line: Floats, place: int) -> float:
-    """Of the parabola through the largest value and those beside it, from the largest."""
+    """Returns the peak of the parabola through the largest value and its neighbours, from there."""
     if not 0 < place < len(line) - 1:
         return 0.0
     before, here, after = line[place - 1 : place + 2]

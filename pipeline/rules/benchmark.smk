@@ -38,9 +38,10 @@ rule measure:
     threads: 1
     params:
         videos=config.get("videos", "tests/data/tracking"),
-        source=lambda wildcards: source_hash("benchmarks.stage"),
+        folder=subpath(output[0], parent=True),
+        source=lambda wildcards: source_hash("benchmarks.__main__"),
     message:
         "Measuring {wildcards.suite}"
     shell:
-        "python -m benchmarks.stage {wildcards.suite} --videos {params.videos} --out {output}"
-        " --log {log}"
+        "python -m benchmarks {wildcards.suite} --videos {params.videos} --out {params.folder}"
+        " --log {log} > /dev/null"

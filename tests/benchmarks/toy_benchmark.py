@@ -1,4 +1,4 @@
-"""A toy scene: the integral of exp over [0, 1] and its derivative by a stretch of the exponent."""
+"""Defines a toy suite: the integral of exp over [0, 1] and its derivative by a stretch."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from functools import partial
 import numpy as np
 
 from benchmarks.harness import (
-    Benchmark,
-    Candidate,
+    Method,
     Run,
     Sample,
+    Suite,
     Target,
     error_of,
+    in_turn,
     seconds_of,
-    speed_up,
+    time_ratio,
 )
 
 
@@ -25,23 +26,20 @@ def exact() -> Run:
     return lambda: Sample(values, {})
 
 
-def trapezoids(n: int) -> Run:
+def trapezoids(n: float, task: str = "") -> Run:
+    del task
+    x = np.linspace(0.0, 1.0, int(n))
+
     def run() -> Sample:
-        x = np.linspace(0.0, 1.0, n)
         loss, gradient = np.trapezoid(np.exp(x), x), np.trapezoid(x * np.exp(x), x)
         values = {"loss": np.asarray(loss), "gradient@stretch": np.array([gradient])}
-        return Sample(values, {"evaluations": n})
+        return Sample(values, {"evaluations": int(n)})
 
     return run
 
 
-def at_setting(n: float, task: str) -> Run:
-    del task
-    return trapezoids(int(n))
-
-
 def slow_at_setting(setting: float, task: str) -> Run:
-    """Busy for ten seconds unless the setting is zero."""
+    """Makes a run that is busy for ten seconds unless the setting is zero."""
     del task
 
     def run() -> Sample:
@@ -56,7 +54,7 @@ def slow_at_setting(setting: float, task: str) -> Run:
 def fails_at_first(n: float, task: str) -> Run:
     if n == 0.0:
         raise ArithmeticError("too loose")
-    return at_setting(n, task)
+    return trapezoids(n, task)
 
 
 def raises_when_run() -> Run:
@@ -71,33 +69,25 @@ def raises_when_prepared() -> Run:
 
 
 def dies() -> Run:
-    def run() -> Sample:
-        os._exit(3)
-
-    return run
+    return lambda: os._exit(3)
 
 
-def benchmark(*more: Candidate) -> Benchmark:
-    return Benchmark(
-        name="toy",
-        title="integral of exp",
-        reference=exact,
-        candidates=(
-            Candidate("coarse", partial(trapezoids, 11)),
-            Candidate(
-                "fine",
-                partial(trapezoids, 1001),
-                repeats=1,
-                share=0.25,
-                baseline=True,
-                note="scaled",
-            ),
+def suite(*more: Method) -> Suite:
+    fine = {"repeats": 1, "share": 0.25, "baseline": True, "note": "scaled"}
+    return in_turn(
+        "toy",
+        "integral of exp",
+        ("the exact one", exact),
+        (
+            Method("coarse", partial(trapezoids, 11)),
+            Method("fine", partial(trapezoids, 1001), **fine),  # type: ignore[arg-type]
             *more,
         ),
-        targets=(
+        (
             Target("loss error", error_of("coarse", "loss"), at_most=1e-3),
             Target("fine loss error", error_of("fine", "loss"), at_most=1e-9, aim=1e-12),
             Target("time", seconds_of("coarse"), "s", at_least=0.0),
-            Target("speed", speed_up("coarse", "absent"), at_least=2),
+            Target("speed", time_ratio("absent", "coarse"), at_least=2),
         ),
+        units=4,
     )

@@ -7,10 +7,10 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pipeline.datasets import git_commit
 from pipeline.runtime import write_atomically
@@ -18,16 +18,13 @@ from tests.e2e.checkout import Checkout
 from tests.hostile import inputs, kills, places
 
 Part = dict[str, Any]
+T = TypeVar("T")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Tries what is asked for, and writes the counts and the page; 1 if something was lost."""
     asked = _parser().parse_args(arguments)
-    parts: dict[str, Callable[[argparse.Namespace], Part]] = {
-        "inputs": _inputs,
-        "kills": _kills,
-        "places": _places,
-    }
+    parts = {"inputs": _inputs, "kills": _kills, "places": _places}
     lost = 0
     for name in asked.parts or parts:
         made = {**parts[name](asked), "seed": asked.seed, "commit": git_commit()}
@@ -35,25 +32,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
             text = json.dumps(made, indent=1, ensure_ascii=False)
             aside.write_text(f"{text}\n", encoding="utf-8")
         lost += len(made["faults"])
-        _tell(
-            f"{name}: {sum(row['tried'] for row in made['rows'])} tried, {len(made['faults'])} lost"
-        )
+        count = sum(row["tried"] for row in made["rows"])
+        _tell(f"{name}: {count} tried, {len(made['faults'])} lost")
     return int(lost > 0)
 
 
 def _inputs(asked: argparse.Namespace) -> Part:
     found = inputs.outcomes(asked.inputs, asked.seed)
     wrong = [each for each in found if each["end"] == "wrong"]
-    rows = [
-        {**row, "survived": row["tried"] - row["wrong"]} for row in inputs.counts(found, "subject")
-    ]
+    rows = [{**row, "survived": row["tried"] - row["wrong"]} for row in inputs.counts(found)]
     faults = [f"{one['number']}: {one['subject']}, {one['damage']}: {one['note']}" for one in wrong]
     return {"rows": rows, "faults": faults}
 
 
 @contextmanager
 def _built() -> Iterator[tuple[Checkout, float]]:
-    """A checkout with a small study, built; and how long that took, in s."""
+    """Builds a small study in a checkout; yields it, and how long that took, in s."""
     with tempfile.TemporaryDirectory() as folder:
         checkout = kills.filmed(Checkout.made(Path(folder, "checkout")))
         kills.finished(checkout)  # compiles
@@ -77,11 +71,11 @@ def _kills(asked: argparse.Namespace) -> Part:
     rows = [
         {
             "what": stage,
-            "tried": len(ends := [kill for kill in found if kill.at_work == stage]),
+            "tried": len(ends),
             "while writing": sum(bool(kill.writing) for kill in ends),
             "survived": 0 if faults else len(ends),
         }
-        for stage in dict.fromkeys(kill.at_work for kill in found)
+        for stage, ends in _grouped(found, "at_work")
     ]
     return {"rows": rows, "faults": faults, "kills": [vars(kill) for kill in found]}
 
@@ -90,20 +84,21 @@ def _places(asked: argparse.Namespace) -> Part:
     del asked
     found: list[places.Tried] = []
     with _built() as (checkout, _):
-        for attempt in places.ALL:
-            for one in attempt(checkout):
-                found.append(one)
-                _tell(str(one))
+        for one in (one for attempt in places.ALL for one in attempt(checkout)):
+            found.append(one)
+            _tell(str(one))
     rows = [
-        {
-            "what": place,
-            "tried": len(ends := [one for one in found if one.place == place]),
-            "survived": sum(not one.fault for one in ends),
-        }
-        for place in dict.fromkeys(one.place for one in found)
+        {"what": place, "tried": len(ends), "survived": sum(not one.fault for one in ends)}
+        for place, ends in _grouped(found, "place")
     ]
     faults = [f"{one.place}, {one.what}: {one.fault}" for one in found if one.fault]
     return {"rows": rows, "faults": faults}
+
+
+def _grouped(found: list[T], key: str) -> Iterator[tuple[str, list[T]]]:
+    """Groups attempts by an attribute, in the order of their first."""
+    for name in dict.fromkeys(getattr(one, key) for one in found):
+        yield name, [one for one in found if getattr(one, key) == name]
 
 
 def _tell(line: str) -> None:
@@ -112,13 +107,12 @@ def _tell(line: str) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m tests.hostile", description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="part", help="inputs, kills, places; all")
-    parser.add_argument("--inputs", type=int, default=1000, help="damaged files (%(default)s)")
-    parser.add_argument("--kills", type=int, default=50, help="killed runs (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of what is random (%(default)s)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("results/survival"), help="folder (%(default)s)"
-    )
+    add, out = parser.add_argument, Path("results/survival")
+    add("parts", nargs="*", metavar="part", help="inputs, kills, places; all")
+    add("--inputs", type=int, default=1000, help="damaged files (%(default)s)")
+    add("--kills", type=int, default=50, help="killed runs (%(default)s)")
+    add("--seed", type=int, default=0, help="of what is random (%(default)s)")
+    add("--out", type=Path, default=out, help="folder (%(default)s)")
     return parser
 
 

@@ -1,24 +1,44 @@
-"""Many damaged files, tried in processes of their own: what came of each."""
+"""Damages files and reads them as the stages do, many in a process of their own, which may crash.
+
+``python -m tests.hostile.inputs SEED NUMBERS`` tries some: a line of JSON before and after each.
+"""
 
 from __future__ import annotations
 
 import json
+import logging
+import math
+import resource
+import signal
 import subprocess
 import sys
+import tempfile
+import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from random import Random
 from typing import Any
 
-from pipeline.runtime import ROOT
-from tests.hostile.subjects import SUBJECTS
+from pipeline.runtime import ROOT, UserError
+from tests.hostile import damage
+from tests.hostile.subjects import SUBJECTS, Subject, Told
 
+ROOM = 3 << 30
+"""Bytes of memory that a trial may take beyond what the process has when it starts."""
+PATIENCE = 60.0
+"""Seconds of CPU that a trial may take."""
 ENDS = ("refused", "same", "changed", "wrong")
+"""Refused in words that name the file; read as before; read as another sound file of a user's
+own, which nothing could tell from the one that was meant; or anything else."""
 
 Outcome = dict[str, Any]
+"""Of a trial: number, subject, sort of the file, damage, end, and a message as note."""
 
 
 def outcomes(count: int, seed: int) -> list[Outcome]:
-    """What came of so many trials; one that ends its process went wrong."""
+    """Runs so many trials; one that ends its process went wrong."""
     found: list[Outcome] = []
     waiting = list(range(count))
     while waiting:
@@ -26,15 +46,16 @@ def outcomes(count: int, seed: int) -> list[Outcome]:
         found += done
         waiting = waiting[len(done) :]
         if begun is not None:
-            found.append(_lost(begun, code))
+            subject = SUBJECTS[begun % len(SUBJECTS)]
+            found.append(_outcome(begun, subject, "?", "wrong", f"the process ended with {code}"))
             waiting = waiting[1:]
     return found
 
 
 def _batch(numbers: Sequence[int], seed: int) -> tuple[list[Outcome], int | None, int]:
-    """Outcomes until the process ended, the trial that it was at, if any, and its exit code."""
+    """Runs trials until the process ends: outcomes, the trial it was at, if any, its exit code."""
     words = [str(seed), ",".join(map(str, numbers))]
-    command = [sys.executable, "-m", "tests.hostile.batch", *words]
+    command = [sys.executable, "-m", "tests.hostile.inputs", *words]
     ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     lines = [json.loads(line) for line in ended.stdout.splitlines() if line.startswith("{")]
     done = [line for line in lines if "end" in line]
@@ -45,16 +66,90 @@ def _batch(numbers: Sequence[int], seed: int) -> tuple[list[Outcome], int | None
     return done, lines[-1]["begun"], ended.returncode
 
 
-def _lost(number: int, code: int) -> Outcome:
-    subject = SUBJECTS[number % len(SUBJECTS)]
-    about = {"number": number, "subject": subject.name, "sort": subject.sort, "damage": "?"}
-    return {**about, "end": "wrong", "note": f"the process ended with {code}"}
-
-
-def counts(found: Sequence[Outcome], key: str) -> list[dict[str, Any]]:
-    """How many of each `key` ended how, in the order of their first trial."""
+def counts(found: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """Counts how many of each subject ended how, in the order of their first trial."""
     rows = []
-    for name in dict.fromkeys(each[key] for each in found):
-        ends = Counter(each["end"] for each in found if each[key] == name)
+    for name in dict.fromkeys(each["subject"] for each in found):
+        ends = Counter(each["end"] for each in found if each["subject"] == name)
         rows.append({"what": name, "tried": ends.total(), **{end: ends[end] for end in ENDS}})
     return rows
+
+
+def tried(number: int, seed: int) -> Outcome:
+    """Runs a trial, which its number and the seed determine."""
+    random = Random(f"{seed}/{number}")
+    subject = SUBJECTS[number % len(SUBJECTS)]
+    good = _good(subject)
+    with tempfile.TemporaryDirectory() as name:
+        path = subject.make(Path(name))
+        how, bad = _damaged(subject, path.read_bytes(), random)
+        path.write_bytes(bad)
+        sealed = subject.sealed and not how.startswith(damage.OWN)
+        return _outcome(number, subject, how, *_end(subject, path, good, sealed=sealed))
+
+
+def _outcome(number: int, subject: Subject, how: str, end: str, note: str) -> Outcome:
+    about = {"number": number, "subject": subject.name, "sort": subject.sort}
+    return {**about, "damage": how, "end": end, "note": note}
+
+
+def _damaged(subject: Subject, good: bytes, random: Random) -> tuple[str, bytes]:
+    known = (*damage.ANY, *subject.damages, *subject.damages)
+    if random.random() < 1 / len(known):
+        other = random.choice([each for each in SUBJECTS if each is not subject])
+        with tempfile.TemporaryDirectory() as name:
+            return "swapped", other.make(Path(name)).read_bytes()
+    chosen = random.choice(known)
+    return chosen.__name__.replace("_", " "), chosen(good, random)
+
+
+def _end(subject: Subject, path: Path, good: Told, *, sealed: bool) -> tuple[str, str]:
+    try:
+        told = subject.read(path)
+    except UserError as error:
+        return ("refused" if path.name in str(error) else "wrong"), str(error)
+    except BaseException as error:  # noqa: BLE001  (whatever it is, it is what is looked for)
+        return "wrong", f"{type(error).__name__}: {error}"
+    if json.dumps(told, default=str) == json.dumps(good, default=str):
+        return "same", ""
+    if sealed and (subject.whole or not all(each in good for each in told)):
+        return "wrong", "read in silence, as something else"
+    # no number is infinite; datasets have gaps, whose places their tables tell
+    infinite = any(math.isinf(each) for each in _leaves(told) if isinstance(each, float))
+    return ("wrong", "not finite") if infinite else ("changed", "")
+
+
+@cache
+def _good(subject: Subject) -> Told:
+    with tempfile.TemporaryDirectory() as name:
+        return subject.read(subject.make(Path(name)))
+
+
+def _leaves(told: object) -> Iterator[object]:
+    if isinstance(told, dict | list | tuple):
+        for each in told.values() if isinstance(told, dict) else told:
+            yield from _leaves(each)
+    else:
+        yield told
+
+
+def main(numbers: list[int], seed: int) -> None:
+    """Runs trials under limits of memory and time."""
+    logging.disable()
+    warnings.simplefilter("ignore")
+    used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    limit = used * resource.getpagesize() + ROOM
+    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    for number in numbers:
+        _tell({"begun": number})
+        signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+        _tell(tried(number, seed))
+
+
+def _tell(what: dict[str, object]) -> None:
+    sys.stdout.write(f"{json.dumps(what)}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main([int(word) for word in sys.argv[2].split(",")], int(sys.argv[1]))

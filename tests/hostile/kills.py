@@ -1,15 +1,13 @@
-"""A small study from end to end, killed at random moments: what is there at the end."""
+"""Kills a small study from end to end at random moments, and compares what is there at the end."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import signal
-import subprocess
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from random import Random
 
 import yaml
@@ -38,7 +36,7 @@ NOT_RESULTS = ("logs", ".journal")
 
 @dataclass(frozen=True)
 class Kill:
-    """One end of a run.
+    """Records one end of a run.
 
     Attributes:
         after: seconds since its start.
@@ -52,7 +50,7 @@ class Kill:
 
 
 def filmed(checkout: Checkout) -> Checkout:
-    """The checkout with a study as small as can be, and a recording of it."""
+    """Gives the checkout a study as small as can be, and a recording of it."""
     asked = yaml.safe_load(checkout.problem.read_text(encoding="utf-8"))
     asked = overlay_keys(asked, SMALLEST)
     checkout.problem.write_text(yaml.safe_dump(asked, sort_keys=False), encoding="utf-8")
@@ -63,14 +61,11 @@ def filmed(checkout: Checkout) -> Checkout:
 
 
 def built(checkout: Checkout) -> dict[str, bytes]:
-    """All results, by name."""
-    found = (path for path in sorted(checkout.results.rglob("*")) if path.is_file())
-    named = {path.relative_to(checkout.results): path for path in found}
-    return {
-        str(name): path.read_bytes()
-        for name, path in named.items()
-        if name.parts[0] not in NOT_RESULTS
-    }
+    """Reads all results, by name."""
+    folder = checkout.results
+    found = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
+    wanted = (name for name in found if name.parts[0] not in NOT_RESULTS)
+    return {str(name): found[name].read_bytes() for name in wanted}
 
 
 def finished(checkout: Checkout) -> None:
@@ -87,7 +82,7 @@ def killed(
     span: float,
     tell: Callable[[Kill], None],
 ) -> list[str]:
-    """Kills so many runs at random, each going on where the last was; what differs in the end.
+    """Kills so many runs at random, each going on where the last was; returns the differences.
 
     Half of the kills wait for a file that is being written. A run that ends before its kill must
     have built what is wanted; the next one begins anew.
@@ -114,7 +109,7 @@ def killed(
 
 
 def _one(checkout: Checkout, random: Random, span: float) -> Kill | None:
-    """A run that is killed, with all that it started; None if it ended by itself."""
+    """Kills a run, with all that it started; None if it ended by itself."""
     writing, moment = random.random() < 0.5, random.uniform(0.5, span)
     start = time.monotonic()
     run = checkout.start()
@@ -126,17 +121,13 @@ def _one(checkout: Checkout, random: Random, span: float) -> Kill | None:
             run.communicate()
             return Kill(round(after, 3), parts, _at_work(checkout))
         time.sleep(0.001)
-    _check_end(run)
+    told = run.communicate()[0]
+    assert run.returncode == 0, told
     return None
 
 
-def _check_end(run: subprocess.Popen[str]) -> None:
-    told = run.communicate()[0]
-    assert run.returncode == 0, told
-
-
 def _parts(checkout: Checkout) -> tuple[str, ...]:
-    """Names of what is being written; folders may go while they are looked into."""
+    """Names what is being written; folders may go while they are looked into."""
     walked = os.walk(checkout.results)
     names = (name for _, folders, files in walked for name in (*folders, *files))
     return tuple(sorted(name for name in names if name.startswith(".") and "part" in name))
@@ -144,15 +135,11 @@ def _parts(checkout: Checkout) -> tuple[str, ...]:
 
 def _at_work(checkout: Checkout) -> str:
     logs = list((checkout.results / "logs").glob("*.log"))
-    return max(logs, key=_date).stem if logs else "nothing yet"
-
-
-def _date(path: Path) -> float:
-    return path.stat().st_mtime
+    return max(logs, key=lambda path: path.stat().st_mtime).stem if logs else "nothing yet"
 
 
 def differences(checkout: Checkout, wanted: Mapping[str, bytes]) -> list[str]:
-    """Names of the results that differ from the wanted ones, or that only one has."""
+    """Names the results that differ from the wanted ones, or that only one has."""
     found = built(checkout)
     names = sorted(found.keys() | wanted.keys())
     return [name for name in names if found.get(name) != wanted.get(name)]

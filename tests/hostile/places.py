@@ -1,4 +1,4 @@
-"""Places where nobody should work: full disks, odd paths, wrong clocks, no terminal, no fonts."""
+"""Works where nobody should: full disks, odd paths, wrong clocks, no terminal, no fonts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tests.e2e.checkout import STUDY, Checkout
@@ -26,7 +27,7 @@ SILENT = (
 
 @dataclass(frozen=True)
 class Tried:
-    """One attempt.
+    """Records one attempt.
 
     Attributes:
         place: what was wrong with it.
@@ -40,7 +41,7 @@ class Tried:
 
 
 def stages(out: Path) -> dict[str, list[str]]:
-    """The command lines of the stages that write, their inputs being built, to a folder."""
+    """Returns the command lines of the stages that write, from what is built to a folder."""
     study = ["--problem", f"experiments/{STUDY}/problem.yaml"]
     design, response = (f"{TARGET}/{name}.nc" for name in ("design", "response"))
     film, track = f"{TARGET}/recordings/cloaked", f"{TARGET}/recordings/cloaked/track.nc"
@@ -65,7 +66,7 @@ def stages(out: Path) -> dict[str, list[str]]:
 
 
 def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> str:
-    """The fault of a stage that must fail in words, or an empty text."""
+    """Runs a stage that must fail in words; returns its fault, or an empty text."""
     module = "reports study" if name == "report" else f"pipeline {name}"
     ended = checkout.module(module, *words, first=first)
     told = ended.stdout + ended.stderr
@@ -76,22 +77,22 @@ def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> st
     return ""
 
 
-def _left(folder: Path, before: Mapping[Path, bytes]) -> str:
-    """What is other than it was in a folder, or an empty text."""
-    now = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-    return "" if now == before else f"left behind: {sorted(map(str, now))}"
+def _files(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def refused(checkout: Checkout, place: str, folder: Path, first: str) -> Iterator[Tried]:
-    """Every stage, where it cannot write what it should; what was there stays."""
+    """Runs every stage where it cannot write what it should; what was there stays."""
     for name, words in stages(folder).items():
-        before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-        fault = _run(checkout, name, words, first) or _left(folder, before)
+        before = _files(folder)
+        fault = _run(checkout, name, words, first)
+        if not fault and (now := _files(folder)) != before:
+            fault = f"left behind: {sorted(map(str, now))}"
         yield Tried(place, name, fault)
 
 
 def small_files(checkout: Checkout) -> Iterator[Tried]:
-    """Files may not grow: libraries meet it in the middle of a write, as on a full disk."""
+    """Lets files not grow: libraries meet it in the middle of a write, as on a full disk."""
     with tempfile.TemporaryDirectory() as folder:
         room = LITTLE_ROOM.replace("16 << 10, 16 << 10", "2 << 10, 2 << 10")
         yield from refused(checkout, "limit of file sizes", Path(folder), room)
@@ -109,14 +110,14 @@ def _small_disk() -> Iterator[Path]:
 
 
 def full_disk(checkout: Checkout) -> Iterator[Tried]:
-    """A file system of some KiB."""
+    """Fills a file system of some KiB."""
     with _small_disk() as folder:
         (folder / "ballast").write_bytes(bytes((ROOM_KIB - 8) << 10))
         yield from refused(checkout, "full disk", folder, "")
 
 
 def read_only(checkout: Checkout) -> Iterator[Tried]:
-    """A folder that may not be written to."""
+    """Closes a folder to writers."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name, "closed")
         folder.mkdir(mode=0o555)
@@ -124,24 +125,20 @@ def read_only(checkout: Checkout) -> Iterator[Tried]:
 
 
 def two_at_once(checkout: Checkout) -> Iterator[Tried]:
-    """Two processes that write the same file."""
+    """Runs two processes that write the same file."""
     with tempfile.TemporaryDirectory() as folder:
         words = stages(Path(folder))["simulate"]
         command = [".venv/bin/python", "-m", "pipeline", "simulate", *words]
-        runs = [
-            subprocess.Popen(command, cwd=checkout.root, stderr=subprocess.DEVNULL) for _ in "12"
-        ]
-        codes = [run.wait() for run in runs]
-        same = (
-            Path(folder, "response.nc").read_bytes()
-            == (checkout.results / "response.nc").read_bytes()
-        )
+        start = partial(subprocess.Popen, command, cwd=checkout.root, stderr=subprocess.DEVNULL)
+        codes = [run.wait() for run in (start(), start())]
+        paths = Path(folder, "response.nc"), checkout.results / "response.nc"
+        same = len({path.read_bytes() for path in paths}) == 1
         fault = "" if same and 0 in codes else f"exit codes {codes}, same bytes: {same}"
         yield Tried("two runs at once", "simulate", fault)
 
 
 def wrong_clock(checkout: Checkout) -> Iterator[Tried]:
-    """The clock was set: files are of the future, or of a distant past."""
+    """Sets the clock: files are of the future, or of a distant past."""
     wanted = built(checkout)
     for place, date in (("clock set back", time.time() + YEAR), ("clock set on", YEAR)):
         for path in (*checkout.results.rglob("*"), *(checkout.root / "experiments").rglob("*")):
@@ -153,7 +150,7 @@ def wrong_clock(checkout: Checkout) -> Iterator[Tried]:
 
 
 def _made(checkout: Checkout, wanted: Mapping[str, bytes]) -> str:
-    """What goes wrong when the study is built, if anything."""
+    """Builds the study; returns what goes wrong, if anything."""
     try:
         finished(checkout)
     except AssertionError as error:
@@ -162,13 +159,13 @@ def _made(checkout: Checkout, wanted: Mapping[str, bytes]) -> str:
 
 
 def _other_bytes(checkout: Checkout, wanted: Mapping[str, bytes]) -> str:
-    """Names of results that differ or are missing, if any."""
+    """Names the results that differ or are missing, if any."""
     names = differences(checkout, wanted)
     return f"other bytes: {', '.join(names)}" if names else ""
 
 
 def no_terminal(checkout: Checkout) -> Iterator[Tried]:
-    """Standard streams are closed, there is no TERM."""
+    """Closes the standard streams, without TERM."""
     wanted = built(checkout)
     for name in ("recordings", "report"):  # of a result that is there, nothing is made anew
         shutil.rmtree(checkout.results / name)
@@ -178,7 +175,7 @@ def no_terminal(checkout: Checkout) -> Iterator[Tried]:
 
 
 def no_fonts(checkout: Checkout) -> Iterator[Tried]:
-    """No home, no fonts of the system, no cache of them."""
+    """Hides home, fonts of the system and their cache."""
     with tempfile.TemporaryDirectory() as folder:
         nowhere = {"HOME": "/nonexistent", "FONTCONFIG_FILE": "/nonexistent"}
         nowhere |= {"XDG_CACHE_HOME": f"{folder}/cache", "MPLCONFIGDIR": f"{folder}/matplotlib"}
@@ -200,7 +197,7 @@ def no_fonts(checkout: Checkout) -> Iterator[Tried]:
 
 
 def odd_paths(checkout: Checkout) -> Iterator[Tried]:
-    """Spaces, quotes, other scripts, words of a shell, and the longest paths."""
+    """Builds in paths of spaces, quotes, other scripts, words of a shell, and great length."""
     wanted = built(checkout)
     with tempfile.TemporaryDirectory() as folder:
         names = {

@@ -1,10 +1,10 @@
-"""The kinds of files that the project reads: one of each, and how the stages read it."""
+"""Lists the kinds of files that the project reads: one of each, and how the stages read it."""
 
 from __future__ import annotations
 
 import shutil
 import zlib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,12 +12,12 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
-import xarray as xr
 
 from pipeline import datasets
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets.tables import TABLES, Kind
-from pipeline.fabrication.papers import MANIFEST, read_manifest
+from pipeline.fabrication.papers import MANIFEST as MANIFEST_FILE
+from pipeline.fabrication.papers import read_manifest
 from pipeline.posing import scene_of
 from pipeline.problem import canonical_json
 from pipeline.problem.fields import csv_columns, units
@@ -27,7 +27,7 @@ from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
 from pipeline.tracking.output import dic_points
 from pipeline.virtual_lab import encode_video
-from tests.hostile import damage, edits
+from tests.hostile import damage
 from tests.hostile.damage import Damage
 from tests.pipeline import static
 from tests.pipeline.problem import test_lattices
@@ -48,13 +48,16 @@ SVG = (
     '<use href="#c" x="20" y="60"/></svg>'
 )
 POINTS = "points: dic.csv\norigin: [0 mm, 0 mm]\nrotation: 0 deg\ncolumns: {time: t, x: x}\n"
+MANIFEST_TEXT = (
+    '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "thin_walls_mm": {}, "files": {}}'
+)
 HOLE = "void: { disc: { radius: 7 mm } }"
 PICTURED = "void: { image: { file: {name}, width: 16 mm } }"
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A kind of file.
+    """Names a kind of file.
 
     Attributes:
         name: what it is.
@@ -100,7 +103,7 @@ def _figure(folder: Path) -> Path:
 
 
 def _beside(make: Callable[[Path], Path], named: Callable[[str], str], folder: Path) -> Path:
-    """A file that a problem names, and the problem."""
+    """Writes a file that a problem names, and the problem."""
     path = make(folder)
     text = static.write(folder, static.HOLE, size=5).read_text(encoding="utf-8")
     _text("problem.yaml", named(text).replace("{name}", path.name), folder)
@@ -177,10 +180,7 @@ def _dataset(kind: Kind, folder: Path) -> Path:
 
 
 def _read_dataset(kind: Kind, path: Path) -> Told:
-    return _plain(datasets.read(path, kind))
-
-
-def _plain(data: xr.Dataset) -> Told:
+    data = datasets.read(path, kind)
     return [
         sorted((str(name), str(value)) for name, value in data.attrs.items()),
         *([str(name), each.dims, each.values.tolist()] for name, each in data.variables.items()),
@@ -197,13 +197,6 @@ def _cases(folder: Path) -> Path:
 
 def _known(path: Path) -> Told:
     return sorted(case_log.known(path.parent).items())
-
-
-def _manifest(folder: Path) -> Path:
-    told = (
-        '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "thin_walls_mm": {}, "files": {}}'
-    )
-    return _text(MANIFEST, told, folder)
 
 
 def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
@@ -245,12 +238,6 @@ def _from_study(name: str) -> Callable[[Path], Path]:
     return partial(_copied, EXPERIMENTS / name)
 
 
-def _dataset_subjects() -> Iterable[Subject]:
-    for kind in TABLES:
-        make, read = partial(_dataset, kind), partial(_read_dataset, kind)
-        yield Subject(f"{kind} dataset", "netCDF", make, read, edits.NETCDF, sealed=True)
-
-
 SUBJECTS: tuple[Subject, ...] = (
     _yaml("problem, dynamic", _from_study("fig2/problem.yaml"), _problem),
     _yaml("problem, static", partial(static.write, more=static.HOLE, size=5), _problem),
@@ -276,13 +263,23 @@ SUBJECTS: tuple[Subject, ...] = (
         _figure,
         lambda p: [joint_figure.load_joint_figure(p).model_dump_json()],
     ),
-    *_dataset_subjects(),
+    *(
+        Subject(
+            f"{kind} dataset",
+            "netCDF",
+            partial(_dataset, kind),
+            partial(_read_dataset, kind),
+            damage.NETCDF,
+            sealed=True,
+        )
+        for kind in TABLES
+    ),
     Subject(
         "lattice in netCDF",
         "netCDF",
         partial(_beside, partial(_lattice, "nc"), _listed),
         _by_problem,
-        edits.NETCDF,
+        damage.NETCDF,
     ),
     _sheet("lattice in CSV", partial(_beside, partial(_lattice, "csv"), _listed), _by_problem),
     _sheet("measured drive", partial(_beside, _motion, _driven), _by_problem),
@@ -305,7 +302,7 @@ SUBJECTS: tuple[Subject, ...] = (
     Subject(
         "manifest of a package",
         "other",
-        _manifest,
+        partial(_text, MANIFEST_FILE, MANIFEST_TEXT),
         lambda p: [sorted(map(str, read_manifest(p.parent).items()))],
     ),
 )

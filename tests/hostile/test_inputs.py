@@ -1,4 +1,4 @@
-"""Damaged files in small; `python -m tests.hostile inputs` tries a thousand."""
+"""Tries damaged files in small; `python -m tests.hostile inputs` tries a thousand."""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ from functools import partial
 
 import pytest
 
-from benchmarks.harness import Worker
-from benchmarks.studies.ablation import SKIPS, Skip
-from tests.benchmarks.studies.test_ablation import COMPILED, refuse_change
+from benchmarks.harness import result_of
+from benchmarks.suites import SKIPS, Skip
+from tests.benchmarks.test_suites import COMPILED, refuse_change
 
 
 @pytest.mark.parametrize(
@@ -16,9 +16,6 @@ from tests.benchmarks.studies.test_ablation import COMPILED, refuse_change
 )
 def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
     """Each in a process of its own, which has not loaded the loops before."""
-    values = []
-    for made in (0.0, 1.0):
-        with Worker(partial(skip.prepare, "small_wave")) as worker:
-            worker.prepare(made, "loss")
-            values.append(worker.run().sample.values)
+    prepare = partial(skip.prepare, "small_wave")
+    values = [result_of(prepare, made, "loss") for made in (0.0, 1.0)]
     refuse_change(skip, *values)

@@ -33,7 +33,7 @@ def test_the_baseline_finds_the_same_loss() -> None:
     start = np.zeros(scene.space.n_variables)
     loss, _, _ = Evaluator(scene, make_plan(scene))(start)
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8, max_steps=4096)
-    of_case = jax_baseline.loss(scene, 0, method, sample_times(scene), mimicking(scene))
-    values, work = jax_baseline.prepare_loss(of_case, len(start))()
+    of_case = jax_baseline.loss(scene, method, sample_times(scene), mimicking(scene))
+    values, work = jax_baseline.prepare(of_case, len(start), "loss")()
     assert float(values["loss"]) == pytest.approx(loss, rel=1e-4)
     assert work["steps"] > 100

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from benchmarks.harness.records import errors
+from benchmarks.harness import errors
 from benchmarks.methods import selection
 
 
 def test_the_continuous_adjoint_of_diffrax_comes_to_that_of_its_steps() -> None:
-    every = {ladder.method: ladder for ladder in selection.ladders("small_wave")}
+    every = {method.name: method for method in selection.methods("small_wave")}
     discrete, continuous = (
         every[name].prepare(1e-6, "gradient")().values
         for name in ("diffrax Tsit5", "diffrax Tsit5, backsolve")

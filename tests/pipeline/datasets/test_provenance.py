@@ -32,7 +32,7 @@ def test_a_method_stores_its_own_part(fig2: Path) -> None:
 def test_the_commit_is_unknown_outside_a_checkout(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(provenance, "_ROOT", tmp_path)
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
     provenance.git_commit.cache_clear()
     assert provenance.git_commit() == "unknown"
     provenance.git_commit.cache_clear()

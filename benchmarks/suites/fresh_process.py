@@ -1,6 +1,7 @@
-"""Runs in a process that compiles its loops anew; nothing that loads Numba is imported before.
+"""Compiles loops anew in a process of its own; nothing that loads Numba is imported before.
 
 The constants of compiled loops are part of their machine code, so a change of one needs this too.
+Packages are lazy: their modules, and Numba with them, are loaded by the first use of a name.
 """
 
 from __future__ import annotations
@@ -10,16 +11,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from tempfile import TemporaryDirectory
 
+from benchmarks import methods, scenes
 from benchmarks.harness import Run, Sample, Task
-from benchmarks.scenes import scene
-from benchmarks.studies.scene_loss import loss_by_solver
-from sim.quasistatics import newton
-from sim.scene import make_plan
-from sim.time_integration import esdirk_stage
+from sim import quasistatics, time_integration
+from sim import scene as sim_scene
 
 
 def compilation(name: str, skipped: float, task: Task) -> Run:
-    """The first result of a process, with its loops from the disk or compiled for it."""
+    """Times the first result of a process, with its loops from the disk or compiled for it."""
     del task
 
     def run() -> Sample:
@@ -32,24 +31,25 @@ def compilation(name: str, skipped: float, task: Task) -> Run:
 
 
 def factors(name: str, skipped: float, task: Task) -> Run:
-    """Factors kept while they converge, or a new one for every Newton step."""
+    """Keeps factors while they converge, or makes a new one for every Newton step."""
     del task
     if skipped:
         return _default(name)
     with _no_cache():
-        esdirk_stage.REFACTOR_ABOVE = 0.0
-        newton.KEEP_FACTOR = newton.RENEW_FACTOR = 0.0
+        time_integration.esdirk_stage.REFACTOR_ABOVE = 0.0
+        quasistatics.newton.KEEP_FACTOR = quasistatics.newton.RENEW_FACTOR = 0.0
         return _default(name)
 
 
 @contextmanager
 def _no_cache() -> Iterator[None]:
-    """An empty folder for what is compiled. Numba reads where it is as it is imported."""
+    """Lends an empty folder to what is compiled. Numba reads where it is as it is imported."""
     with TemporaryDirectory() as folder:
         os.environ["NUMBA_CACHE_DIR"] = folder
         yield
 
 
 def _default(name: str) -> Run:
-    """The loss by the scene's own plan."""
-    return loss_by_solver(name, make_plan(scene(name)).solver)
+    """Prepares the loss by the scene's own plan."""
+    solver = sim_scene.make_plan(scenes.scene(name)).solver
+    return methods.warmed_up(methods.loss_run(scenes.case(name), solver))

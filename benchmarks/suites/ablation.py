@@ -1,4 +1,4 @@
-"""What a plan can skip, each with and without: the same result for less time.
+"""Measures what a plan can skip, each with and without: the same result for less time.
 
 A skip is prepared with the scene it stands on and whether it is made; its run gives results that
 must not depend on that beyond the tolerance stated.
@@ -13,24 +13,23 @@ from functools import partial
 import numpy as np
 
 from benchmarks.harness import (
+    Measurement,
     MeasuringLimits,
+    Method,
     Run,
     Sample,
-    SettingLadder,
     Task,
     Tell,
-    Worker,
-    WorkPrecisionPoint,
-    climb,
+    measure_settings,
+    result_of,
 )
+from benchmarks.methods import gradient_run, loss_run, warmed_up
 from benchmarks.scenes import load_cases
-from benchmarks.studies import fresh_process
-from benchmarks.studies.scene_loss import loss_by_solver, loss_of_case, warmed_up
-from benchmarks.suites import warm
+from benchmarks.suites import fresh_process, warm
 from sim.core import Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import Evaluator, GradientChain, make_plan, parameters_of_design
+from sim.scene import Evaluator, make_plan
 from sim.solvers import Harmonic, LinearRamp, Solver, solve_cases
 from sim.time_integration import ImplicitSolver
 
@@ -42,7 +41,7 @@ SLOWLY = 20.0
 
 @dataclass(frozen=True)
 class Skip:
-    """Something left out.
+    """Names something that a plan leaves out.
 
     Attributes:
         name: what.
@@ -62,12 +61,10 @@ class Skip:
 
 
 def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
-    """The region is compared with the unloaded lattice at rest, or with its simulation."""
+    """Compares the region with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
-    run, solver = loss_by_solver(name, make_plan(posed.scene).solver), make_plan(posed.scene).solver
-    still = posed.scene.updated(
-        motions=tuple(_still(motion) for motion in posed.scene.loads.motions)
-    )
+    solver = make_plan(posed.scene).solver
+    still = posed.scene.driven_by(*map(_still, posed.scene.loads.motions))
 
     def simulated() -> Sample:
         rest, *_ = solve_cases(solver, posed.values, still.loads.cases)
@@ -75,7 +72,7 @@ def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
         return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
 
     del task
-    return run if skipped else warmed_up(simulated)
+    return warmed_up(loss_run(posed, solver) if skipped else simulated)
 
 
 def _still(motion: object) -> Harmonic | LinearRamp:
@@ -84,15 +81,16 @@ def _still(motion: object) -> Harmonic | LinearRamp:
 
 
 def distant_contact(name: str, skipped: float, task: Task) -> Run:
-    """Contact in ligaments whose voids are wide open, checked after the run."""
+    """Evaluates contact in ligaments whose voids are wide open, or checks it after the run."""
     del task
     solver = make_plan(load_cases.scene(name)).solver
     assert isinstance(solver, ImplicitSolver)
-    return loss_by_solver(name, solver if skipped else replace(solver, turn_allowance=np.inf))
+    used = solver if skipped else replace(solver, turn_allowance=np.inf)
+    return warmed_up(loss_run(load_cases.case(name), used))
 
 
 def inertia(name: str, skipped: float, task: Task) -> Run:
-    """A slow load as equilibria, or as the motion that it is."""
+    """Solves a slow load as equilibria, or as the motion that it is."""
     del task
     scene = load_cases.scene(name)
     (ramp,) = scene.loads.motions
@@ -105,11 +103,11 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     )
     plan = make_plan(scene if skipped else slow)
     posed = load_cases.LoadCase(scene if skipped else slow, load_cases.case(name).target)
-    return loss_of_case(posed, plan.solver)
+    return warmed_up(loss_run(posed, plan.solver))
 
 
 def other_outputs(name: str, skipped: float, task: Task) -> Run:
-    """Energies, reactions and void angles at every sample, which the loss does not ask for."""
+    """Observes energies, reactions and void angles at every sample, without need."""
     del task
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
@@ -124,24 +122,14 @@ def other_outputs(name: str, skipped: float, task: Task) -> Run:
 
 
 def far_derivatives(name: str, skipped: float, task: Task) -> Run:
-    """Derivatives by the parameters of ligaments that the design does not move."""
+    """Differentiates by the parameters of ligaments that the design does not move."""
     del task
     posed = load_cases.case(name)
     solver = make_plan(posed.scene).solver
     if not skipped:
         every = np.arange(posed.scene.lattice.n_ligaments, dtype=np.int64)
         solver = _on(solver, designed=every)
-    of_design = parameters_of_design(posed.scene)
-    evaluate = partial(
-        GradientChain(of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
-    )
-    start = np.zeros(posed.scene.space.n_variables)
-
-    def run() -> Sample:
-        loss_by_solver, gradient, motion = evaluate(start)
-        return Sample(posed.results(loss_by_solver, motion, gradient), {})
-
-    return warmed_up(run)
+    return warmed_up(gradient_run(posed, solver, {}))
 
 
 def _on(solver: Solver, designed: Ints) -> Solver:
@@ -150,21 +138,21 @@ def _on(solver: Solver, designed: Ints) -> Solver:
 
 
 def equal_cases(name: str, skipped: float, task: Task) -> Run:
-    """Load cases that are copies of others, turned by a quarter."""
+    """Solves load cases that are copies of others, turned by a quarter."""
     del task
     scene = load_cases.symmetric(name)
     evaluate = Evaluator(scene, make_plan(scene, every_case=not skipped))
     start = np.zeros(scene.space.n_variables)
 
     def run() -> Sample:
-        loss_by_solver, gradient, _ = evaluate(start)
-        return Sample({"loss": np.asarray(loss_by_solver), "gradient": gradient}, {})
+        loss, gradient, _ = evaluate(start)
+        return Sample({"loss": np.asarray(loss), "gradient": gradient}, {})
 
     return warmed_up(run)
 
 
 def cold_start(name: str, skipped: float, task: Task) -> Run:
-    """Paths followed from rest for every design, or from the last design's."""
+    """Follows paths from rest for every design, or from the last design's."""
     del task
     return warm.walk(load_cases.scene(name), 1e-10, warm=bool(skipped))
 
@@ -177,40 +165,22 @@ SKIPS = (
     Skip("far derivatives", far_derivatives, True, EXACT, "the design moves no ligament there"),
     Skip("equal load cases", equal_cases, True, 1e-6, "the symmetry turns one into the other"),
     Skip("paths from rest", cold_start, False, 1e-9, "a similar design's path is near"),
-    Skip(
-        "compilation",
-        fresh_process.compilation,
-        True,
-        EXACT,
-        "loops compiled before are on the disk",
-        1,
-    ),
-    Skip(
-        "fresh factors",
-        fresh_process.factors,
-        True,
-        1e-4,
-        "stages are solved to a tolerance anyway",
-    ),
+    Skip("compilation", fresh_process.compilation, True, EXACT, "loops are on the disk", 1),
+    Skip("fresh factors", fresh_process.factors, True, 1e-4, "stages have a tolerance anyway"),
 )
 
 
-def measure(
-    waves: str, pushes: str, rules: MeasuringLimits, tell: Tell
-) -> list[WorkPrecisionPoint]:
-    """Every skip on its scene, made and not made, each in a process of its own.
+def measure(waves: str, pushes: str, limits: MeasuringLimits, tell: Tell) -> list[Measurement]:
+    """Measures every skip on its scene, made and not made, each in a process of its own.
 
     Errors are what the results change by if it is not skipped.
     """
-    points: list[WorkPrecisionPoint] = []
+    measured: list[Measurement] = []
     for skip in SKIPS:
         name = waves if skip.wave else pushes
-        units = load_cases.scene(name).lattice.n_units
-        prepare = partial(skip.prepare, name)
-        with Worker(prepare) as worker:
-            worker.prepare(1.0, "loss")
-            reference = worker.run().sample.values
-        for rung in ((DONE, 0.0), (SKIPPED, 1.0)):
-            ladder = SettingLadder(skip.name, prepare, (rung,), True, ("loss",), skip.repeats)
-            points += climb(ladder, reference, rules, units, tell)
-    return points
+        units, prepare = load_cases.scene(name).lattice.n_units, partial(skip.prepare, name)
+        reference = result_of(prepare, 1.0, "loss")
+        for setting in ((DONE, 0.0), (SKIPPED, 1.0)):
+            method = Method(skip.name, prepare, (setting,), True, ("loss",), skip.repeats)
+            measured += measure_settings(method, reference, units, limits, tell)
+    return measured

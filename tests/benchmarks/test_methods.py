@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from benchmarks.harness import Run, SettingLadder
-from benchmarks.harness.records import errors
+from benchmarks.harness import Method, Run, errors
 from benchmarks.methods import own_solvers, scipy_statics, selection
-from benchmarks.scenes.load_cases import TITLES
+from benchmarks.scenes import TITLES
 from sim.core import Floats
 
 Found = dict[str, Floats]
@@ -20,15 +19,15 @@ def reference() -> Found:
     return dict(selection.reference("small_push")()().values)
 
 
-def missed(ladder: SettingLadder, value: float, task: str, reference: Found) -> dict[str, float]:
-    run: Run = ladder.prepare(value, task)
+def missed(method: Method, value: float, task: str, reference: Found) -> dict[str, float]:
+    run: Run = method.prepare(value, task)
     return errors(run().values, reference)
 
 
 @pytest.mark.parametrize("way", [0, 1])
 def test_our_equilibria_and_gradients(way: int, reference: Found) -> None:
-    ladder = own_solvers.at_rest("small_push", (1e-10,))[way]
-    found = missed(ladder, 1e-10, "gradient", reference)
+    method = own_solvers.at_rest("small_push", (1e-10,))[way]
+    found = missed(method, 1e-10, "gradient", reference)
     assert found.keys() == {"displacement", "loss", "gradient", "slope"}
     assert max(found.values()) < 1e-9
 
@@ -43,14 +42,14 @@ def test_newton_by_scipy_comes_to_the_reference(reference: Found) -> None:
     assert 0 < missed(splu, 1e-4, "loss", reference)["displacement"] < 1e-4
 
 
-@pytest.mark.parametrize("of", [selection.ladders, selection.reference_in_words])
+@pytest.mark.parametrize("of", [selection.methods, selection.reference_described])
 def test_every_scene_has_its_methods_and_reference(of: Callable[[str], object]) -> None:
     assert all(of(name) for name in TITLES)
 
 
 def test_the_scenes_have_the_baselines_asked_for() -> None:
-    waves = {ladder.method for ladder in selection.ladders("fig2")}
+    waves = {method.name for method in selection.methods("fig2")}
     assert {"diffrax Tsit5", "diffrax Dopri5", "diffrax Kvaerno5"} < waves
     assert {"scipy Radau", "scipy BDF", "scipy DOP853", "central differences"} < waves
-    pushes = {ladder.method for ladder in selection.ladders("fig6")}
+    pushes = {method.name for method in selection.methods("fig6")}
     assert {"pseudo-dynamics, Dopri5", "scipy newton_krylov", "Newton, fronts"} < pushes

@@ -1,32 +1,31 @@
-"""Growth of a sweep with the number of its cases, each a problem of its own on Figure 2's units."""
+"""Measures the growth of a sweep with its cases, each a problem of its own on Figure 2's units."""
 
 from __future__ import annotations
 
 from functools import partial
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from benchmarks.harness import (
+    Measurement,
     MeasuringLimits,
+    Method,
     Run,
     Sample,
-    SettingLadder,
     Tell,
-    Worker,
-    WorkPrecisionPoint,
-    climb,
-    dataset,
+    measure_settings,
+    result_of,
 )
 from pipeline.posing import lattice_of, setting_losses
 from pipeline.problem import Problem
 from pipeline.problem.reading import load
 from pipeline.problem.sections import Sweep, sweep_cases
+from pipeline.runtime import ROOT
 
 COUNTS = (1, 10, 100, 400)
-PROBLEM = Path(__file__).resolve().parents[2] / "experiments/fig2/problem.yaml"
+PROBLEM = ROOT / "experiments/fig2/problem.yaml"
 SWEEP = {
     "random": {
         "drive.directions": {"from": "0 deg", "to": "180 deg"},
@@ -39,23 +38,20 @@ SWEEP = {
 
 
 def measure(
-    counts: tuple[int, ...], preset: str | None, rules: MeasuringLimits, tell: Tell
-) -> xr.Dataset:
-    """Time and memory of so many cases, each number of them in a process of its own."""
+    counts: tuple[int, ...], preset: str | None, limits: MeasuringLimits, tell: Tell
+) -> list[Measurement]:
+    """Measures time and memory of so many cases, each number in a process of its own."""
     units = load(PROBLEM, preset).lattice.n_units
-    with Worker(partial(cases, preset, 1)) as worker:
-        worker.prepare()
-        reference = worker.run().sample.values
-    found: list[WorkPrecisionPoint] = []
+    prepare, measured = partial(cases, preset), list[Measurement]()
+    reference = result_of(prepare, 1)
     for count in counts:
-        rung = (f"{count} cases", float(count))
-        ladder = SettingLadder("sweep", partial(cases, preset), (rung,), True, ("loss",), 1)
-        found += climb(ladder, reference, rules, units, tell)
-    return dataset(found)
+        method = Method("sweep", prepare, ((f"{count} cases", float(count)),), True, ("loss",), 1)
+        measured += measure_settings(method, reference, units, limits, tell)
+    return measured
 
 
 def cases(preset: str | None, count: float, task: str = "loss") -> Run:
-    """Run of the first ``count`` cases, after one that compiles."""
+    """Prepares the first ``count`` cases, after one that compiles."""
     del task
     asked, wanted = load(PROBLEM, preset), Sweep.model_validate(SWEEP)
     vertices = _unchanged(asked)
@@ -73,6 +69,6 @@ def cases(preset: str | None, count: float, task: str = "loss") -> Run:
 
 
 def _unchanged(asked: Problem) -> xr.DataArray:
-    """The initial structure as a design has it."""
+    """Returns the initial structure as a design has it."""
     lattice = lattice_of(asked)
     return xr.DataArray(lattice.padded(lattice.vertices), dims=("unit", "vertex", "xy"))

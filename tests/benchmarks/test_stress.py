@@ -12,20 +12,21 @@ import pytest
 from benchmarks.stress import (
     LAWS,
     Check,
+    RandomDesigns,
     StressCase,
     StressFamily,
     StressScene,
+    Tally,
+    attempted,
     balance,
     checks,
     pressed,
-    registry,
     shaken,
     squares,
     stiffness,
 )
 from benchmarks.stress import __main__ as suite
 from benchmarks.stress.families import constants, pieces
-from benchmarks.stress.verdicts import Tally, attempted
 from sim.core import SimulationError
 from sim.quasistatics import StaticSolver
 from sim.solvers import Harmonic
@@ -151,8 +152,6 @@ def test_stages_off_balance_are_found() -> None:
 
 
 def test_drawn_designs_can_be_made_and_reach_their_bounds() -> None:
-    from benchmarks.stress import RandomDesigns
-
     lattice = squares(4)
     draws = RandomDesigns(lattice, np.array([5]), 7.0, 0.97)
     vertices = draws(3)
@@ -173,7 +172,7 @@ def test_a_wrong_answer_fails_the_suite(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     family = StressFamily("toy", "", "", lambda _: [StressCase("bad", lambda: found(2.0))])
-    monkeypatch.setattr(registry, "load", lambda _: [family])
+    monkeypatch.setattr(suite, "FAMILIES", {"toy": family})
     assert suite.main(["--out", str(tmp_path / "stress.json")]) == 1
     assert "wrong: toy: bad: error: 2, limit 1" in capsys.readouterr().out
 
@@ -184,7 +183,7 @@ def test_an_unknown_family_is_refused(capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
-    alone = [case for case in pieces.family().cases(False) if "no ligament" in case.name]
+    alone = [case for case in pieces.cases(False) if "no ligament" in case.name]
     assert len(alone) == 3
     for case in alone:
         outcome = attempted(case)
@@ -194,5 +193,5 @@ def test_units_without_a_ligament_are_refused_by_every_solver() -> None:
 
 def test_stages_settle_that_contract_fast_at_first_and_slowly_then() -> None:
     name = "axial stiffness times 1e+01, shaken at 60 Hz"
-    stiff = [case for case in constants.family().cases(False) if case.name == name]
+    stiff = [case for case in constants.cases(False) if case.name == name]
     assert [attempted(case).verdict for case in stiff] == ["solved"]

@@ -1,21 +1,22 @@
-"""Structures in pieces: disconnected, floating, held by a thread, one unit, one-unit cloaks."""
+"""Tries lattices from 3 x 3 to 120 x 120 units, and structures in pieces."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from benchmarks.stress import (
+    LAWS,
     NONE,
     Check,
     StressCase,
-    StressFamily,
     StressScene,
     Wanted,
+    attempt,
     equilibria,
+    family,
     motions,
     posed,
     pressed,
@@ -26,41 +27,73 @@ from sim.core import Ints
 from sim.scene import Clamp, Evaluator, make_plan
 from sim.solvers import Harmonic, LinearRamp
 from sim.structure import Lattice, quads
+from sim.time_integration import ExplicitSolver, ImplicitSolver
+
+SIDES = (3, 4, 5, 8, 15, 30, 60, 120)
+TOUCHING = 30
+"""Largest lattice that is also pressed with contact on distances."""
+
+
+@family(
+    f"squares of {SIDES[0]} to {SIDES[-1]} units a side, and strips: pressed by 10 %, shaken by"
+    " either integrator",
+    "balance by the definition, void angles and overlaps by geometry, half the steps",
+)
+def sizes(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
+    shapes = [(side, side) for side in SIDES] + [(60, 2), (3, 40), (2, 2)]
+    for columns, rows in [(3, 3), (8, 8)] if small else shapes:
+        lattice, name = squares(columns, rows), f"{columns} x {rows}"
+        loads = np.array([1.0])
+        wanted: Wanted = "solution" if columns > 2 else "refusal"  # or no unit is free
+        yield attempt(f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, wanted=wanted)
+        if max(columns, rows) <= TOUCHING:
+            touching = pressed(lattice, 0.1, contact=LAWS["distances"])
+            yield attempt(
+                f"{name}, contact on distances", equilibria, touching, loads, wanted=wanted
+            )
+        if min(columns, rows) > 2:
+            case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
+            for integrator in ("implicit", "explicit"):
+                yield attempt(f"{name}, shaken, {integrator}", _shaken, case, integrator)
+
+
+def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
+    duration, asked = case.scene.loads.duration, np.linspace(0.0, case.scene.loads.duration, 6)
+    if integrator == "explicit":
+        return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))
+    times = np.linspace(0.0, duration, 41)
+    return motions(case, asked, 0.05, ImplicitSolver(case.topology, times, asked))
+
 
 LOADS = np.array([0.5, 1.0])
 SIDE = 5
 ASKED = np.linspace(0.0, 0.02, 21)
 
 
-def family() -> StressFamily:
-    """The family."""
-    return StressFamily(
-        "pieces",
-        "floating units and halves, ends that hang on one ligament, supports along x alone, all"
-        " units held, no ligament, a single unit; cloaks of one unit",
-        "equilibria and motions as elsewhere; gradients of the loss against differences",
-        _cases,
-    )
-
-
-def _cases(small: bool) -> Iterator[StressCase]:
+@family(
+    "floating units and halves, ends that hang on one ligament, supports along x alone, all"
+    " units held, no ligament, a single unit; cloaks of one unit",
+    "equilibria and motions as elsewhere; gradients of the loss against differences",
+)
+def pieces(small: bool) -> Iterator[StressCase]:
+    """Yields the cases."""
     for name, lattice, wanted in list(_structures())[:2] if small else _structures():
         plate = pressed(lattice, 0.04)
-        yield StressCase(f"{name}, pressed", partial(equilibria, plate, LOADS), wanted)
+        yield attempt(f"{name}, pressed", equilibria, plate, LOADS, wanted=wanted)
         for integrator in ("implicit", "explicit"):
             case = shaken_ends(lattice, integrator)
             more: Wanted = "solution" if len(lattice.ligaments) else "refusal"
-            attempt = partial(motions, case, ASKED, 0.15)
-            yield StressCase(f"{name}, shaken, {integrator}", attempt, more)
+            yield attempt(f"{name}, shaken, {integrator}", motions, case, ASKED, 0.15, wanted=more)
     yield from _odd()
     for unit in (6,) if small else (0, 6, 7, 12, 17):
         for static in (True, False):
             kind = "pressed" if static else "shaken"
-            yield StressCase(f"cloak of unit {unit}, {kind}", partial(_cloak, unit, static))
+            yield attempt(f"cloak of unit {unit}, {kind}", _cloak, unit, static)
 
 
 def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
-    """Lattices, and whether they have a stable equilibrium under a load."""
+    """Yields lattices, and whether they have a stable equilibrium under a load."""
     whole = squares(SIDE)
     yield "a whole lattice", whole, "solution"
     yield "a floating unit", _cut(whole, np.array([12])), "refusal"
@@ -71,42 +104,41 @@ def _structures() -> Iterator[tuple[str, Lattice, Wanted]]:
 
 
 def _cut(lattice: Lattice, units: Ints, keep: int = 0) -> Lattice:
-    """Without all but ``keep`` of the ligaments between these units and the others."""
+    """Cuts all but ``keep`` of the ligaments between these units and the others."""
     inside = np.isin(lattice.ligament_units, units)
     crossing = np.flatnonzero(inside[:, 0] != inside[:, 1])[keep:]
     return replace(lattice, ligaments=np.delete(lattice.ligaments, crossing, axis=0))
 
 
 def shaken_ends(lattice: Lattice, integrator: str) -> StressScene:
-    """The left column clamped, the right one shaken."""
+    """Clamps the left column, shakes the right one."""
     left, right = (np.flatnonzero(lattice.index[:, 0] == end) for end in (0, SIDE - 1))
     motion = Harmonic(0.5, 60.0, 0.3)
     return posed(lattice, left, right, motion, duration=0.02, frequency=60.0, integrator=integrator)
 
 
 def _odd() -> Iterator[StressCase]:
-    """What hardly is a lattice any more."""
+    """Yields what hardly is a lattice any more."""
     free = posed(squares(3), NONE, [4], LinearRamp(1.0, 1.0), static=True)
-    yield StressCase("held by nothing but the driven unit", partial(equilibria, free, LOADS))
+    yield attempt("held by nothing but the driven unit", equilibria, free, LOADS)
     chain = quads(2, 1, 15.0, 2.25, 0.3)
     held = posed(chain, [0], [1], LinearRamp(0.5, 1.0), static=True)
-    yield StressCase("all units held, static", partial(equilibria, held, LOADS), "refusal")
+    yield attempt("all units held, static", equilibria, held, LOADS, wanted="refusal")
     for integrator in ("implicit", "explicit"):
         more = {"duration": 0.02, "frequency": 60.0, "integrator": integrator}
         moving = posed(chain, [0], [1], Harmonic(0.5, 60.0), **more)
-        attempt = partial(motions, moving, ASKED, 0.05)
-        yield StressCase(f"all units held, {integrator}", attempt, "refusal")
+        yield attempt(
+            f"all units held, {integrator}", motions, moving, ASKED, 0.05, wanted="refusal"
+        )
     sliding = pressed(squares(SIDE), 0.04)
     along = sliding.scene.updated(supports=(Clamp(5 * np.arange(5), ("ux",)),))
-    yield StressCase(
-        "clamped along x alone", partial(equilibria, replace(sliding, scene=along), LOADS)
-    )
+    yield attempt("clamped along x alone", equilibria, replace(sliding, scene=along), LOADS)
     alone = posed(quads(1, 1, 15.0, 2.25, 0.3), NONE, [0], LinearRamp(1.0, 1.0), static=True)
-    yield StressCase("a single unit, driven", partial(equilibria, alone, LOADS), "refusal")
+    yield attempt("a single unit, driven", equilibria, alone, LOADS, wanted="refusal")
 
 
 def _cloak(unit: int, static: bool) -> Sequence[Check]:
-    """Slope of the loss along a random direction against differences of it."""
+    """Compares the slope of the loss along a random direction with differences of it."""
     lattice = squares(SIDE)
     case = (
         pressed(lattice, 0.05)

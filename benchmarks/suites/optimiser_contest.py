@@ -1,4 +1,4 @@
-"""Optimisers on the same problems: every evaluation counted, timed and judged alike."""
+"""Compares optimisers on the same problems: every evaluation counted, timed and judged alike."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import nlopt
 import numpy as np
 import xarray as xr
 from scipy.optimize import BFGS, NonlinearConstraint, minimize
 
-from benchmarks.harness import CandidateError, Run, Sample, Tell, Worker, padded
+from benchmarks.harness import CandidateError, MeasuringLimits, Run, Sample, Tell, Worker, padded
 from benchmarks.scenes import load_cases
 from sim.constraints import ConstraintVector
 from sim.core import Floats, SimulationError
@@ -30,12 +30,12 @@ WORSE = 10.0
 
 
 class BudgetSpentError(Exception):
-    """The evaluations or the time are used up."""
+    """Reports that the evaluations or the time are used up."""
 
 
 @dataclass
 class BudgetedProblem:
-    """A problem that counts what is asked of it.
+    """Counts the evaluations of a problem.
 
     Attributes:
         evaluate: loss, gradient and more of a design.
@@ -57,10 +57,10 @@ class BudgetedProblem:
     _known: tuple[float, Floats] | None = None
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
-        """Loss, gradient and more; the last design again is no new evaluation.
+        """Evaluates loss, gradient and more; the last design again is no new evaluation.
 
         Raises:
-            SpentError: no more may be asked for.
+            BudgetSpentError: no more may be asked for.
             SimulationError: the simulation failed.
         """
         if len(self.losses) >= self.evaluations:
@@ -76,7 +76,7 @@ class BudgetedProblem:
         return found
 
     def plain(self, design: Floats) -> tuple[float, Floats]:
-        """Loss and gradient for those who know of no failures: one is a bad loss."""
+        """Evaluates for optimisers that know of no failures: one is a bad loss."""
         if self.designs and np.array_equal(design, self.designs[-1]) and self._known:
             return self._known
         try:
@@ -88,7 +88,7 @@ class BudgetedProblem:
 
 
 class OptimiserHistory(NamedTuple):
-    """What came of an optimiser, evaluation by evaluation.
+    """Holds the history of an optimiser, evaluation by evaluation.
 
     Attributes:
         loss, violation, clock: as evaluated: loss, mm, s of processor time since the start.
@@ -107,7 +107,7 @@ class OptimiserHistory(NamedTuple):
 def judged(
     asked: BudgetedProblem, afresh: Callable[[Floats], tuple[float, Floats, Floats]]
 ) -> OptimiserHistory:
-    """The course of a contest that is over; ``afresh`` is the loss and gradient to judge by."""
+    """Judges a contest that is over; ``afresh`` is the loss and gradient to judge by."""
     losses = np.array(asked.losses)
     places = [asked.constraints(design) for design in asked.designs]
     violation = np.array([max(0.0, -float(values.min())) for values, _ in places])
@@ -127,44 +127,27 @@ def judged(
     )
 
 
-def _own_sqp(asked: BudgetedProblem) -> None:
-    _own(asked, "sqp")
-
-
-def _own_mma(asked: BudgetedProblem) -> None:
-    _own(asked, "mma")
-
-
-def _own(asked: BudgetedProblem, method: Literal["sqp", "mma"]) -> None:
+def _own(method: Literal["sqp", "mma"], asked: BudgetedProblem) -> None:
     options = {"sqp": SqpOptions, "mma": MmaOptions}[method](evaluations=asked.evaluations)
     start = np.zeros(asked.n_variables)
     minimise(method, asked, asked.constraints, start, (-REACH, REACH), options)
 
 
-def _scipy(
-    asked: BudgetedProblem, method: str, constraints: object, options: dict[str, float]
-) -> None:
+def _scipy(method: str, asked: BudgetedProblem) -> None:
+    of, options = asked.constraints, {"maxiter": float(asked.evaluations)}
+    limits: Any = NonlinearConstraint(of.values, 0.0, np.inf, jac=lambda x: of(x)[1], hess=BFGS())
+    if method == "SLSQP":
+        limits = {"type": "ineq", "fun": of.values, "jac": lambda x: of(x)[1].toarray()}
+        options["ftol"] = 1e-9
     minimize(
         asked.plain,
         np.zeros(asked.n_variables),
         jac=True,
         method=method,
         bounds=[(-REACH, REACH)] * asked.n_variables,
-        constraints=constraints,
+        constraints=limits,
         options=options,
     )
-
-
-def _slsqp(asked: BudgetedProblem) -> None:
-    of = asked.constraints
-    limits = {"type": "ineq", "fun": of.values, "jac": lambda x: of(x)[1].toarray()}
-    _scipy(asked, "SLSQP", limits, {"maxiter": asked.evaluations, "ftol": 1e-9})
-
-
-def _interior_point(asked: BudgetedProblem) -> None:
-    of = asked.constraints
-    limits = NonlinearConstraint(of.values, 0.0, np.inf, jac=lambda x: of(x)[1], hess=BFGS())
-    _scipy(asked, "trust-constr", limits, {"maxiter": asked.evaluations})
 
 
 def _nlopt(algorithm: str, asked: BudgetedProblem) -> None:
@@ -192,29 +175,26 @@ def _nlopt(algorithm: str, asked: BudgetedProblem) -> None:
     made.optimize(np.zeros(asked.n_variables))
 
 
+NLOPT = ("MMA", "CCSAQ", "SLSQP", "AUGLAG")
 OPTIMISERS: dict[str, Callable[[BudgetedProblem], None]] = {
-    "own sqp": _own_sqp,
-    "own mma": _own_mma,
-    "scipy SLSQP": _slsqp,
-    "scipy trust-constr": _interior_point,
-    "nlopt MMA": partial(_nlopt, "LD_MMA"),
-    "nlopt CCSAQ": partial(_nlopt, "LD_CCSAQ"),
-    "nlopt SLSQP": partial(_nlopt, "LD_SLSQP"),
-    "nlopt AUGLAG": partial(_nlopt, "LD_AUGLAG"),
+    "own sqp": partial(_own, "sqp"),
+    "own mma": partial(_own, "mma"),
+    **{f"scipy {method}": partial(_scipy, method) for method in ("SLSQP", "trust-constr")},
+    **{f"nlopt {name}": partial(_nlopt, f"LD_{name}") for name in NLOPT},
 }
 """trust-constr is an interior-point method here, AUGLAG an augmented Lagrangian over CCSAQ."""
 
 
 @dataclass(frozen=True)
 class OptimiserBudget:
-    """What each optimiser gets: evaluations, and processor time in s."""
+    """Bounds each optimiser: evaluations, and processor time in s."""
 
     evaluations: int = 60
     seconds: float = 120.0
 
 
-def prepare(name: str, terms: OptimiserBudget, optimiser: str) -> Run:
-    """Run of one optimiser on a scene's design problem, judged."""
+def prepare(name: str, budget: OptimiserBudget, optimiser: str) -> Run:
+    """Prepares one optimiser on a scene's design problem, judged."""
     scene, limits = load_cases.designed(name)
     plan = make_plan(scene)
     evaluate = Evaluator(scene, plan)
@@ -224,7 +204,9 @@ def prepare(name: str, terms: OptimiserBudget, optimiser: str) -> Run:
     constraints(start)
 
     def run() -> Sample:
-        asked = BudgetedProblem(evaluate, constraints, len(start), terms.evaluations, terms.seconds)
+        asked = BudgetedProblem(
+            evaluate, constraints, len(start), budget.evaluations, budget.seconds
+        )
         with suppress(BudgetSpentError):
             OPTIMISERS[optimiser](asked)
         return Sample(judged(asked, evaluate)._asdict(), {})
@@ -232,38 +214,35 @@ def prepare(name: str, terms: OptimiserBudget, optimiser: str) -> Run:
     return run
 
 
-def measure(name: str, terms: OptimiserBudget, tell: Tell) -> xr.Dataset:
-    """The dataset ``contest`` of a scene, without its attributes."""
-    courses: list[OptimiserHistory] = []
+def measure(name: str, budget: OptimiserBudget, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
+    """Returns the dataset ``contest`` of a scene, without its attributes."""
+    del limits
+    histories: list[OptimiserHistory] = []
     outcomes: list[str] = []
     for optimiser in OPTIMISERS:
-        with Worker(partial(prepare, name, terms), 3 * terms.seconds) as worker:
+        with Worker(partial(prepare, name, budget), 3 * budget.seconds) as worker:
             try:
                 worker.prepare(optimiser)
-                courses.append(OptimiserHistory(**worker.run().sample.values))
+                histories.append(OptimiserHistory(**worker.run().sample.values))
                 outcomes.append("measured")
             except CandidateError as failed:
-                nothing = np.zeros(0)
-                courses.append(
-                    OptimiserHistory(nothing, nothing, nothing, nothing, nothing, np.array(np.nan))
-                )
+                histories.append(OptimiserHistory(*(np.zeros(0),) * 5, final=np.array(np.nan)))
                 outcomes.append(str(failed))
-        tell(f"{name}, {optimiser}: {courses[-1].final:.4g} ({outcomes[-1]})")
-    return _dataset(courses, outcomes)
-
-
-def _dataset(courses: list[OptimiserHistory], outcomes: list[str]) -> xr.Dataset:
+        tell(f"{optimiser}: {histories[-1].final:.4g} ({outcomes[-1]})")
     dims = ("optimiser", "evaluation")
-    names = {"loss": "loss", "violation": "violation", "clock": "cpu_time", "best": "best_loss"}
-    names["residual"] = "kkt_residual"
     return xr.Dataset(
         {
             **{
-                name: (dims, padded([getattr(c, key) for c in courses]))
-                for key, name in names.items()
+                name: (dims, padded([getattr(history, key) for history in histories]))
+                for key, name in _NAMES.items()
             },
-            "final_loss": ("optimiser", np.array([float(c.final) for c in courses])),
+            "final_loss": ("optimiser", np.array([float(each.final) for each in histories])),
             "outcome": ("optimiser", outcomes),
         },
         {"optimiser": list(OPTIMISERS)},
     )
+
+
+_NAMES = {"loss": "loss", "violation": "violation", "clock": "cpu_time", "best": "best_loss"}
+_NAMES["residual"] = "kkt_residual"
+"""Variables of the dataset, by attributes of the history."""

@@ -1,5 +1,0 @@
-"""Runs the studies of `snakemake benchmark`: growth, ablation, optimisers."""
-
-import lazy_loader as lazy
-
-__getattr__, __dir__, __all__ = lazy.attach_stub(__name__, __file__)

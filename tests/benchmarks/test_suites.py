@@ -1,0 +1,86 @@
+"""Skips change nothing beyond their tolerance; optimisers, cases and scenes are what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from benchmarks.harness import errors
+from benchmarks.methods import jax_baseline
+from benchmarks.scenes import paper_scenes
+from benchmarks.suites import (
+    FEASIBLE,
+    OPTIMISERS,
+    SKIPS,
+    OptimiserBudget,
+    Skip,
+    prepare,
+    sweep_growth,
+)
+from sim.core import Floats
+from sim.energy import gradient, system_of
+from sim.scene import concrete_parameters, parameters_of_design
+from sim.solvers import Harmonic
+
+COMPILED = ("compilation", "fresh factors")
+"""Those that compile every loop anew, minutes each: tests/slow/test_ablation.py tries them."""
+
+
+@pytest.mark.parametrize(
+    "skip", [skip for skip in SKIPS if skip.name not in COMPILED], ids=lambda skip: skip.name
+)
+def test_a_skip_changes_nothing_beyond_its_tolerance(skip: Skip) -> None:
+    name = "small_wave" if skip.wave else "small_push"
+    done, skipped = (skip.prepare(name, made, "loss")().values for made in (0.0, 1.0))
+    refuse_change(skip, done, skipped)
+
+
+def refuse_change(skip: Skip, done: Mapping[str, Floats], skipped: Mapping[str, Floats]) -> None:
+    changes = errors(done, skipped)
+    assert changes.keys() == done.keys() == skipped.keys()
+    assert max(changes.values()) <= skip.tolerance
+
+
+@pytest.mark.parametrize("optimiser", OPTIMISERS)
+def test_an_optimiser_lowers_the_loss(optimiser: str) -> None:
+    course = prepare("small_push", OptimiserBudget(evaluations=30), optimiser)().values
+    best = course["best"][np.isfinite(course["best"])]
+    assert len(course["loss"]) <= 30
+    assert np.all(np.diff(best) <= 0.0)
+    assert course["final"] == pytest.approx(best[-1], rel=1e-6)
+    assert course["final"] < 0.9 * course["loss"][0]
+    feasible = course["loss"][course["violation"] <= FEASIBLE]
+    assert feasible.min() == best[-1]
+
+
+def test_a_case_does_not_depend_on_those_after_it() -> None:
+    alone, three = (sweep_growth.cases("quick", count)() for count in (1, 3))
+    assert (alone.work, three.work) == ({"cases": 1}, {"cases": 3})
+    assert np.isfinite(alone.values["loss"]).all()
+    np.testing.assert_array_equal(alone.values["loss"], three.values["loss"])
+
+
+def test_counts_of_variables() -> None:
+    assert paper_scenes.fig2().space.n_variables == 304
+    assert paper_scenes.fig2(symmetry="C4").space.n_variables == 76
+    assert paper_scenes.fig4().space.n_variables == 280
+
+
+def test_one_case_keeps_its_direction() -> None:
+    (motion,) = paper_scenes.one_case(paper_scenes.fig2(), 135.0).loads.motions
+    assert isinstance(motion, Harmonic)
+    assert float(motion.direction) == pytest.approx(np.deg2rad(135.0))
+
+
+def test_the_baseline_has_the_same_forces() -> None:
+    scene = paper_scenes.fig2()
+    values = concrete_parameters(scene, scene.lattice.vertices)
+    motion = 0.05 * np.random.default_rng(0).normal(size=scene.topology.n_dofs)
+    ours = np.empty_like(motion)
+    gradient(motion, system_of(scene.topology, values), np.empty((225, 4)), ours)
+    made = parameters_of_design(scene)(jnp.zeros(scene.space.n_variables))
+    theirs = jax_baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
+    np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())
