@@ -177,7 +177,10 @@ class Checkout:
         return kept | own if self.own_caches else kept
 
 
-_NO_SETUP = ("--old-file=.venv/requirements.lock", "--old-file=setup")
+_NO_SETUP = tuple(
+    f"--old-file={name}"
+    for name in (".venv/requirements.lock", ".venv/requirements-dev.lock", "setup", "dev")
+)
 
 
 def _words(process: psutil.Process) -> list[str]:
