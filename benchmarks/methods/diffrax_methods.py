@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -68,9 +67,9 @@ def _by_steps(solver: str, adjoint: str, posed: LoadCase, tolerance: Array) -> D
 
 def _slowly(posed: LoadCase, duration: Any) -> DiffraxProblem:  # noqa: ANN401  (traced in place of a float)
     """The static scene as the authors move it; times at which their ramp passes the loads."""
-    scene, (ramp,) = posed.scene, posed.scene.motions
+    scene, (ramp,) = posed.scene, posed.scene.loads.motions
     assert isinstance(ramp, LinearRamp)
-    constants = scene.material
+    constants = scene.structure.material
     shear, bending = (float(np.mean(each)) for each in (constants.shear, constants.bending))
     damping = damping_of_ratio(RATIO, DENSITY, scene.lattice.spacing, shear, bending)
     heavy = constants._replace(
@@ -78,8 +77,7 @@ def _slowly(posed: LoadCase, duration: Any) -> DiffraxProblem:  # noqa: ANN401  
     )
     most = np.tanh(6.0)
     share = np.clip(2 * posed.times / ramp.duration - 1, -most, most)
-    slow = replace(
-        scene,
+    slow = scene.updated(
         material=heavy,
         motions=(TanhRamp(ramp.amplitude, duration, ramp.direction),),
         duration=duration,
@@ -124,9 +122,9 @@ def _compiled(name: str, pose: Pose, task: Task) -> Callable[[Array], Any]:
     def evaluate(design: Array, value: Array) -> tuple[Array, Any]:
         posed = pose(case_, value)
         values = structure(posed.scene)(design)
-        motion, counts = respond(posed.scene, posed.scene.drives[0], posed.method, posed.times)(
-            values
-        )
+        motion, counts = respond(
+            posed.scene, posed.scene.loads.cases[0], posed.method, posed.times
+        )(values)
         return case_.measure(motion[None], values)[0], (motion[None], counts)
 
     start = jnp.zeros(case_.scene.space.n_variables)

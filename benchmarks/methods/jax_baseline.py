@@ -57,7 +57,12 @@ def force(scene: Scene) -> Force:
         strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
         angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
         return strain + jnp.sum(
-            contact_energy(angles, ContactLaw(contact, scene.barrier, scene.cutoff))
+            contact_energy(
+                angles,
+                ContactLaw(
+                    contact, scene.structure.contact.barrier, scene.structure.contact.cutoff
+                ),
+            )
         )
 
     of_ends = jax.vmap(jax.grad(energy))
@@ -104,7 +109,7 @@ def respond(
             diffrax.ODETerm(rates),
             getattr(diffrax, method.solver)(),
             t0=0.0,
-            t1=scene.duration,
+            t1=scene.loads.duration,
             dt0=None,
             y0=zero,
             args=values,
@@ -139,7 +144,7 @@ def loss(
         measure: the loss (1,) of motions (1, n_times, n_units, 3).
     """
     of_design = structure(scene)
-    of_parameters = respond(scene, scene.drives[case], method, jnp.asarray(times))
+    of_parameters = respond(scene, scene.loads.cases[case], method, jnp.asarray(times))
 
     def of_case(design: Array) -> tuple[Array, dict[str, Array]]:
         values = of_design(design)

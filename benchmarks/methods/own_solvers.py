@@ -16,7 +16,7 @@ from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
 from sim.scene import STIFFENING, make_plan, structure, value_and_gradient
-from sim.solvers import Solver, base
+from sim.solvers import Solver, solve_cases
 from sim.structure import ConcreteParameters
 from sim.time_integration import (
     BLANES_MOAN,
@@ -84,7 +84,7 @@ def _differences(name: str, apart: float, task: Task) -> Run:
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
         values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))
-        motion, *_ = base.forward(solver, values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, values, posed.scene.loads.cases)
         value, _ = posed.measured(motion, values)
         return np.asarray(value), motion
 
@@ -119,7 +119,7 @@ def _loss(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
     values = posed.values
 
     def run() -> dict[str, Floats]:
-        motion, *_ = base.forward(solver, values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, values, posed.scene.loads.cases)
         return posed.results(*posed.measured(motion, values))
 
     return run
@@ -127,7 +127,7 @@ def _loss(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
 
 def _gradient(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
     of_design = structure(posed.scene)
-    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.drives)
+    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.loads.cases)
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> dict[str, Floats]:
@@ -145,7 +145,7 @@ def _stored(posed: LoadCase, by_fronts: bool) -> Topology:
 
 
 def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
-    asked = replace(posed.scene, integrator="implicit", accuracy="default")
+    asked = posed.scene.updated(integrator="implicit", accuracy="default")
     solver = make_plan(asked).solver
     assert isinstance(solver, ImplicitSolver)
     times = solver.times
@@ -158,9 +158,11 @@ def _implicit(by_fronts: bool, posed: LoadCase, halvings: float) -> Solver:
 def _explicit(key: str, posed: LoadCase, doublings: float) -> Solver:
     scene, splitting = posed.scene, SPLITTINGS[key]
     highest = STIFFENING * highest_frequency(scene.topology, posed.values)
-    stable = scene.duration * highest / (0.9 * splitting.stability)
+    stable = scene.loads.duration * highest / (0.9 * splitting.stability)
     n_steps = int(np.ceil(stable)) * 2 ** int(doublings)
-    return ExplicitSolver(scene.topology, scene.duration, n_steps, posed.times, splitting=splitting)
+    return ExplicitSolver(
+        scene.topology, scene.loads.duration, n_steps, posed.times, splitting=splitting
+    )
 
 
 def _static(by_fronts: bool, posed: LoadCase, relative: float) -> Solver:

@@ -38,11 +38,11 @@ class FirstOrderSystem:
 
     def __init__(self, posed: LoadCase, values: ConcreteParameters) -> None:
         scene = posed.scene
-        (drive,) = scene.motions
+        (drive,) = scene.loads.motions
         assert isinstance(drive, Harmonic)
         self.topology, self.values, self.drive = scene.topology, values, drive
         self.free = np.sort(self.topology.free_dofs)
-        driven = 3 * scene.driven
+        driven = 3 * scene.loads.driven
         self._along_x, self._along_y = driven, driven + 1
         self._system = system_of(self.topology, values)
         self._turn = np.empty((self.topology.n_units, 4))
@@ -122,7 +122,7 @@ def _solve(
     more = {"jac": motion.jacobian} if method in IMPLICIT else {}
     found = solve_ivp(
         motion.rates,
-        (0.0, posed.scene.duration),
+        (0.0, posed.scene.loads.duration),
         np.zeros(2 * len(motion.free)),
         method=method,
         t_eval=posed.times,

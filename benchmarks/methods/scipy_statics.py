@@ -91,7 +91,7 @@ def _path(posed: LoadCase, solve: partial[Floats]) -> Floats:
     Raises:
         ArithmeticError: not even small increments succeed.
     """
-    (drive,), top = posed.scene.drives, posed.scene.topology
+    (drive,), top = posed.scene.loads.cases, posed.scene.topology
     held = drive.values(top.held, np.concatenate([[0.0], posed.times]))
     states = [np.zeros(top.n_dofs)]
     for before, after in pairwise(held):

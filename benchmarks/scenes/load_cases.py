@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -80,7 +80,7 @@ class LoadCase:
     def results(self, loss: object, motion: object, gradient: object = None) -> dict[str, Floats]:
         """What is compared: region's motion by spacings, loss, gradient and its slope."""
         spacing = self.scene.lattice.spacing
-        moved = np.asarray(motion)[0][:, self.scene.region]
+        moved = np.asarray(motion)[0][:, self.scene.objective.region]
         found = {
             "displacement": moved / np.array([spacing, spacing, 1.0]),
             "loss": np.asarray(loss),
@@ -95,14 +95,14 @@ class LoadCase:
 def case(name: str) -> LoadCase:
     """The case of that name (a key of TITLES)."""
     posed = scene(name)
-    return LoadCase(posed, None if posed.reference is None else target_motion(posed))
+    return LoadCase(posed, None if posed.objective.reference is None else target_motion(posed))
 
 
 def scene(name: str) -> Scene:
     """Its scene."""
     if name.startswith("small"):
         return _small_wave() if name == "small_wave" else _small_push()
-    whole = replace(scene_of(load(_file(name)), _file(name).parent), symmetry="none")
+    whole = scene_of(load(_file(name)), _file(name).parent).updated(symmetry="none")
     return paper_scenes.one_case(whole, 45.0) if name == "fig2" else whole
 
 
@@ -111,7 +111,7 @@ def symmetric(name: str) -> Scene:
     if name == "fig2":
         return paper_scenes.fig2(symmetry="C4")
     turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
-    return replace(scene(name), symmetry="C4", motions=turns, weights=np.full(2, 0.5))
+    return scene(name).updated(symmetry="C4", motions=turns, weights=np.full(2, 0.5))
 
 
 def designed(name: str) -> tuple[Scene, Limits]:
@@ -129,8 +129,7 @@ def _file(name: str) -> Path:
 def _small_wave() -> Scene:
     lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
     corners = np.array([0, 4, 20, 24])
-    return replace(
-        paper_scenes.fig2(),
+    return paper_scenes.fig2().updated(
         lattice=lattice,
         clamped=held_dofs(corners, np.array([], dtype=np.int64)),
         driven=np.array([12]),
@@ -147,10 +146,9 @@ def _small_wave() -> Scene:
 def _small_push() -> Scene:
     lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
     left = 5 * np.arange(5)
-    return replace(
-        paper_scenes.fig4(),
+    return paper_scenes.fig4().updated(
         lattice=lattice,
-        material=paper_scenes.fig2().material,
+        material=paper_scenes.fig2().structure.material,
         clamped=held_dofs(left, np.array([], dtype=np.int64)),
         driven=left + 4,
         motions=(LinearRamp(-4.0, 1.0),),

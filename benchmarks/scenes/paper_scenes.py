@@ -33,9 +33,9 @@ def fig2(**changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
 
 def one_case(scene: Scene, degrees: float) -> Scene:
     """The scene with its load case of that direction alone."""
-    motions = [motion for motion in scene.motions if isinstance(motion, Harmonic)]
+    motions = [motion for motion in scene.loads.motions if isinstance(motion, Harmonic)]
     wanted = next(m for m in motions if np.isclose(float(m.direction), np.deg2rad(degrees)))
-    return replace(scene, motions=(wanted,), weights=np.ones(1))
+    return scene.updated(motions=(wanted,), weights=np.ones(1))
 
 
 @cache
@@ -69,8 +69,7 @@ def fig4_as_dynamics() -> Scene:
     """The same as the authors solve it: density 1 tonne/mm^2, damped, pushed slowly over 3500 s."""
     scene, duration = fig4(), 3500.0
     damping = damping_of_ratio(0.0186, 1.0, 15.0, 1.19, 1.5)
-    return replace(
-        scene,
+    return scene.updated(
         material=Material(1.0, 120.0, 1.19, 1.5, 1.5, *damping),
         motions=(TanhRamp(-15.0, duration),),
         duration=duration,
@@ -88,7 +87,7 @@ def final_energy(scene: Scene) -> StrainEnergyMimicking:
 def counted(scene: Scene, solver: Solver, cases: list[int]) -> dict[str, int]:
     """Work of the forward solves of some load cases at the initial design."""
     values = concrete_parameters(scene, scene.lattice.vertices)
-    records = [solve_case(solver, values, scene.drives[case])[2] for case in cases]
+    records = [solve_case(solver, values, scene.loads.cases[case])[2] for case in cases]
     total: dict[str, int] = {}
     for record in records:
         for what, count in work_of(record).items():

@@ -29,7 +29,7 @@ MOST_STAGES = 24
 
 
 class Answer(NamedTuple):
-    """What a solver returned: displacement and velocity (n_asked, n_dofs), and its record."""
+    """What a solver returned: displacement and velocity (n_times, n_dofs), and its record."""
 
     displacement: Floats
     velocity: Floats
@@ -136,7 +136,7 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
     turned = np.array([case.values.void + _turns(case, state) for state in motion])
     seen = np.array([np.asarray(_void_angles(case, state)) for state in motion])
     off = np.abs((turned - seen + np.pi) % (2 * np.pi) - np.pi).max()
-    beyond = np.rad2deg(scene.barrier - turned.min())
+    beyond = np.rad2deg(scene.structure.contact.barrier - turned.min())
     return [
         *checks,
         Check("void angles off their geometry, rad", float(off), 1e-8),
@@ -201,7 +201,7 @@ def motions_as_advised(case: StressScene, asked: Floats, error: float) -> list[C
     else:
         if all(check.kept or not check.stated for check in checks):
             return checks
-    return motions(replace(case, scene=replace(case.scene, accuracy="tight")), asked, error)
+    return motions(replace(case, scene=case.scene.updated(accuracy="tight")), asked, error)
 
 
 def stages(
@@ -234,7 +234,7 @@ def stages(
 
 
 def energies(case: StressScene, answer: Answer) -> Floats:
-    """Kinetic and elastic energy (n_asked,), N mm."""
+    """Kinetic and elastic energy (n_times,), N mm."""
     rates = answer.velocity.copy()
     rates[:, case.topology.held] = 0.0
     kinetic = 0.5 * rates**2 @ case.values.mass.ravel()
@@ -242,7 +242,7 @@ def energies(case: StressScene, answer: Answer) -> Floats:
 
 
 def work(case: StressScene, answer: Answer, times: Floats) -> tuple[Floats, Floats]:
-    """Work of the drive and energy lost to damping (n_asked,) up to each time, N mm.
+    """Work of the drive and energy lost to damping (n_times,) up to each time, N mm.
 
     By the trapezoidal rule, so the times must resolve the motion.
     """

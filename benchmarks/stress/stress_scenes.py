@@ -42,7 +42,7 @@ class StressScene:
     @property
     def drive(self) -> PrescribedMotion:
         """Of its load case."""
-        return self.scene.drives[0]
+        return self.scene.loads.cases[0]
 
     @cached_property
     def values(self) -> ConcreteParameters:
@@ -53,7 +53,11 @@ class StressScene:
     def structure(self) -> ReferenceStructure:
         """As the definition takes it."""
         scene = self.scene
-        limits = (scene.barrier, scene.cutoff, scene.contact_distance)
+        limits = (
+            scene.structure.contact.barrier,
+            scene.structure.contact.cutoff,
+            scene.contact_distance,
+        )
         return ReferenceStructure(scene.lattice, self.vertices, self.values, *limits)
 
     def solver(self, asked: Floats) -> Solver:
@@ -62,8 +66,8 @@ class StressScene:
 
     def with_material(self, **constants: Any) -> StressScene:  # noqa: ANN401  (numbers or arrays)
         """The same of other constants."""
-        material = self.scene.material._replace(**constants)
-        return replace(self, scene=replace(self.scene, material=material))
+        material = self.scene.structure.material._replace(**constants)
+        return replace(self, scene=self.scene.updated(material=material))
 
 
 def squares(columns: int, rows: int | None = None, bias: float = BIAS) -> Lattice:

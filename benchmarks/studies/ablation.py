@@ -31,7 +31,7 @@ from sim.core import Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
 from sim.scene import evaluator, make_plan, structure, value_and_gradient
-from sim.solvers import Harmonic, LinearRamp, Solver, base
+from sim.solvers import Harmonic, LinearRamp, Solver, solve_cases
 from sim.time_integration import ImplicitSolver
 
 EXACT = 1e-12
@@ -65,11 +65,13 @@ def unloaded_reference(name: str, skipped: float, task: Task) -> Run:
     """The region is compared with the unloaded lattice at rest, or with its simulation."""
     posed = load_cases.case(name)
     run, solver = loss_by_solver(name, make_plan(posed.scene).solver), make_plan(posed.scene).solver
-    still = replace(posed.scene, motions=tuple(_still(motion) for motion in posed.scene.motions))
+    still = posed.scene.updated(
+        motions=tuple(_still(motion) for motion in posed.scene.loads.motions)
+    )
 
     def simulated() -> Sample:
-        rest, *_ = base.forward(solver, posed.values, still.drives)
-        moved, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        rest, *_ = solve_cases(solver, posed.values, still.loads.cases)
+        moved, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         return Sample(posed.results(*posed.measured(moved - rest, posed.values)), {})
 
     del task
@@ -93,10 +95,9 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     """A slow load as equilibria, or as the motion that it is."""
     del task
     scene = load_cases.scene(name)
-    (ramp,) = scene.motions
+    (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
-    slow = replace(
-        scene,
+    slow = scene.updated(
         static=False,
         motions=(ramp._replace(duration=SLOWLY),),
         duration=SLOWLY,
@@ -114,7 +115,7 @@ def other_outputs(name: str, skipped: float, task: Task) -> Run:
     solver = make_plan(posed.scene).solver
 
     def run() -> Sample:
-        motion, *_ = base.forward(solver, posed.values, posed.scene.drives)
+        motion, *_ = solve_cases(solver, posed.values, posed.scene.loads.cases)
         if not skipped:
             observe(posed.scene.topology, posed.values, motion[0])
         return Sample(posed.results(*posed.measured(motion, posed.values)), {})
@@ -131,7 +132,7 @@ def far_derivatives(name: str, skipped: float, task: Task) -> Run:
         every = np.arange(posed.scene.lattice.n_ligaments, dtype=np.int64)
         solver = _on(solver, designed=every)
     of_design = structure(posed.scene)
-    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.drives)
+    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.loads.cases)
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> Sample:

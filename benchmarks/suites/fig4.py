@@ -67,7 +67,7 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
         value = energy(displacement[:, -1:], values)[0]
         return value, value
 
-    evaluate = value_and_gradient(structure(scene), final, solver, scene.drives)
+    evaluate = value_and_gradient(structure(scene), final, solver, scene.loads.cases)
     start = np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, solver, [0])
 
@@ -90,5 +90,5 @@ def _dynamics_loss() -> Run:
 def _loss() -> jax_baseline.Loss:
     scene = paper_scenes.fig4_as_dynamics()
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8)
-    end = np.array([scene.duration])
+    end = np.array([scene.loads.duration])
     return jax_baseline.loss(scene, 0, method, end, paper_scenes.final_energy(scene))

@@ -85,8 +85,8 @@ def _scene() -> Scene:
 
 
 def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
-    asked = replace(scene, accuracy=accuracy, integrator="implicit")
-    solver = make_plan(asked, asked=SAMPLES).solver
+    asked = scene.updated(accuracy=accuracy, integrator="implicit")
+    solver = make_plan(asked, times=SAMPLES).solver
     assert isinstance(solver, ImplicitSolver)
     times = solver.times
     for _ in range(halvings):
@@ -96,7 +96,7 @@ def _implicit(accuracy: Accuracy, halvings: int, scene: Scene) -> Solver:
 
 def _explicit(method: str, n_steps: int, scene: Scene) -> Solver:
     return ExplicitSolver(
-        scene.topology, scene.duration, n_steps, SAMPLES, splitting=METHODS[method]
+        scene.topology, scene.loads.duration, n_steps, SAMPLES, splitting=METHODS[method]
     )
 
 
@@ -104,12 +104,12 @@ def _run_with(make: partial[Solver], warm: bool = True) -> Run:
     scene = _scene()
     solver = make(scene)
     of_design, spacing = structure(scene), scene.lattice.spacing
-    measure = jax.jit(DisplacementMimicking(scene.region, spacing, np.ones(200)).__call__)
+    measure = jax.jit(DisplacementMimicking(scene.objective.region, spacing, np.ones(200)).__call__)
     scale = np.array([spacing, spacing, 1.0])
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        displacement = simulate(solver, values, scene.drives).displacement
+        displacement = simulate(solver, values, scene.loads.cases).displacement
         return measure(displacement, values)[0], displacement[0]
 
     evaluate = jax.value_and_grad(loss, has_aux=True)
@@ -119,7 +119,7 @@ def _run_with(make: partial[Solver], warm: bool = True) -> Run:
     def run() -> Sample:
         (value, motion), gradient = evaluate(start)
         values = {
-            "rms": np.asarray(motion)[:, scene.region] / scale,
+            "rms": np.asarray(motion)[:, scene.objective.region] / scale,
             "loss": np.asarray(value),
             "gradient": np.asarray(gradient),
         }

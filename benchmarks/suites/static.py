@@ -105,8 +105,8 @@ def _solve(side: int, by_fronts: bool | None = None) -> Run:
         run()  # compiles
     else:
         _solve(SIDES[0])
-        drive.values(top.held, solver.asked)
-        drive.rates(top.held, solver.asked)
+        drive.values(top.held, solver.output_times)
+        drive.rates(top.held, solver.output_times)
     return run
 
 

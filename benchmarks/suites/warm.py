@@ -79,7 +79,7 @@ def _warm() -> Run:
 
 
 def _scene() -> Scene:
-    return replace(paper_scenes.fig4(), steps=STEPS)
+    return paper_scenes.fig4().updated(steps=STEPS)
 
 
 def walk(scene: Scene, relative: float, warm: bool) -> Run:

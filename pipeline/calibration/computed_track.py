@@ -15,9 +15,8 @@ from pipeline.runtime import UserError
 from pipeline.tracking.output import absent, labelled
 from sim.core import Floats
 from sim.energy import observe
-from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import solve_case
-from sim.structure import Material
+from sim.scene import Scene, concrete_parameters, simulate
+from sim.structure import Material, VoidAngleContact
 
 
 def track_of(
@@ -30,7 +29,7 @@ def track_of(
     """
     assert asked.virtual is not None
     made = specimen(asked, folder)
-    count = 1 + int(made.scene.duration * asked.virtual.rate * (1 + 1e-9))
+    count = 1 + int(made.scene.loads.duration * asked.virtual.rate * (1 + 1e-9))
     time = np.arange(count) / asked.virtual.rate
     posed = _posed(made, true)
     motion = _motion(posed, asked.case, time)
@@ -54,21 +53,20 @@ def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
         made.stiffer * axial,
         made.stiffer * shear,
         made.stiffer * bending,
-        scene.material.contact,
+        scene.structure.material.contact,
         translation,
         rotation,
     )
-    cutoff = scene.cutoff if true.cutoff is None else true.cutoff
-    return replace(scene, material=constants, cutoff=cutoff, reference=None, accuracy="tight")
+    law = scene.structure.contact
+    if true.cutoff is not None and isinstance(law, VoidAngleContact):
+        law = replace(law, cutoff=true.cutoff)
+    return scene.updated(material=constants, contact=law, reference=None, accuracy="tight")
 
 
 def _motion(posed: Scene, case: int, time: Floats) -> Floats:
     """Motion (n_times, n_units, 3) without noise."""
-    plan = make_plan(posed, posed.lattice.vertices, time, every_case=True)
-    values, drive = concrete_parameters(posed, posed.lattice.vertices), posed.drives[case]
-    _, _, record = solve_case(plan.solver, values, drive)
-    finer = solve_case(plan.solver.refined(record), values, drive)[0]
-    return finer.reshape(len(time), posed.lattice.n_units, 3)
+    response = simulate(posed, vertices=posed.lattice.vertices, times=time, cases=[case])
+    return np.asarray(response.refined().displacement[0])
 
 
 def _force(
@@ -86,7 +84,7 @@ def _force(
         raise UserError(what, file=folder / asked.problem, key="load", remedy=remedy)
     values = concrete_parameters(posed, posed.lattice.vertices)
     reaction = observe(posed.topology, values, motion).reaction
-    return np.asarray(reaction[:, posed.driven].sum(axis=1) @ towards)
+    return np.asarray(reaction[:, posed.loads.driven].sum(axis=1) @ towards)
 
 
 def _dataset(

@@ -8,7 +8,6 @@ at the start of a drive. Frames in which a unit was not seen are bridged by it.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -21,8 +20,8 @@ from pipeline.posing import PosedStructure
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Mask, Numbers, SimulationError
 from sim.energy import observe
-from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import solve_case
+from sim.scene import Scene, concrete_parameters, simulate
+from sim.solvers import PrescribedMotion
 
 FINER = 2
 """Instants that the filtered motion is kept at, for every frame."""
@@ -138,9 +137,9 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
 
 def held_units(scene: Scene) -> tuple[Ints, Mask]:
     """Places of the driven units and of those clamped in all dofs, and which of them are driven."""
-    clamped, count = np.unique(scene.clamped // 3, return_counts=True)
-    unit = np.union1d(clamped[count == 3], scene.driven)
-    return unit, np.isin(unit, scene.driven)
+    clamped, count = np.unique(scene.loads.clamped // 3, return_counts=True)
+    unit = np.union1d(clamped[count == 3], scene.loads.driven)
+    return unit, np.isin(unit, scene.loads.driven)
 
 
 def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
@@ -150,13 +149,9 @@ def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
 
 def under(scene: Scene, held: Held) -> Scene:
     """The scene with all held units driven as measured; its end is that of the measurement."""
-    followed = (3 * held.unit[:, None] + np.arange(3)).ravel()
-    return replace(
-        scene,
-        driven=held.unit,
-        clamped=np.setdiff1d(scene.clamped, followed),
-        motions=(held.motion,),
-        weights=np.ones(1),
+    return scene.updated(
+        cases=(PrescribedMotion(held.unit, held.motion),),
+        weights=None,
         duration=held.motion.step * (len(held.motion.value) - 1),
         frequency=None,
         reference=None,
@@ -173,19 +168,17 @@ def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
     """
     scene, vertices = structure
     driven = under(scene, held)
-    values = concrete_parameters(driven, vertices)
     shape = (len(times), scene.lattice.n_units, 3)
     displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)
     failure = None
     try:
-        plan = make_plan(driven, vertices, times)
-        found = solve_case(plan.solver, values, driven.drives[0])[0].reshape(shape)
+        found = simulate(driven, vertices=vertices, times=times).displacement[0]
     except SimulationError as error:
         failure = str(error)
         found = np.empty((0, *shape[1:])) if error.states is None else error.states
         found = found.reshape(-1, *shape[1:])
     if len(found):
-        reaction = observe(driven.topology, values, found).reaction
+        seen = observe(driven.topology, concrete_parameters(driven, vertices), found)
         displacement[: len(found)] = found
-        force[: len(found)] = reaction[:, scene.driven, :2].sum(axis=1)
+        force[: len(found)] = seen.force_on(scene.loads.driven)
     return Redriven(displacement, force, failure)

@@ -21,8 +21,8 @@ from pipeline.runtime import cli
 from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import Case, Measure, Solved, Solver, run_batch
+from sim.scene import Scene, cases_of, make_plan, simulate
+from sim.solvers import Measure, Solved, Solver, run_batch
 from sim.structure import MOST_ROUNDS
 
 STREAM = 1
@@ -65,20 +65,18 @@ def sampled(
         SimulationError: the structure as designed cannot be simulated.
     """
     planned, vertices = structure
-    scene = _alone(planned, case) if held is None else under(planned, held)
+    scene = planned.alone(case) if held is None else under(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
     unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
     failures = [unsound for _, copy in made if not copy.sound]
     solver = _solver(scene, vertices, times)
     cases = (
-        Case(concrete_parameters(each, copy.vertices), scene.drives[0], solver)
-        for each, copy in made
-        if copy.sound
+        case for each, copy in made if copy.sound for case in cases_of(each, copy.vertices, solver)
     )
     courses = []
     with cli.progress(len(made), "specimens", initial=len(failures)) as bar:
-        for outcome in run_batch(cases, _measure(scene, planned.driven), threads):
+        for outcome in run_batch(cases, _measure(scene, planned.loads.driven), threads):
             if outcome.value is None:
                 failures.append(outcome.failure or "")
             else:
@@ -92,25 +90,21 @@ def sampled(
     )
 
 
-def _alone(scene: Scene, case: int) -> Scene:
-    """The scene under one of its load cases."""
-    return replace(scene, motions=(scene.motions[case],), weights=np.ones(1))
-
-
 def _solver(scene: Scene, vertices: Floats, times: Floats) -> Solver:
     """The plan's solver; of a path of equilibria, with the steps of the structure as designed."""
-    solver = make_plan(scene, vertices, times).solver
+    plan = make_plan(scene, vertices, times)
+    solver = plan.solver
     if not isinstance(solver, StaticSolver):
         return solver
-    record = solver.forward(concrete_parameters(scene, vertices), scene.drives[0])[2]
-    return replace(solver, start=record)
+    response = simulate(scene, vertices=vertices, plan=plan)
+    return replace(solver, start=response.records[0])
 
 
 def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
     def reduce(solved: Solved) -> tuple[Floats, Floats]:
         motion = solved.displacement
-        reaction = observe(scene.topology, solved.case.values, motion).reaction
-        return motion, reaction[:, driven, :2].sum(axis=1)
+        seen = observe(scene.topology, solved.case.values, motion)
+        return motion, seen.force_on(driven)
 
     return reduce
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -21,7 +20,7 @@ from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import StaticRecord
-from sim.scene import objective, sample_times, scales, strain_energies
+from sim.scene import mimicking, sample_times, scales, strain_energies
 from sim.solvers import solve_case
 from sim.structure import clearance
 
@@ -84,10 +83,10 @@ def measure(
         intact: the cases of the structure to be mimicked, if one was simulated.
     """
     scene, vertices = structure
-    stride = 1 if scene.static else CLEARANCE_STRIDE
+    stride = 1 if scene.loads.static else CLEARANCE_STRIDE
 
     def loss_of(motion: Floats, case: Case, at: Ints, weights: Floats | None) -> float:
-        measure = objective(scene, _target(motion, scene, case.number, intact, at), weights)
+        measure = mimicking(scene, _target(motion, scene, case.number, intact, at), weights)
         return float(measure(motion[None, at], case.values)[0])
 
     def reduce(solved: Solved) -> CaseResult:
@@ -99,7 +98,7 @@ def measure(
         )
         mean = np.full(len(times.sampled), 1 / len(times.sampled))
         region, fine_region = (
-            each[times.integrated][:, scene.region] / scales(scene.lattice.spacing)
+            each[times.integrated][:, scene.objective.region] / scales(scene.lattice.spacing)
             for each in (motion, refined)
         )
         shown = motion[times.shown]
@@ -109,15 +108,15 @@ def measure(
             displacement=shown,
             velocity=solved.velocity[times.shown],
             observables=seen,
-            drive_force=seen.reaction[:, scene.driven, :2].sum(axis=1),
+            drive_force=seen.force_on(scene.loads.driven),
             roi_energy=_roi_energy(scene, case, shown),
             gap=_at_stride(found.gap, stride, len(shown)),
             overlapping=_at_stride(found.overlaps, stride, len(shown)),
             stability=_stability(solved, times.shown),
-            region=motion[:, scene.region],
+            region=motion[:, scene.objective.region],
             loss=loss,
             loss_samples=loss_of(motion, case, times.sampled, mean),
-            loss_error=abs(loss - fine_loss) / (1.0 if scene.reference else fine_loss),
+            loss_error=abs(loss - fine_loss) / (1.0 if scene.objective.reference else fine_loss),
             displacement_error=float(
                 np.linalg.norm(region - fine_region) / np.linalg.norm(fine_region)
             ),
@@ -134,9 +133,9 @@ def _target(
     at: Ints,
 ) -> Floats | None:
     """What the region (1, n_at, n_region, 3) should do: as the intact one did, which is its own."""
-    if scene.reference is None:
+    if scene.objective.reference is None:
         return None
-    whole = motion[:, scene.region] if intact is None else intact[number].region
+    whole = motion[:, scene.objective.region] if intact is None else intact[number].region
     return np.asarray(whole[None, at])
 
 
@@ -171,15 +170,15 @@ def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]
         "altered": PosedStructure(scene, scene.lattice.vertices),
         "cloaked": PosedStructure(scene, flat_vertices(scene.lattice, design["vertices"])),
     }
-    if scene.reference is None:
+    if scene.objective.reference is None:
         return found
-    intact = replace(scene.reference, reference=scene.reference)
+    intact = scene.objective.reference.updated(reference=scene.objective.reference)
     return {"intact": PosedStructure(intact, intact.lattice.vertices), **found}
 
 
 def times_of(asked: Problem, scene: Scene) -> Times:
     """Output times of a problem's response."""
-    horizon = scene.duration
+    horizon = scene.loads.duration
     end = (
         horizon
         if asked.frequency is None
@@ -187,7 +186,9 @@ def times_of(asked: Problem, scene: Scene) -> Times:
     )
     shown = np.linspace(0.0, end, asked.response.samples)
     integrated = sample_times(scene)
-    sampled = integrated if scene.steps else np.linspace(0.0, horizon, asked.horizon.samples)
+    sampled = (
+        integrated if scene.objective.steps else np.linspace(0.0, horizon, asked.horizon.samples)
+    )
     wanted = (shown, integrated, sampled)
     nanoseconds = [np.round(times * 1e9).astype(np.int64) for times in wanted]
     every, place = np.unique(np.concatenate(nanoseconds), return_inverse=True)

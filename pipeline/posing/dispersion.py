@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.posing.structure_variables import Variables
-from pipeline.posing.to_scene import lattice_of, material_of
+from pipeline.posing.to_scene import contact_laws, lattice_of, material_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
 from pipeline.runtime import UserError
@@ -51,10 +51,7 @@ def _cell(asked: Problem) -> UnitCell:
         raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
     made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked))
-    contact = asked.contact
-    fixed = topology(
-        lattice, np.zeros(0, dtype=np.int64), contact.barrier_angle, contact.cutoff_angle
-    )
+    fixed = topology(lattice, np.zeros(0, dtype=np.int64), contact_laws(asked)["angle"])
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
     values = Parameters(*(np.asarray(part) for part in made))
     try:

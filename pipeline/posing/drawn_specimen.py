@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -33,8 +32,10 @@ def drawn(
     """
     random = np.random.default_rng(seed)
     lattice = scene.lattice
-    copy = shifted(lattice, vertices, asked.geometry * lattice.spacing, scene.cutoff, random)
-    material = stiffened(scene.material, lattice.n_ligaments, asked.ligaments, random)
+    copy = shifted(
+        lattice, vertices, asked.geometry * lattice.spacing, scene.structure.contact, random
+    )
+    material = stiffened(scene.structure.material, lattice.n_ligaments, asked.ligaments, random)
     axial, shear, bending = _factors(3, asked.stiffness, random)
     damping = _factors(lattice.n_units, asked.units, random) * _factors(1, asked.damping, random)
     constants: Material = material._replace(
@@ -46,8 +47,8 @@ def drawn(
     )
     joints = np.random.default_rng((*seed, 1))
     spread = (asked.assembly.shift, asked.assembly.turn)
-    return replace(scene, material=constants), assembled(
-        lattice, copy, spread, scene.cutoff, joints
+    return scene.updated(material=constants), assembled(
+        lattice, copy, spread, scene.structure.contact, joints
     )
 
 

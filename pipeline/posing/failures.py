@@ -34,7 +34,7 @@ def infeasible(
 
 
 class Simulated(NamedTuple):
-    """What was to be simulated: a structure of a problem file at solver times (n_asked,)."""
+    """What was to be simulated: a structure of a problem file at solver times (n_times,)."""
 
     source: Path
     scene: Scene
@@ -52,14 +52,14 @@ def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> Use
     """
     scene = tried.scene
     what = f"the {tried.name} structure cannot be simulated"
-    if scene.static and error.step is not None:
+    if scene.loads.static and error.step is not None:
         reached = 0.0 if error.step == 0 else float(tried.asked[error.step - 1])
         driven = np.stack(
-            [np.asarray(motion(np.array([reached])))[0, :2] for motion in scene.motions]
+            [np.asarray(motion(np.array([reached])))[0, :2] for motion in scene.loads.motions]
         )
         length = float(np.linalg.norm(driven, axis=1).max())
         what += f" beyond a driven displacement of {length:.3g} mm"
-        what += f" ({reached / scene.duration:.0%} of the load)"
+        what += f" ({reached / scene.loads.duration:.0%} of the load)"
     if error.unit is not None:
         i, j = scene.lattice.index[error.unit]
         what += f", look at unit [{i}, {j}]"

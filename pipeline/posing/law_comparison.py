@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core import SimulationError
-from sim.scene import by_distance, judge
+from sim.scene import mimicking, simulate, target_motion
+from sim.structure import clearance
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.posing.case_result import PosedStructure
     from pipeline.problem import Problem
-    from sim.scene import LawComparison
+    from sim.structure import ContactModel
 
 LOG = logging.getLogger(__name__)
 
@@ -24,36 +25,28 @@ LAWS = ("angle", "geometric")
 DIFFERENCE = 0.1
 """Relative difference of the losses under the two laws at which a design depends on the law."""
 _DIMS = ("structure", "contact_law", "case")
-_MEASURES = {
-    "loss_by_contact": "loss",
-    "overlaps_by_contact": "overlaps",
-    "gap_by_contact": "gap",
-}
+_MEASURES = ("loss_by_contact", "overlaps_by_contact", "gap_by_contact")
 
 
 def by_contact(
-    structures: dict[str, PosedStructure], distance: float
+    structures: dict[str, PosedStructure], laws: dict[str, ContactModel]
 ) -> dict[str, tuple[Any, ...]]:
-    """Loss, overlaps and smallest gap of static structures under either law.
+    """Compares loss, overlaps and smallest gap of static structures under either law.
 
     NaN in studies of motion in time, and where a structure cannot be simulated under a law.
 
     Args:
         structures: by name.
-        distance: activation distance of geometric contact, mm.
+        laws: by LAWS.
     """
-    judged = [
-        [_judge(name, structure, law, distance) for law in LAWS]
-        for name, structure in structures.items()
-    ]
-    n_cases = len(next(iter(structures.values())).scene.motions)
-
-    def gather(field: str) -> NDArray[np.float64]:
-        return np.array(
-            [[_part(one, field, n_cases) for one in of_laws] for of_laws in judged], dtype=float
-        )
-
-    return {name: (_DIMS, gather(field)) for name, field in _MEASURES.items()}
+    found = np.array(
+        [
+            [_under(name, structure, law, laws[law]) for law in LAWS]
+            for name, structure in structures.items()
+        ],
+        dtype=float,
+    )
+    return {name: (_DIMS, found[:, :, k]) for k, name in enumerate(_MEASURES)}
 
 
 def cloak_losses(response: xr.Dataset) -> tuple[float, float]:
@@ -69,17 +62,25 @@ def geometric(asked: Problem) -> Problem:
     return asked.model_copy(update={"contact": contact})
 
 
-def _part(judgement: LawComparison | None, field: str, n_cases: int) -> NDArray[np.float64]:
-    return np.full(n_cases, np.nan) if judgement is None else getattr(judgement, field)
-
-
-def _judge(name: str, structure: PosedStructure, law: str, distance: float) -> LawComparison | None:
-
-    if not structure.scene.static:
-        return None
-    scene = by_distance(structure.scene, distance if law == "geometric" else None)
+def _under(
+    name: str, structure: PosedStructure, law: str, contact: ContactModel
+) -> NDArray[np.float64]:
+    """Losses, largest number of overlaps and smallest gap (3, n_cases) under a law of contact."""
+    nothing = np.full((len(_MEASURES), len(structure.scene.loads.cases)), np.nan)
+    if not structure.scene.loads.static:
+        return nothing
+    scene, vertices = structure.scene.with_contact(contact), structure.vertices
     try:
-        return judge(scene, structure.vertices)
+        response = simulate(scene, vertices=vertices)
+        target = None if scene.objective.reference is None else target_motion(scene)
     except SimulationError as error:
         LOG.warning("%s structure under %s contact: %s", name, law, error)
-        return None
+        return nothing
+    found = [clearance(scene.lattice, vertices, motion) for motion in response.displacement]
+    return np.array(
+        [
+            mimicking(scene, target)(response.displacement, response.parameters),
+            [each.overlaps.max() for each in found],
+            [each.gap.min() for each in found],
+        ]
+    )

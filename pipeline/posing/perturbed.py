@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -17,14 +16,14 @@ from sim.core import Floats
 from sim.energy import observe
 from sim.scene import (
     Scene,
-    concrete_parameters,
+    cases_of,
     make_plan,
-    objective,
+    mimicking,
     sample_times,
     scales,
     target_motion,
 )
-from sim.solvers import Case, Measure, MotionLaw, Outcome, Solved, run_batch
+from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
 from sim.structure import MOST_ROUNDS, PerturbedStructure, shifted, stiffened
 
 GEOMETRY, STIFFNESS = "geometry", "stiffness"
@@ -70,9 +69,9 @@ def draw(
     random = np.random.default_rng(seed)
     if noise.kind == GEOMETRY:
         largest = noise.size * scene.lattice.spacing
-        return scene, shifted(scene.lattice, vertices, largest, scene.cutoff, random)
-    material = stiffened(scene.material, scene.lattice.n_ligaments, noise.size, random)
-    return replace(scene, material=material), PerturbedStructure(vertices, 0, 0, sound=True)
+        return scene, shifted(scene.lattice, vertices, largest, scene.structure.contact, random)
+    material = stiffened(scene.structure.material, scene.lattice.n_ligaments, noise.size, random)
+    return scene.updated(material=material), PerturbedStructure(vertices, 0, 0, sound=True)
 
 
 def simulate(
@@ -91,7 +90,7 @@ def simulate(
         samples: numbers of the copies to draw of each kind.
         threads: copies simulated side by side.
     """
-    target = None if scene.reference is None else target_motion(scene, threads)
+    target = None if scene.objective.reference is None else target_motion(scene, threads)
     parts = []
     with cli.progress(len(noises(asked)) * len(samples), "copies") as bar:
         for number, noise in enumerate(noises(asked)):
@@ -118,12 +117,12 @@ def _outcomes(
     """Outcomes of the load cases of every copy; none of a copy that cannot be made."""
     plan = make_plan(scene, vertices, sample_times(scene), every_case=True)
     cases = (
-        Case(concrete_parameters(imperfect, copy.vertices), drive, plan.solver, number)
+        case
         for imperfect, copy in drawn
         if copy.sound
-        for number, drive in enumerate(scene.drives)
+        for case in cases_of(imperfect, copy.vertices, plan.solver)
     )
-    n_cases = len(scene.drives)
+    n_cases = len(scene.loads.cases)
     done = run_batch(cases, _measure(scene, target), threads)
     for _, copy in drawn:
         yield list(islice(done, n_cases)) if copy.sound else []
@@ -135,15 +134,15 @@ def _measure(scene: Scene, target: Floats | None) -> Measure[PerturbedResponse]:
     def reduce(solved: Solved) -> PerturbedResponse:
         case, motion = solved.case, solved.displacement
         aim = None if target is None else target[case.number : case.number + 1]
-        inside = motion[:, scene.region]
+        inside = motion[:, scene.objective.region]
         apart = (inside if aim is None else inside - aim[0]) / scale
         seen = observe(scene.topology, case.values, motion)
-        force = seen.reaction[:, scene.driven, :2].sum(axis=1)
-        loss = objective(scene, aim)(jnp.asarray(motion[None]), case.values)
+        force = seen.force_on(scene.loads.driven)
+        loss = mimicking(scene, aim)(jnp.asarray(motion[None]), case.values)
         return PerturbedResponse(
             np.abs(inside[..., 2]).mean(axis=1),
             np.sqrt((apart**2).sum(axis=-1).mean(axis=-1)),
-            force @ _along(scene.motions[case.number]),
+            force @ _along(scene.loads.motions[case.number]),
             float(loss[0]),
             float(seen.void_angle.min()),
         )
@@ -169,7 +168,7 @@ def _row(
 
     def mean(name: str) -> Floats:
         values = np.array([getattr(course, name) for course in courses])
-        return np.tensordot(scene.weights, values, axes=1)
+        return np.tensordot(scene.loads.case_weights, values, axes=1)
 
     curves = {
         name: ("time", np.full(len(times), np.nan) if failure else mean(name))

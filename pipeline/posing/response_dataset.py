@@ -15,7 +15,7 @@ from pipeline.posing.structure_variables import (
     spread,
     unit_coordinates,
 )
-from pipeline.posing.to_scene import contact_distance, lattice_of
+from pipeline.posing.to_scene import contact_laws, lattice_of
 from pipeline.problem import Problem
 from sim.core import Floats
 
@@ -53,7 +53,7 @@ def assemble_response(
         **_over_units(asked, structures, measured),
         **_over_steps(measured),
         **_over_cases(measured),
-        **by_contact(structures, contact_distance(asked)),
+        **by_contact(structures, contact_laws(asked)),
         "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
     }
     for name in ("loss", "loss_samples", "loss_by_contact"):
@@ -126,9 +126,9 @@ def _over_cases(measured: Table) -> Variables:
 def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
     """Mean displacement (n_cases, n_times, 2) of the driven units, mm."""
     scene = structures["altered"].scene
-    dofs = (3 * scene.driven[:, None] + np.arange(2)).ravel()
-    place = np.searchsorted(scene.held, dofs)
-    held = np.stack([drive.values(scene.held, times) for drive in scene.drives])
+    dofs = (3 * scene.loads.driven[:, None] + np.arange(2)).ravel()
+    place = np.searchsorted(scene.loads.held, dofs)
+    held = np.stack([drive.values(scene.loads.held, times) for drive in scene.loads.cases])
     return np.asarray(held[:, :, place].reshape(*held.shape[:2], -1, 2).mean(axis=2))
 
 

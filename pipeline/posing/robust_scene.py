@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
     if robust is None:
         return scene
     copies = _copies(robust, scene) if robust.copies else None
-    scene = replace(scene, sharpness=robust.sharpness, copies=copies)
+    scene = scene.updated(sharpness=robust.sharpness, copies=copies)
     if not robust.loads:
         return scene
     loads = (Load(), *robust.loads)
@@ -33,8 +32,8 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
     motions: tuple[MotionLaw, ...] = tuple(m for each in every for m in motions_of(each, folder))
     frequency = max(each.frequency for each in every if each.frequency is not None)
     share = np.array([load.weight for load in loads])
-    weights = np.outer(share / share.sum(), scene.weights).ravel()
-    return replace(scene.under(motions, scene.duration, frequency), weights=weights)
+    weights = np.outer(share / share.sum(), scene.loads.case_weights).ravel()
+    return scene.under(motions, scene.loads.duration, frequency).updated(weights=weights)
 
 
 def _under(asked: Problem, load: Load) -> Problem:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +17,8 @@ from pipeline.problem.reading import findings, reason
 from pipeline.problem.sections import Setting, laid
 from pipeline.runtime import SweepResult, UserError
 from sim.core import Floats, SimulationError
-from sim.scene import Scene, concrete_parameters, make_plan, objective, target_motion
-from sim.solvers import Case, Outcome, Solved, run_batch
+from sim.scene import Scene, cases_of, make_plan, mimicking, target_motion
+from sim.solvers import Outcome, Solved, run_batch
 
 Result = Outcome[tuple[float, float]]
 
@@ -49,12 +48,12 @@ def results(
         if lattice_of(problem).n_units != vertices.sizes["unit"]:
             raise UnposedError("the design is of a lattice with another number of units")
         # No design space is asked for: its symmetry costs more than it could save.
-        scene = replace(scene_of(problem, folder), symmetry="none")
+        scene = scene_of(problem, folder).updated(symmetry="none")
     except ValidationError as error:
         raise UnposedError(reason(error)[0]) from error
     except UserError as error:
         raise UnposedError(error.what) from error
-    target = None if scene.reference is None else target_motion(scene, threads)
+    target = None if scene.objective.reference is None else target_motion(scene, threads)
     altered = _simulated(scene, scene.lattice.vertices, target, threads)
     cloaked = _simulated(scene, flat_vertices(scene.lattice, vertices), target, threads)
     return [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
@@ -93,16 +92,15 @@ def _simulated(
     try:
         plan = make_plan(scene, vertices, threads=threads)
     except SimulationError as error:
-        return iter([Outcome(None, str(error), error)] * len(scene.motions))
-    values = concrete_parameters(scene, vertices)
+        return iter([Outcome(None, str(error), error)] * len(scene.loads.motions))
 
     def reduce(solved: Solved) -> tuple[float, float]:
         number = solved.case.number
-        measure = objective(scene, None if target is None else target[number : number + 1])
-        loss = float(measure(solved.displacement[None], values)[0])
-        voids = scene.topology.smallest_void_angle(values.void, solved.displacement)
+        measure = mimicking(scene, None if target is None else target[number : number + 1])
+        loss = float(measure(solved.displacement[None], solved.case.values)[0])
+        voids = scene.topology.smallest_void_angle(solved.case.values.void, solved.displacement)
         return loss, float(voids.min())
 
-    cases = (Case(values, scene.drives[k], plan.solver, int(k)) for k in plan.simulated)
+    cases = cases_of(scene, vertices, plan.solver, plan.simulated)
     solved = list(run_batch(cases, reduce, threads))
     return (solved[k] for k in np.searchsorted(plan.simulated, plan.case_of))

@@ -42,13 +42,13 @@ def network_variables(problem: Problem, scene: Scene) -> Variables:
     region = np.full(intact.n_units, VOID, dtype=np.int8)
     region[kept] = SURROUNDINGS
     region[list(problems.inclusion_units(problem))] = INCLUSION
-    region[kept[scene.cloak]] = CLOAK
-    region[kept[scene.driven]] = SOURCE
+    region[kept[scene.design.cloak]] = CLOAK
+    region[kept[scene.loads.driven]] = SOURCE
     interest = np.zeros(intact.n_units, dtype=np.int8)
-    interest[kept[scene.region]] = 1
+    interest[kept[scene.objective.region]] = 1
     support = np.full(intact.n_units, FREE, dtype=np.int8)
-    support[kept[np.unique(scene.clamped // 3)]] = CLAMPED
-    support[kept[scene.driven]] = DRIVEN
+    support[kept[np.unique(scene.loads.clamped // 3)]] = CLAMPED
+    support[kept[scene.loads.driven]] = DRIVEN
     local = intact.ligaments - intact.first_vertex[intact.ligament_units]
     return {
         "region": (("unit",), region),

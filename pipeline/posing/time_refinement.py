@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from pipeline.posing.to_scene import scene_of
 from pipeline.posing.verification import AS_RUN, Numbers
 from sim.core import Floats, SimulationError
 from sim.energy import observe
-from sim.scene import concrete_parameters, make_plan, objective, scales
-from sim.solvers import solve_case
+from sim.scene import Response, mimicking, scales, simulate
 from sim.structure import clearance
 from sim.time_integration import ExplicitRecord
 
@@ -29,44 +28,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
-    from sim.solvers import PrescribedMotion, Solver
-    from sim.structure import ConcreteParameters
 
 LOG = logging.getLogger(__name__)
 
 HALVINGS = {AS_RUN: 0, "half the step": 1, "a quarter of the step": 2}
 BY_DISTANCE = "contact on distance"
 
-Runs = dict[str, list["Run"]]
-
-
-class Run(NamedTuple):
-    """A structure simulated under one load case.
-
-    Attributes:
-        solver: that took it.
-        motion: (n_times, n_units, 3).
-        record: the solver's.
-    """
-
-    solver: Solver
-    motion: Floats
-    record: Any
-
-    @property
-    def time_step(self) -> float:
-        """Length of equal steps in s; NaN of a graded grid."""
-        return self.record.steps.h if isinstance(self.record, ExplicitRecord) else np.nan
-
-    def repeated(self, values: ConcreteParameters, drive: PrescribedMotion) -> Run:
-        """With half the steps."""
-        return _run(self.solver.refined(self.record), values, drive)
-
-
-def _run(solver: Solver, values: ConcreteParameters, drive: PrescribedMotion) -> Run:
-
-    motion, _, record = solve_case(solver, values, drive)
-    return Run(solver, motion.reshape(len(solver.asked), -1, 3), record)
+Runs = dict[str, Response]
 
 
 def trials(
@@ -83,7 +51,7 @@ def trials(
     found = {AS_RUN: _numbers(structures, runs, as_run, times)}
     status = {AS_RUN: "ok"}
     for check in (name for name, halvings in HALVINGS.items() if halvings):
-        runs = {name: _halved(each, runs[name]) for name, each in structures.items()}
+        runs = {name: run.refined() for name, run in runs.items()}
         found[check] = _numbers(structures, runs, as_run, times)
         status[check] = "ok"
     others = structures_of(scene_of(law_comparison.geometric(asked), folder), design)
@@ -97,26 +65,21 @@ def trials(
     return found, status
 
 
-def _first(structure: PosedStructure, times: Times) -> list[Run]:
-
-    scene, vertices = structure
-    plan = make_plan(scene, vertices, times.asked, every_case=True)
-    values = concrete_parameters(scene, vertices)
-    return [_run(plan.solver, values, drive) for drive in scene.drives]
+def _first(structure: PosedStructure, times: Times) -> Response:
+    return simulate(structure.scene, vertices=structure.vertices, times=times.asked)
 
 
-def _halved(structure: PosedStructure, runs: list[Run]) -> list[Run]:
-
-    scene, vertices = structure
-    values = concrete_parameters(scene, vertices)
-    return [run.repeated(values, drive) for run, drive in zip(runs, scene.drives, strict=True)]
+def _time_step(run: Response) -> float:
+    """Longest of the equal steps of all cases, s; NaN of a graded grid."""
+    steps = [r.steps.h if isinstance(r, ExplicitRecord) else np.nan for r in run.records]
+    return float(max(steps))
 
 
 def _numbers(
     structures: dict[str, PosedStructure], runs: Runs, as_run: Runs, times: Times
 ) -> dict[str, Numbers]:
     first = next(iter(structures.values())).scene
-    aims = [run.motion[times.integrated][:, first.region] for run in next(iter(runs.values()))]
+    aims = next(iter(runs.values())).displacement[:, times.integrated][:, :, first.objective.region]
     return {
         name: _of_structure(structure, runs[name], as_run[name], aims, times)
         for name, structure in structures.items()
@@ -124,16 +87,15 @@ def _numbers(
 
 
 def _of_structure(
-    structure: PosedStructure, runs: list[Run], as_run: list[Run], aims: list[Floats], times: Times
+    structure: PosedStructure, run: Response, as_run: Response, aims: Floats, times: Times
 ) -> Numbers:
 
     scene, vertices = structure
-    values = concrete_parameters(scene, vertices)
-    mimics = scene.reference is not None
-    measure = objective(scene, np.stack(aims) if mimics else None)
-    motion = np.stack([run.motion for run in runs])
-    inside = motion[:, times.integrated][:, :, scene.region]
-    apart = motion[:, times.shown] - np.stack([run.motion for run in as_run])[:, times.shown]
+    values, motion = run.parameters, run.displacement
+    mimics = scene.objective.reference is not None
+    measure = mimicking(scene, aims if mimics else None)
+    inside = motion[:, times.integrated][:, :, scene.objective.region]
+    apart = motion[:, times.shown] - as_run.displacement[:, times.shown]
     missed, size = ((each / scales(scene.lattice.spacing)) for each in (inside - aims, aims))
     seen = [observe(scene.topology, values, each) for each in motion[:, times.shown]]
     clear = [
@@ -141,12 +103,14 @@ def _of_structure(
         for each in motion[:, times.shown]
     ]
     return Numbers(
-        loss=float(scene.weights @ np.asarray(measure(motion[:, times.integrated], values))),
+        loss=float(
+            scene.loads.case_weights @ np.asarray(measure(motion[:, times.integrated], values))
+        ),
         departure=float(np.linalg.norm(apart[..., :2], axis=-1).max()),
         min_void_angle=min(float(each.void_angle.min()) for each in seen),
         gap=min(float(each.gap.min()) for each in clear),
         overlaps=max(int(each.overlaps.max()) for each in clear),
         contact_pairs=max(int(each.contact_pairs.max()) for each in seen),
         error=float(np.linalg.norm(missed) / np.linalg.norm(size)) if mimics else np.nan,
-        time_step=max(run.time_step for run in runs),
+        time_step=_time_step(run),
     )

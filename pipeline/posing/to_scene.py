@@ -16,17 +16,17 @@ from pipeline.problem.sections import (
     LinearRampDrive,
     PulseDrive,
     RampHarmonicDrive,
+    Selector,
     TanhRampDrive,
     TimeSeriesDrive,
 )
 from pipeline.runtime import UserError
 from sim.constraints import Limits
 from sim.energy import activation_distance
-from sim.scene import Scene
-from sim.solvers import loads
-from sim.structure import Lattice, Material
+from sim.scene import Clamp, Design, Loads, Numerics, Objective, Scene, Structure
+from sim.solvers import PrescribedMotion, loads
+from sim.structure import ContactModel, DistanceContact, Lattice, Material, VoidAngleContact
 
-DOFS = ("ux", "uy", "theta")
 TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
 
 
@@ -54,55 +54,75 @@ def scene_of(
         UserError: the file of a measured drive cannot be read.
     """
     made = motions_of(problem, folder) if motions is None else motions
-    weights = problem.drive.case_weights if motions is None else np.full(len(made), 1 / len(made))
     intact, altered = lattice_of(problem), altered_lattice_of(problem)
-    interest = _units(problems.interest_units(problem))
-    samples = problem.horizon.samples
-    material = material_of(problem)
+    material, law = material_of(problem), contact_laws(problem)[problem.contact.law]
+    weights = None if motions is not None else np.asarray(problem.drive.case_weights)
+    interest, samples = _units(problems.interest_units(problem)), problem.horizon.samples
     scene = Scene(
-        lattice=intact,
-        material=material,
-        barrier=problem.contact.barrier_angle,
-        cutoff=problem.contact.cutoff_angle,
-        contact_distance=contact_distance(problem) if problem.contact.law == "geometric" else None,
-        clamped=clamped_dofs(problem, intact),
-        driven=driven_units(problem, intact),
-        motions=made,
-        weights=np.asarray(weights),
-        duration=problem.horizon_time,
-        frequency=problem.frequency,
-        static=problem.static,
-        cloak=_units(()),
-        region=interest,
-        objective=problem.objective.kind,
-        samples=samples + 1 - samples % 2,
-        steps=problem.horizon.steps,
-        accuracy=problem.solver.accuracy,
-        integrator=problem.solver.integrator,
+        Structure(intact, material, law),
+        _loads(problem, intact, made, weights),
+        Objective(
+            region=interest,
+            kind=problem.objective.kind,
+            samples=samples + 1 - samples % 2,
+            steps=problem.horizon.steps,
+        ),
+        numerics=Numerics(problem.solver.accuracy, problem.solver.integrator),
     )
     return replace(
         scene,
-        lattice=altered,
-        material=_stiffened(problem, altered, material),
-        clamped=clamped_dofs(problem, altered),
-        driven=driven_units(problem, altered),
-        cloak=altered.positions(_units(problems.cloak_units(problem))),
-        region=altered.positions(interest),
-        frozen=altered.positions(_units(problems.source_units(problem))),
-        reference=scene if problem.objective.target == "intact" else None,
-        symmetry=problem.optimiser.symmetry,
+        structure=Structure(altered, _stiffened(problem, altered, material), law),
+        loads=_loads(problem, altered, made, weights),
+        objective=replace(
+            scene.objective,
+            region=altered.positions(interest),
+            reference=scene if problem.objective.target == "intact" else None,
+        ),
+        design=Design(
+            cloak=altered.positions(_units(problems.cloak_units(problem))),
+            frozen=altered.positions(_units(problems.source_units(problem))),
+            symmetry=problem.optimiser.symmetry,
+        ),
     )
+
+
+def _loads(
+    problem: Problem,
+    lattice: Lattice,
+    motions: tuple[loads.MotionLaw, ...],
+    weights: NDArray[np.float64] | None,
+) -> Loads:
+    driven = driven_units(problem, lattice)
+    return Loads(
+        cases=tuple(PrescribedMotion(driven, motion) for motion in motions),
+        supports=tuple(
+            Clamp(_selected(problem, support.units, lattice), support.clamp)
+            for support in problem.supports
+        ),
+        duration=problem.horizon_time,
+        frequency=problem.frequency,
+        static=problem.static,
+        weights=weights,
+    )
+
+
+def _selected(problem: Problem, units: Selector, lattice: Lattice) -> NDArray[np.int64]:
+    """Places of selected units in a network."""
+    return lattice.positions(_units(problems.selected_units(units, problem.lattice)))
 
 
 def _units(ids: Iterable[int]) -> NDArray[np.int64]:
     return np.array(sorted(ids), dtype=np.int64)
 
 
-def contact_distance(problem: Problem) -> float:
-    """Activation distance of geometric contact, whether or not the problem asks for it, mm."""
-    asked = problem.contact.distance
-    ligament, gap = problem.lattice.ligament_length, problem.constraints.gap
-    return activation_distance(ligament, gap) if asked is None else asked
+def contact_laws(problem: Problem) -> dict[str, ContactModel]:
+    """Laws of contact by their names in the problem file, whichever it asks for."""
+    asked, ligament = problem.contact, problem.lattice.ligament_length
+    by_default = activation_distance(ligament, problem.constraints.gap)
+    return {
+        "angle": VoidAngleContact(asked.barrier_angle, asked.cutoff_angle),
+        "geometric": DistanceContact(by_default if asked.distance is None else asked.distance),
+    }
 
 
 def limits_of(problem: Problem) -> Limits:
@@ -117,20 +137,9 @@ def limits_of(problem: Problem) -> Limits:
     )
 
 
-def clamped_dofs(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
-    """Dofs (3 place of the unit + dof) of a network that the supports hold, ascending."""
-    dofs = [
-        3 * lattice.positions(_units(problems.selected_units(support.units, problem.lattice)))
-        + DOFS.index(dof)
-        for support in problem.supports
-        for dof in support.clamp
-    ]
-    return np.unique(np.concatenate([_units(()), *dofs]))
-
-
 def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
     """Places of the units of a network that follow the drive."""
-    return lattice.positions(_units(problems.selected_units(problem.drive.units, problem.lattice)))
+    return _selected(problem, problem.drive.units, lattice)
 
 
 def material_of(problem: Problem) -> Material:

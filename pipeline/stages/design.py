@@ -34,7 +34,7 @@ from sim.optimise import (
     minimise,
 )
 from sim.quasistatics import StaticSolver
-from sim.scene import Paths, evaluator, make_plan
+from sim.scene import Evaluator, Paths, make_plan
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _check_symmetry(scene: Scene, source: Path) -> None:
             str(error),
             file=source,
             key="optimiser.symmetry",
-            value=scene.symmetry,
+            value=scene.design.symmetry,
             remedy="ask for none, or for one that lattice and cloak have",
         ) from error
 
@@ -134,7 +134,7 @@ def optimise(
             ) as journal:
                 return minimise(
                     method,  # type: ignore[arg-type]
-                    journal.wrap(evaluator(scene, plan, paths)),
+                    journal.wrap(Evaluator(scene, plan, paths)),
                     constraints,
                     np.zeros(scene.space.n_variables) if start is None else start,
                     options=_options(asked, method),
@@ -144,7 +144,7 @@ def optimise(
         except InfeasibleStartError as error:
             raise failures.infeasible(error, constraints, source) from error
         except SimulationError as error:
-            tried = failures.Simulated(source, scene, "initial", plan.solver.asked)
+            tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
             raise failures.unsolved(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
@@ -157,7 +157,7 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
     """
     if not isinstance(plan.solver, StaticSolver):
         return None
-    return evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:

@@ -14,7 +14,6 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
 from pipeline.runtime import UserError, cli
-from sim.solvers import base
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -123,17 +122,12 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     vertices = scene.lattice.vertices
     if path is not None:
         vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
-    shifts = [0.0] if scene.copies is None else scene.copies[:, scene.lattice.group]
+    shifts = [0.0] if scene.design.copies is None else scene.design.copies[:, scene.lattice.group]
     return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
 
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
     """The combined loss of one structure."""
-    from sim.scene import combined, concrete_parameters, make_plan, objective
+    from sim.scene import make_plan, simulate
 
-    plan = make_plan(scene, vertices)
-    values = concrete_parameters(scene, vertices)
-    drives = [scene.drives[case] for case in plan.simulated]
-    motion, *_ = base.forward(plan.solver, values, drives)
-    each = objective(scene)(motion, values)[np.searchsorted(plan.simulated, plan.case_of)]
-    return float(combined(each, scene.weights, scene.sharpness))
+    return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,16 +24,15 @@ from pipeline.posing import (
 )
 from pipeline.runtime import cli
 from sim.core import Floats
-from sim.scene import concrete_parameters, make_plan
-from sim.solvers import Case, run_batch
+from sim.scene import cases_of, make_plan
+from sim.solvers import run_batch
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.problem import Problem
     from sim.core import SimulationError
-    from sim.scene import Plan, Scene
-    from sim.solvers import Case
+    from sim.scene import Scene
 
 LOG = logging.getLogger(__name__)
 
@@ -78,10 +75,10 @@ def _keep(
 ) -> Path | None:
     """Writes the response of a static path as far as all structures can be followed, if at all."""
     scene, step = structures[stopped.name].scene, stopped.error.step
-    whole = scene.steps or 1
-    reached = 0.0 if not step else stopped.asked[step - 1] / scene.duration
+    whole = scene.objective.steps or 1
+    reached = 0.0 if not step else stopped.asked[step - 1] / scene.loads.duration
     steps = int(whole * reached * (1 + 1e-9))
-    if not scene.static or scene.steps is None or steps == 0:
+    if not scene.loads.static or scene.objective.steps is None or steps == 0:
         return None
     shorter = {
         name: each._replace(scene=_until(each.scene, steps)) for name, each in structures.items()
@@ -98,12 +95,11 @@ def _keep(
 
 def _until(scene: Scene, steps: int) -> Scene:
     """A static scene whose path ends after so many of its load steps."""
-    assert scene.steps is not None
-    return replace(
-        scene,
-        duration=scene.duration * steps / scene.steps,
+    assert scene.objective.steps is not None
+    return scene.updated(
+        duration=scene.loads.duration * steps / scene.objective.steps,
         steps=steps,
-        reference=scene.reference and _until(scene.reference, steps),
+        reference=scene.objective.reference and _until(scene.objective.reference, steps),
     )
 
 
@@ -130,13 +126,13 @@ def measured_cases(
     """
     measured: dict[str, list[CaseResult]] = {}
     plans: dict[str, object] = {}
-    n_cases = len(structures["altered"].scene.motions)
+    n_cases = len(structures["altered"].scene.loads.motions)
     with cli.progress(len(structures) * n_cases, "response") as bar:
         for name, structure in structures.items():
             plan = make_plan(structure.scene, structure.vertices, times.asked, every_case=True)
             plans[name] = plan.record()
             LOG.info("%s: %s", name, plan.describe())
-            cases = _cases(structure, plan)
+            cases = cases_of(structure.scene, structure.vertices, plan.solver)
             reduce = measure(structure, times, measured.get("intact"))
             measured[name] = []
             for outcome in run_batch(cases, reduce, threads):
@@ -146,12 +142,3 @@ def measured_cases(
                 measured[name].append(outcome.value)
                 bar.update(loss=outcome.value.loss)
     return measured, plans
-
-
-def _cases(structure: PosedStructure, plan: Plan) -> Iterator[Case]:
-
-    values = concrete_parameters(structure.scene, structure.vertices)
-    return (
-        Case(values, drive, plan.solver, number)
-        for number, drive in enumerate(structure.scene.drives)
-    )

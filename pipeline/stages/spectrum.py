@@ -24,9 +24,7 @@ from pipeline.posing import (
 )
 from pipeline.runtime import UserError, cli
 from sim.core import Floats
-from sim.quasistatics import StaticSolver
-from sim.scene import concrete_parameters
-from sim.solvers import solve_case
+from sim.scene import concrete_parameters, simulate
 from sim.vibration import linearised, modes
 
 if TYPE_CHECKING:
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
     from pipeline.posing import PosedStructure, Variables
     from pipeline.problem import Problem
     from pipeline.problem.sections import Spectrum
-    from sim.structure import ConcreteParameters
     from sim.vibration import Linear
 
 
@@ -126,7 +123,7 @@ def _vibrations(
     scene, lattice = structure.scene, structure.scene.lattice
     values = concrete_parameters(scene, structure.vertices)
     found = []
-    for state in _equilibria(structure, values):
+    for state in _equilibria(structure):
         made = linearised(scene.topology, values, state)
         frequency, shape = _modes(made, wanted.modes)
         sent = _transmission(made, structure, wanted, directions)
@@ -135,14 +132,14 @@ def _vibrations(
     return Vibrations(*(np.stack(part) for part in zip(*found, strict=True)))
 
 
-def _equilibria(structure: PosedStructure, values: ConcreteParameters) -> list[Floats]:
+def _equilibria(structure: PosedStructure) -> list[Floats]:
 
     scene = structure.scene
     found = [np.zeros((scene.lattice.n_units, 3))]
-    if scene.static:
-        solver = StaticSolver(scene.topology, np.array([scene.duration]))
-        loaded, *_ = solve_case(solver, values, scene.drives[0])
-        found.append(loaded[0].reshape(-1, 3))
+    if scene.loads.static:
+        end = np.array([scene.loads.duration])
+        response = simulate(scene, vertices=structure.vertices, times=end, cases=[0])
+        found.append(response.displacement[0, 0])
     return found
 
 
@@ -166,8 +163,8 @@ def _transmission(
     scene = structure.scene
     unit, dof = np.divmod(made.held, 3)
     along = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in directions])
-    drives = np.where(np.isin(unit, scene.driven)[:, None], along.T[dof], 0.0)
+    drives = np.where(np.isin(unit, scene.loads.driven)[:, None], along.T[dof], 0.0)
     band = wanted.transmission
     excited = 2 * np.pi * np.linspace(band.start, band.stop, band.points)
-    moved = transmission(made, drives, excited)[:, :, scene.region, :2]
+    moved = transmission(made, drives, excited)[:, :, scene.objective.region, :2]
     return np.asarray(np.sqrt((np.abs(moved) ** 2).sum(axis=-1).mean(axis=-1)).T)

@@ -24,9 +24,7 @@ from pipeline.runtime import UserError, found_in
 from pipeline.tracking.frames import recording as recordings
 from pipeline.virtual_lab import specimen
 from sim.core import SimulationError
-from sim.energy import observe
-from sim.scene import concrete_parameters, make_plan
-from sim.solvers import solve_case
+from sim.scene import simulate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,7 +80,7 @@ def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedSt
         remedy = f"give one of: {', '.join(held)}"
         what = "the study has no such structure"
         raise UserError(what, key="structure", value=recording.structure, remedy=remedy)
-    cases = len(structure.scene.motions)
+    cases = len(structure.scene.loads.motions)
     if recording.case >= cases:
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError(
@@ -97,7 +95,7 @@ def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
     times = wanted.asked[wanted.shown]
     if not unload:
         return times
-    if not scene.static:
+    if not scene.loads.static:
         remedy = "leave it out: a motion in time comes back by itself"
         raise UserError("no static load", key="virtual.specimen.unload", remedy=remedy)
     return np.concatenate([times, 2 * times[-1] - times[-2::-1]])
@@ -111,7 +109,7 @@ def _described(
     scene, vertices = made
     intact, lattice = lattice_of(asked), scene.lattice
     motion, force = _simulated(made, times)
-    drive = motion[:, scene.driven, :2].mean(axis=1)
+    drive = motion[:, scene.loads.driven, :2].mean(axis=1)
     variables = {
         **network_variables(asked, altered),
         "vertices": (
@@ -134,15 +132,11 @@ def _described(
 def _simulated(made: PosedStructure, times: Floats) -> tuple[Floats, Floats]:
     """Displacement (n_times, n_units, 3) and force of the drive (n_times, 2), N."""
     scene, vertices = made
-    values = concrete_parameters(scene, vertices)
     try:
-        plan = make_plan(scene, vertices, times)
-        motion = solve_case(plan.solver, values, scene.drives[0])[0]
+        response = simulate(scene, vertices=vertices, times=times)
     except SimulationError as error:
         remedy = "give another seed, or smaller tolerances"
         raise UserError(
             f"the specimen cannot be simulated: {error}", key="virtual.specimen", remedy=remedy
         ) from error
-    motion = motion.reshape(len(times), -1, 3)
-    reaction = observe(scene.topology, values, motion).reaction
-    return motion, reaction[:, scene.driven, :2].sum(axis=1)
+    return response.displacement[0], response.drive_force[0]

@@ -90,11 +90,9 @@ def specimen(structure: PosedStructure, case: int, asked: Making, end: float) ->
     if not copy.sound:
         remedy = "give another seed, or smaller tolerances"
         raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
-    made = replace(
-        scene,
+    made = scene.driven_by(
+        shaken(scene, case, asked.drive, end, asked.unload),
         lattice=replace(scene.lattice, vertices=copy.vertices),
-        motions=(shaken(scene, case, asked.drive, end, asked.unload),),
-        weights=np.ones(1),
         duration=end,
         frequency=None,
         reference=None,
@@ -113,9 +111,9 @@ def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) ->
         end: of the motion, s.
         unload: whether the load is taken off again in the second half.
     """
-    planned = scene.motions[case]
-    path = np.asarray(planned(np.linspace(0, scene.duration, SAMPLES)))[:, :2]
-    site = scene.lattice.site[scene.driven]
+    planned = scene.loads.motions[case]
+    path = np.asarray(planned(np.linspace(0, scene.loads.duration, SAMPLES)))[:, :2]
+    site = scene.lattice.site[scene.loads.driven]
     return Shaken(
         planned,
         site - site.mean(axis=0),

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.collision.neighbour_list import MAX_STRANGERS, TERMS_PER_VERTEX
+from sim.collision.neighbour_list import MAX_NEW_PAIRS, TERMS_PER_VERTEX
 from sim.collision.polygons import ContactArrays, NeighbourCache
 from sim.core import Ints, NewContactPairs
-from sim.structure import ConcreteParameters, Lattice, close_pairs
+from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, close_pairs
 
 MARGIN = 1 / 15
 """Motion of a unit after which neighbours are searched for again, in lattice spacings."""
@@ -40,9 +40,9 @@ class CandidatePairs:
         """(n_vertices,) unit of each vertex."""
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
-    def with_pairs(self, strangers: Ints) -> CandidatePairs:
+    def with_pairs(self, new_pairs: Ints) -> CandidatePairs:
         """The same with more pairs (n, 2) of units."""
-        return replace(self, pairs=np.unique(np.concatenate([self.pairs, strangers]), axis=0))
+        return replace(self, pairs=np.unique(np.concatenate([self.pairs, new_pairs]), axis=0))
 
 
 def find_candidate_pairs(lattice: Lattice, distance: float) -> CandidatePairs:
@@ -61,53 +61,53 @@ def find_candidate_pairs(lattice: Lattice, distance: float) -> CandidatePairs:
 
 
 def contact_arrays(
-    meeting: CandidatePairs | None, values: ConcreteParameters, n_units: int
+    candidate_pairs: CandidatePairs | VoidAngleContact, values: ConcreteParameters, n_units: int
 ) -> ContactArrays:
-    """The kernels' arrays of concrete parameters; without pairs if there is nothing to meet."""
+    """Lays out the kernels' arrays of concrete parameters; no pairs where void angles count."""
     corner = np.array(values.corner, dtype=float, order="C")
-    if meeting is None:
+    if isinstance(candidate_pairs, VoidAngleContact):
         none = np.zeros(0, dtype=np.int64)
-        meeting = CandidatePairs(none.reshape(0, 2), none, none, 1.0, 1.0, 1.0)
-    n_vertices = len(meeting.following)
-    radius = np.zeros(len(meeting.first[1:]))
-    np.maximum.at(radius, meeting.owner, np.linalg.norm(corner[:n_vertices], axis=1))
-    scale = (meeting.distance / meeting.length) ** 2
+        candidate_pairs = CandidatePairs(none.reshape(0, 2), none, none, 1.0, 1.0, 1.0)
+    n_vertices = len(candidate_pairs.following)
+    radius = np.zeros(len(candidate_pairs.first[1:]))
+    np.maximum.at(radius, candidate_pairs.owner, np.linalg.norm(corner[:n_vertices], axis=1))
+    scale = (candidate_pairs.distance / candidate_pairs.length) ** 2
     return ContactArrays(
-        pairs=np.ascontiguousarray(meeting.pairs),
-        first=meeting.first,
-        owner=meeting.owner,
-        following=meeting.following,
+        pairs=np.ascontiguousarray(candidate_pairs.pairs),
+        first=candidate_pairs.first,
+        owner=candidate_pairs.owner,
+        following=candidate_pairs.following,
         corner=corner,
         centroid=np.array(values.centroid, dtype=float, order="C"),
         radius=radius,
         energy=float(values.contact.mean()) * scale,
         per_stiffness=scale / len(values.contact),
-        distance=meeting.distance,
-        reach=meeting.reach,
-        margin=MARGIN * meeting.reach,
-        watch=_watch(meeting, n_units),
+        distance=candidate_pairs.distance,
+        reach=candidate_pairs.reach,
+        margin=MARGIN * candidate_pairs.reach,
+        cache=_empty_cache(candidate_pairs, n_units),
     )
 
 
 def raise_new_pairs(contacts: ContactArrays) -> None:
     """Raises ``NewContactPairs`` if a solve ended since the tangent has no room for a pair."""
-    count = contacts.watch.found[1]
+    count = contacts.cache.found[1]
     if count > 0:
-        raise NewContactPairs(contacts.watch.strangers[:count].copy())
+        raise NewContactPairs(contacts.cache.new_pairs[:count].copy())
 
 
-def _watch(meeting: CandidatePairs, n_units: int) -> NeighbourCache:
+def _empty_cache(candidate_pairs: CandidatePairs, n_units: int) -> NeighbourCache:
     """Scratch that belongs to no state yet."""
-    n_vertices, n_watched = len(meeting.following), len(meeting.first[1:])
+    n_vertices, n_watched = len(candidate_pairs.following), len(candidate_pairs.first[1:])
     return NeighbourCache(
         state=np.full(3 * n_units, np.inf),
         place=np.zeros((n_vertices, 2)),
         centre=np.zeros((n_watched, 2)),
         searched=np.full(3 * n_units, np.inf),
         moved=np.zeros(n_watched),
-        gap=np.zeros(len(meeting.pairs)),
+        gap=np.zeros(len(candidate_pairs.pairs)),
         room=np.zeros(1),
-        strangers=np.zeros((MAX_STRANGERS, 2), dtype=np.int64),
+        new_pairs=np.zeros((MAX_NEW_PAIRS, 2), dtype=np.int64),
         terms=np.zeros((TERMS_PER_VERTEX * n_vertices, 3), dtype=np.int64),
         found=np.zeros(2, dtype=np.int64),
         overlap=np.full(2, -1),

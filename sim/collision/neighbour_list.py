@@ -3,7 +3,7 @@
 The broad phase sweeps all units and notes the gap of each pair of them that may meet. The gap of a
 pair shrinks by no more than its units have moved since, so most pairs are skipped without a look at
 their vertices; once any unit has moved by ``margin``, the sweep is repeated. Pairs whose coupling
-the tangent has no room for ("strangers") are noted before they come within reach: the state then
+the tangent has no room for ("new pairs") are noted before they come within reach: the state then
 counts as not admissible, and the solve is to be repeated with more room.
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from sim.collision.polygons import ContactArrays, crosses, gap_between, is_inside, place_vertices
 from sim.core import Floats, Ints, compiled
 
-MAX_STRANGERS = 256
+MAX_NEW_PAIRS = 256
 TERMS_PER_VERTEX = 16
 
 
@@ -36,35 +36,35 @@ def _position(a: int, b: int, pairs: Ints) -> int:
 @compiled
 def _note(a: int, b: int, contacts: ContactArrays) -> None:
     """Notes the gap of two units nearer than the reach."""
-    watch = contacts.watch
+    cache = contacts.cache
     gap = min(gap_between(a, b, contacts), contacts.reach)
     row = _position(a, b, contacts.pairs)
     if row >= 0:
-        watch.gap[row] = gap
+        cache.gap[row] = gap
         return
-    watch.room[0] = min(watch.room[0], gap)
-    if gap < contacts.distance + 2.0 * contacts.margin and watch.found[1] < MAX_STRANGERS:
-        watch.strangers[watch.found[1], 0], watch.strangers[watch.found[1], 1] = a, b
-        watch.found[1] += 1
+    cache.room[0] = min(cache.room[0], gap)
+    if gap < contacts.distance + 2.0 * contacts.margin and cache.found[1] < MAX_NEW_PAIRS:
+        cache.new_pairs[cache.found[1], 0], cache.new_pairs[cache.found[1], 1] = a, b
+        cache.found[1] += 1
 
 
 @compiled
 def _sweep(contacts: ContactArrays) -> None:
     """Notes the gaps of all pairs of units, in the order of their left ends."""
-    watch, radius = contacts.watch, contacts.radius
-    watch.gap[:] = contacts.reach
-    watch.room[0] = contacts.reach
-    left = watch.centre[:, 0] - radius
+    cache, radius = contacts.cache, contacts.radius
+    cache.gap[:] = contacts.reach
+    cache.room[0] = contacts.reach
+    left = cache.centre[:, 0] - radius
     order = np.argsort(left)
     for i in range(len(order)):
         one = order[i]
-        end = watch.centre[one, 0] + radius[one] + contacts.reach
+        end = cache.centre[one, 0] + radius[one] + contacts.reach
         for j in range(i + 1, len(order)):
             other = order[j]
             if left[other] > end:
                 break
-            dx = watch.centre[other, 0] - watch.centre[one, 0]
-            dy = watch.centre[other, 1] - watch.centre[one, 1]
+            dx = cache.centre[other, 0] - cache.centre[one, 0]
+            dy = cache.centre[other, 1] - cache.centre[one, 1]
             within = radius[one] + radius[other] + contacts.reach
             if dx * dx + dy * dy < within * within:
                 _note(min(one, other), max(one, other), contacts)
@@ -73,35 +73,35 @@ def _sweep(contacts: ContactArrays) -> None:
 @compiled
 def _follow_motion(motion: Floats, contacts: ContactArrays) -> None:
     """Bounds the motion since the last sweep; repeats it where that is due."""
-    watch = contacts.watch
+    cache = contacts.cache
     largest = 0.0
     for unit in range(len(contacts.radius)):
-        dx = motion[3 * unit] - watch.searched[3 * unit]
-        dy = motion[3 * unit + 1] - watch.searched[3 * unit + 1]
-        turn = abs(motion[3 * unit + 2] - watch.searched[3 * unit + 2])
-        watch.moved[unit] = math.sqrt(dx * dx + dy * dy) + contacts.radius[unit] * turn
-        largest = max(largest, watch.moved[unit])
+        dx = motion[3 * unit] - cache.searched[3 * unit]
+        dy = motion[3 * unit + 1] - cache.searched[3 * unit + 1]
+        turn = abs(motion[3 * unit + 2] - cache.searched[3 * unit + 2])
+        cache.moved[unit] = math.sqrt(dx * dx + dy * dy) + contacts.radius[unit] * turn
+        largest = max(largest, cache.moved[unit])
     if not largest <= contacts.margin:
-        watch.searched[:] = motion
-        watch.moved[:] = 0.0
+        cache.searched[:] = motion
+        cache.moved[:] = 0.0
         _sweep(contacts)
 
 
 @compiled
 def _append(v: int, p: int, q: int, contacts: ContactArrays) -> None:
-    watch = contacts.watch
-    if watch.found[0] == len(watch.terms):  # more than units with edges of any length can have
-        watch.found[0] = -1
-    if watch.found[0] >= 0:
-        term = watch.terms[watch.found[0]]
+    cache = contacts.cache
+    if cache.found[0] == len(cache.terms):  # more than units with edges of any length can have
+        cache.found[0] = -1
+    if cache.found[0] >= 0:
+        term = cache.terms[cache.found[0]]
         term[0], term[1], term[2] = v, p, q
-        watch.found[0] += 1
+        cache.found[0] += 1
 
 
 @compiled
 def _append_near(v: int, unit: int, with_vertices: bool, contacts: ContactArrays) -> None:
     """Appends the terms of vertex ``v`` with the edges, and vertices, of a unit."""
-    place, reach = contacts.watch.place, contacts.distance
+    place, reach = contacts.cache.place, contacts.distance
     for p in range(contacts.first[unit], contacts.first[unit + 1]):
         q = contacts.following[p]
         ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
@@ -116,21 +116,21 @@ def _append_near(v: int, unit: int, with_vertices: bool, contacts: ContactArrays
 @compiled
 def _collect(contacts: ContactArrays) -> None:
     """Lists the terms of all pairs within reach; none, and -1, if two units overlap."""
-    watch = contacts.watch
-    watch.found[0] = 0
+    cache = contacts.cache
+    cache.found[0] = 0
     for k in range(len(contacts.pairs)):
         a, b = contacts.pairs[k, 0], contacts.pairs[k, 1]
-        if watch.gap[k] - watch.moved[a] - watch.moved[b] >= contacts.distance:
+        if cache.gap[k] - cache.moved[a] - cache.moved[b] >= contacts.distance:
             continue
         for one, other in ((a, b), (b, a)):
             far = contacts.radius[other] + contacts.distance
             for v in range(contacts.first[one], contacts.first[one + 1]):
-                dx = watch.place[v, 0] - watch.centre[other, 0]
-                dy = watch.place[v, 1] - watch.centre[other, 1]
+                dx = cache.place[v, 0] - cache.centre[other, 0]
+                dy = cache.place[v, 1] - cache.centre[other, 1]
                 if dx * dx + dy * dy >= far * far:
                     continue
                 if is_inside(v, other, contacts) or crosses(v, other, contacts):
-                    watch.found[0], watch.overlap[0], watch.overlap[1] = -1, a, b
+                    cache.found[0], cache.overlap[0], cache.overlap[1] = -1, a, b
                     return
                 _append_near(v, other, one == a, contacts)
 
@@ -146,18 +146,18 @@ def is_same(one: Floats, other: Floats) -> bool:
 
 @compiled
 def find(motion: Floats, contacts: ContactArrays) -> int:
-    """Lists the vertices and edges in contact in a state (n_dofs,) in ``watch.terms``.
+    """Lists the vertices and edges in contact in a state (n_dofs,) in ``cache.terms``.
 
     Returns:
-        their number, or -1 if units overlap or strangers come close.
+        their number, or -1 if units overlap or a new pair comes close.
     """
-    watch = contacts.watch
-    if not is_same(motion, watch.state):
-        watch.state[:] = motion
+    cache = contacts.cache
+    if not is_same(motion, cache.state):
+        cache.state[:] = motion
         place_vertices(motion, contacts)
         _follow_motion(motion, contacts)
         _collect(contacts)
-    return -1 if watch.found[1] > 0 else watch.found[0]
+    return -1 if cache.found[1] > 0 else cache.found[0]
 
 
 @compiled
@@ -175,5 +175,5 @@ def pairs_in_contact(motion: Floats, contacts: ContactArrays) -> int:
 @compiled
 def term(k: int, contacts: ContactArrays) -> tuple[int, int, int]:
     """Vertex, and start and end of the edge (-1: its start alone), of the ``k``-th term found."""
-    row = contacts.watch.terms[k]
+    row = contacts.cache.terms[k]
     return row[0], row[1], row[2]

@@ -20,10 +20,10 @@ class NeighbourCache(NamedTuple):
         searched: (n_dofs,) the state of the last sweep.
         moved: (n_units,) bound of the motion of each unit's points since then, mm.
         gap: (n_pairs,) distance of the pairs then, or a lower bound of it, mm.
-        room: (1,) smallest distance of two strangers then, or a lower bound of it, mm.
-        strangers: (MAX_STRANGERS, 2) units of pairs that the tangent has no room for.
+        room: (1,) smallest distance of a new pair then, or a lower bound of it, mm.
+        new_pairs: (MAX_NEW_PAIRS, 2) units of pairs that the tangent has no room for.
         terms: (n, 3) vertex, and the start and end of an edge; the end is -1 for a vertex alone.
-        found: (2,) number of terms, -1 if the state is not admissible, and number of strangers.
+        found: (2,) number of terms, -1 if the state is not admissible, and number of new pairs.
         overlap: (2,) units that overlap, if the state is not admissible.
     """
 
@@ -34,7 +34,7 @@ class NeighbourCache(NamedTuple):
     moved: Floats
     gap: Floats
     room: Floats
-    strangers: Ints
+    new_pairs: Ints
     terms: Ints
     found: Ints
     overlap: Ints
@@ -56,7 +56,7 @@ class ContactArrays(NamedTuple):
         distance: activation distance, mm.
         reach: distance up to which the sweep finds pairs, mm.
         margin: motion of a unit after which it is repeated, mm.
-        watch: scratch.
+        cache: scratch.
     """
 
     pairs: Ints
@@ -71,22 +71,22 @@ class ContactArrays(NamedTuple):
     distance: float
     reach: float
     margin: float
-    watch: NeighbourCache
+    cache: NeighbourCache
 
 
 @compiled
 def place_vertices(motion: Floats, contacts: ContactArrays) -> None:
     """Notes the positions of all vertices and centroids in a state."""
-    watch = contacts.watch
+    cache = contacts.cache
     for unit in range(len(contacts.radius)):
         c, s = math.cos(motion[3 * unit + 2]), math.sin(motion[3 * unit + 2])
         x = contacts.centroid[unit, 0] + motion[3 * unit]
         y = contacts.centroid[unit, 1] + motion[3 * unit + 1]
-        watch.centre[unit, 0], watch.centre[unit, 1] = x, y
+        cache.centre[unit, 0], cache.centre[unit, 1] = x, y
         for v in range(contacts.first[unit], contacts.first[unit + 1]):
             rx, ry = contacts.corner[v, 0], contacts.corner[v, 1]
-            watch.place[v, 0] = x + c * rx - s * ry
-            watch.place[v, 1] = y + s * rx + c * ry
+            cache.place[v, 0] = x + c * rx - s * ry
+            cache.place[v, 1] = y + s * rx + c * ry
 
 
 @compiled
@@ -103,7 +103,7 @@ def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
 @compiled
 def is_inside(v: int, unit: int, contacts: ContactArrays) -> bool:
     """Whether vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
-    place, inside = contacts.watch.place, False
+    place, inside = contacts.cache.place, False
     x, y = place[v, 0], place[v, 1]
     for p in range(contacts.first[unit], contacts.first[unit + 1]):
         q = contacts.following[p]
@@ -124,7 +124,7 @@ def _side(p: int, q: int, v: int, place: Floats) -> bool:
 @compiled
 def crosses(v: int, unit: int, contacts: ContactArrays) -> bool:
     """Whether the edge that starts at ``v`` crosses one of a unit's."""
-    place, w = contacts.watch.place, contacts.following[v]
+    place, w = contacts.cache.place, contacts.following[v]
     for p in range(contacts.first[unit], contacts.first[unit + 1]):
         q = contacts.following[p]
         apart = _side(v, w, p, place) == _side(v, w, q, place)
@@ -143,5 +143,5 @@ def gap_between(a: int, b: int, contacts: ContactArrays) -> float:
                 return 0.0
             for p in range(contacts.first[other], contacts.first[other + 1]):
                 q = contacts.following[p]
-                smallest = min(smallest, _square_to_edge(v, p, q, contacts.watch.place))
+                smallest = min(smallest, _square_to_edge(v, p, q, contacts.cache.place))
     return math.sqrt(smallest)

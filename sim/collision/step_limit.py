@@ -86,7 +86,7 @@ def _pass_unit(
     one: int, other: int, largest: float, step: Floats, contacts: ContactArrays
 ) -> float:
     """``largest``, or less: the multiple up to which no vertex of ``one`` meets ``other``."""
-    centre, place = contacts.watch.centre, contacts.watch.place
+    centre, place = contacts.cache.centre, contacts.cache.place
     w = (centre[one, 0] - centre[other, 0], centre[one, 1] - centre[other, 1])
     d = (step[3 * one] - step[3 * other], step[3 * one + 1] - step[3 * other + 1])
     spin = step[3 * other + 2]
@@ -117,7 +117,7 @@ def _pass_edge(
 
     ``path`` is w, d, r and ``turning`` the spins of ``_at`` with the bound of the curvature.
     """
-    place, centre, q = contacts.watch.place, contacts.watch.centre, contacts.following[p]
+    place, centre, q = contacts.cache.place, contacts.cache.centre, contacts.following[p]
     (w, d, r), (spin, relative, bent) = path, turning
     ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
     length = math.sqrt(ex * ex + ey * ey)
@@ -142,18 +142,18 @@ def collision_free_step(motion: Floats, contacts: ContactArrays, step: Floats) -
     """Multiple of ``step`` (n_dofs,) up to which no two units meet; inf if beyond FAR."""
     if find(motion, contacts) < 0:
         return 0.0
-    watch, fastest = contacts.watch, 0.0
+    cache, fastest = contacts.cache, 0.0
     sway = np.empty(len(contacts.radius))
     for unit in range(len(sway)):
         sway[unit] = math.hypot(step[3 * unit], step[3 * unit + 1])
         sway[unit] += contacts.radius[unit] * abs(step[3 * unit + 2])
-        fastest = max(fastest, watch.moved[unit] + FAR * sway[unit])
+        fastest = max(fastest, cache.moved[unit] + FAR * sway[unit])
     largest = FAR
-    if 2.0 * fastest > watch.room[0]:  # strangers meet no sooner than this
-        largest = _room_for_strangers(sway, contacts)
+    if 2.0 * fastest > cache.room[0]:  # new pairs meet no sooner than this
+        largest = _room_for_new_pairs(sway, contacts)
     for k in range(len(contacts.pairs)):
         a, b = contacts.pairs[k, 0], contacts.pairs[k, 1]
-        gap = watch.gap[k] - watch.moved[a] - watch.moved[b]
+        gap = cache.gap[k] - cache.moved[a] - cache.moved[b]
         if gap < largest * (sway[a] + sway[b]):
             largest = _pass_unit(a, b, largest, step, contacts)
             largest = _pass_unit(b, a, largest, step, contacts)
@@ -161,7 +161,7 @@ def collision_free_step(motion: Floats, contacts: ContactArrays, step: Floats) -
 
 
 @compiled
-def _room_for_strangers(sway: Floats, contacts: ContactArrays) -> float:
-    watch = contacts.watch
-    left = watch.room[0] - 2.0 * watch.moved.max()
+def _room_for_new_pairs(sway: Floats, contacts: ContactArrays) -> float:
+    cache = contacts.cache
+    left = cache.room[0] - 2.0 * cache.moved.max()
     return min(FAR, max(left, 0.0) / max(2.0 * sway.max(), 1e-300))

@@ -11,7 +11,13 @@ from sim.collision import CandidatePairs, find_candidate_pairs
 from sim.core import Floats, Ints
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Pattern, number_free_dofs
-from sim.structure import ConcreteParameters, Lattice
+from sim.structure import (
+    ConcreteParameters,
+    ContactModel,
+    DistanceContact,
+    Lattice,
+    VoidAngleContact,
+)
 
 
 @dataclass(frozen=True)
@@ -22,29 +28,29 @@ class Topology:
         ligament_units: (n_ligaments, 2).
         site: (n_units, 2) where the units are, mm.
         held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending.
-        barrier, cutoff: contact angles, rad.
         designed: (n_designed,) ligaments whose parameters may be differentiated by.
         rotation_scale: length that makes rotations comparable with displacements, mm.
-        meeting: the units that may meet, if contact acts on their distance; without it contact
-            acts on the void angles.
+        contact: the law on void angles, or the pairs of units that the law on distances acts on.
     """
 
     ligament_units: Ints
     site: Floats
     held: Ints
-    barrier: float
-    cutoff: float
     designed: Ints
     rotation_scale: float
-    meeting: CandidatePairs | None = None
+    contact: VoidAngleContact | CandidatePairs
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:
         """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
-        coupled = self.ligament_units
-        if self.meeting is not None:
-            coupled = np.concatenate([coupled, self.meeting.pairs])
-        return number_free_dofs(self.site, coupled, self.held)
+        return number_free_dofs(self.site, self.coupled_units, self.held)
+
+    @property
+    def coupled_units(self) -> Ints:
+        """(n, 2) pairs of units that the tangent couples."""
+        if isinstance(self.contact, VoidAngleContact):
+            return self.ligament_units
+        return np.concatenate([self.ligament_units, self.contact.pairs])
 
     @cached_property
     def free_dofs(self) -> Ints:
@@ -54,8 +60,8 @@ class Topology:
 
     def coupling(self, pairs: Ints) -> Topology:
         """The same with room in the tangent for contact of more pairs (n, 2) of units."""
-        assert self.meeting is not None
-        return replace(self, meeting=self.meeting.with_pairs(pairs))
+        assert isinstance(self.contact, CandidatePairs)
+        return replace(self, contact=self.contact.with_pairs(pairs))
 
     @property
     def n_units(self) -> int:
@@ -77,15 +83,13 @@ class Topology:
 
         If contact acts on the distance of units, there is none in any ligament.
         """
-        n = len(self.ligament_units)
-        if self.meeting is not None:
-            touching = np.zeros(0, dtype=np.int64)
-        contact = np.empty((n, 3))
+        n, law = len(self.ligament_units), self.contact
+        contact = np.full((n, 3), -np.inf)
         contact[:, 0] = values.contact
-        by_angle = self.meeting is None
-        contact[:, 1], contact[:, 2] = (
-            (self.barrier, self.cutoff) if by_angle else (-np.inf, -np.inf)
-        )
+        if isinstance(law, VoidAngleContact):
+            contact[:, 1:] = law.barrier, law.cutoff
+        else:
+            touching = np.zeros(0, dtype=np.int64)
         return NetworkArrays(
             unit=self.ligament_units,
             arm=np.array(values.arm, dtype=float, order="C"),
@@ -113,16 +117,9 @@ class Topology:
 
 
 def topology(
-    lattice: Lattice,
-    held: Ints,
-    barrier: float,
-    cutoff: float,
-    designed_units: Ints | None = None,
-    distance: float | None = None,
+    lattice: Lattice, held: Ints, contact: ContactModel, designed_units: Ints | None = None
 ) -> Topology:
-    """Topology of a lattice whose dofs ``held`` are prescribed.
-
-    With a ``distance`` (mm), contact acts on units nearer than that to one another.
+    """Joins the units of a lattice whose dofs ``held`` are prescribed.
 
     Without ``designed_units`` every ligament's parameters can be differentiated by; with them only
     those of the ligaments of these units, which must be all units with a vertex that the design
@@ -138,9 +135,9 @@ def topology(
         ligament_units=np.ascontiguousarray(units),
         site=lattice.site,
         held=np.unique(held),
-        barrier=barrier,
-        cutoff=cutoff,
         designed=designed,
         rotation_scale=lattice.spacing / 2,
-        meeting=None if distance is None else find_candidate_pairs(lattice, distance),
+        contact=find_candidate_pairs(lattice, contact.distance)
+        if isinstance(contact, DistanceContact)
+        else contact,
     )

@@ -53,7 +53,7 @@ def _frame(
     v: int, p: int, q: int, contacts: ContactArrays
 ) -> tuple[float, float, float, float, float]:
     """Direction of an edge, its length, and the vertex's distance s and position x."""
-    place = contacts.watch.place
+    place = contacts.cache.place
     ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
     length = math.sqrt(ex * ex + ey * ey)
     tx, ty = ex / length, ey / length
@@ -90,7 +90,7 @@ def _vertex_slopes(
     v: int, p: int, contacts: ContactArrays
 ) -> tuple[float, float, float, float, float, float]:
     """Energy of two vertices, its gradient (x, y) and Hessian (xx, xy, yy) by the first."""
-    place = contacts.watch.place
+    place = contacts.cache.place
     dx, dy = place[v, 0] - place[p, 0], place[v, 1] - place[p, 1]
     energy, slope, twice = _barrier(dx * dx + dy * dy, contacts)
     slope, twice = 2.0 * slope, 4.0 * twice
@@ -126,8 +126,8 @@ def _slopes(
 @compiled
 def _arms(v: int, a: int, b: int, contacts: ContactArrays) -> tuple[float, float, float, float]:
     """Arms of a vertex from the centroids of its own unit and of the other."""
-    x, y = contacts.watch.place[v, 0], contacts.watch.place[v, 1]
-    centre = contacts.watch.centre
+    x, y = contacts.cache.place[v, 0], contacts.cache.place[v, 1]
+    centre = contacts.cache.centre
     return x - centre[a, 0], y - centre[a, 1], x - centre[b, 0], y - centre[b, 1]
 
 

@@ -15,7 +15,7 @@ from sim.energy.connectivity import Topology
 from sim.energy.ligament import LigamentStrain, ligament_strain
 from sim.energy.system import System, system_of
 from sim.energy.total import gradient
-from sim.structure import ConcreteParameters
+from sim.structure import ConcreteParameters, VoidAngleContact
 
 
 class Observables(NamedTuple):
@@ -41,6 +41,10 @@ class Observables(NamedTuple):
     shear: Floats
     bend: Floats
 
+    def force_on(self, units: Ints) -> Floats:
+        """Sums the reactions on units to a force (n_states, 2), N."""
+        return np.asarray(self.reaction[:, units, :2].sum(axis=1))
+
 
 @compiled
 def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pairs: Ints) -> None:
@@ -63,7 +67,7 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
         return observe(topology.coupling(met.pairs), values, motion)
     reaction = np.full_like(states, np.nan)
     reaction[:, topology.held] = forces[:, topology.held]
-    voids = topology.smallest_void_angles(values.void, motion)
+    law, voids = topology.contact, topology.smallest_void_angles(values.void, motion)
     given = (jnp.asarray(part) for part in (values.arm, values.vector, motion))
     strain = _largest_strains(topology.ligament_units, *given)
     return Observables(
@@ -71,7 +75,7 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
         energies[:, 1],
         reaction.reshape(motion.shape),
         voids.min(axis=1, initial=np.pi),
-        near if topology.meeting else (voids < topology.cutoff).sum(axis=1),
+        (voids < law.cutoff).sum(axis=1) if isinstance(law, VoidAngleContact) else near,
         *(np.asarray(part) for part in strain),
     )
 

@@ -99,7 +99,7 @@ def system_of(
     free, pattern = topology.numbering
     return System(
         net=topology.network(values, touching),
-        contacts=contact_arrays(topology.meeting, values, topology.n_units),
+        contacts=contact_arrays(topology.contact, values, topology.n_units),
         mass=np.array(values.mass, dtype=float, order="C").ravel(),
         damping=np.array(values.damping, dtype=float, order="C").ravel(),
         free=free,

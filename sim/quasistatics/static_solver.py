@@ -10,7 +10,7 @@ from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
 from sim.quasistatics.equilibrium_path import adjoint, follow
-from sim.solvers import PrescribedMotion, refuse_floating, refuse_start
+from sim.solvers import PrescribedMotion, check_connected, check_start
 from sim.structure import ConcreteParameters
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
@@ -23,10 +23,10 @@ class StaticRecord:
     """What the reverse sweep of one case needs.
 
     Attributes:
-        states: (n_asked, n_dofs) equilibria.
-        tangents: (n_asked, n_dofs) step to each along the path's tangent at the one before.
-        stable: (n_asked,) whether each is a minimum of the energy.
-        jumped: (n_asked,) whether the structure jumped on the way there: its path ended in a limit
+        states: (n_times, n_dofs) equilibria.
+        tangents: (n_times, n_dofs) step to each along the path's tangent at the one before.
+        stable: (n_times,) whether each is a minimum of the energy.
+        jumped: (n_times,) whether the structure jumped on the way there: its path ended in a limit
             point or branched.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
         topology: as solved, with room for all units that met; None if it was the solver's.
@@ -42,13 +42,13 @@ class StaticRecord:
 
 @dataclass(frozen=True)
 class StaticSolver:
-    """Finds the equilibria of one case at the asked load parameters (``dynamics.Solver``).
+    """Finds the equilibria of one case at the asked load parameters (``Solver``).
 
     The load parameter takes the place of time; the velocities of free dofs are zero.
 
     Attributes:
         topology: the structure.
-        asked: (n_asked,) load parameters, in the order in which they are passed.
+        output_times: (n_times,) load parameters, in the order in which they are passed.
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
         threads: cases solved side by side.
@@ -60,7 +60,7 @@ class StaticSolver:
     """
 
     topology: Topology
-    asked: Floats
+    output_times: Floats
     relative: float = 1e-10
     absolute: float = 1e-11
     threads: int = 1
@@ -73,15 +73,15 @@ class StaticSolver:
         return replace(self, relative=self.relative / 100, start=None, substeps=2 * self.substeps)
 
     def coupling(self, pairs: Ints) -> StaticSolver:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         return replace(self, topology=self.topology.coupling(pairs))
 
     def forward(
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, StaticRecord]:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         top = self.topology
-        refuse_floating(top)
+        check_connected(top)
         loads = drive.values(top.held, self._passed)
         states, tangents = (np.zeros((len(loads), top.n_dofs)) for _ in range(2))
         stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
@@ -92,7 +92,7 @@ class StaticSolver:
             initial=0
         )
         floor = max(self.absolute, rounding * float(values.law[:, 0].max()))
-        refuse_start(top, values, system.contacts, np.zeros(top.n_dofs))
+        check_start(top, values, system.contacts, np.zeros(top.n_dofs))
         reached, fraction = follow(
             loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
             counts,
@@ -103,7 +103,7 @@ class StaticSolver:
             unit = int(top.ligament_units[where, 0])
             raise SimulationError(
                 f"no equilibrium found beyond load {reached // self.substeps} of"
-                f" {len(self.asked)} (at {fraction:.3g} of"
+                f" {len(self.output_times)} (at {fraction:.3g} of"
                 f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
                 " stable state; try a smaller load or more load steps",
                 step=reached // self.substeps,
@@ -119,10 +119,10 @@ class StaticSolver:
 
     @property
     def _passed(self) -> Floats:
-        """(n_asked * substeps,) load parameters of all loads passed; the path starts at zero."""
-        way = np.diff(self.asked, prepend=0.0)
+        """(n_times * substeps,) load parameters of all loads passed; the path starts at zero."""
+        way = np.diff(self.output_times, prepend=0.0)
         left = np.arange(self.substeps - 1, -1, -1) / self.substeps
-        return (self.asked[:, None] - way[:, None] * left).ravel()
+        return (self.output_times[:, None] - way[:, None] * left).ravel()
 
     def _known(self, states: Floats) -> tuple[Floats, Ints]:
         """Departure of the start's path from its tangents, and where it may serve."""
@@ -135,7 +135,7 @@ class StaticSolver:
     def backward(
         self, values: ConcreteParameters, record: StaticRecord, bar_u: Floats, bar_v: Floats
     ) -> tuple[ConcreteParameters, Floats, Floats]:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         del bar_v
         top = record.topology or self.topology
         system = system_of(top, values)
@@ -147,4 +147,4 @@ class StaticSolver:
                 " gradient to follow; try another design or more load steps",
                 step=unstable,
             )
-        return as_values(bars), self.asked, bars.drive
+        return as_values(bars), self.output_times, bars.drive

@@ -1,110 +1,32 @@
-"""Loss and gradient of a design: what the optimisers see."""
+"""Evaluates designs: loss and gradient by the adjoint, and the design that minimises the loss."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol
+from functools import lru_cache
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.core import Floats, Ints
+from sim.constraints import ConstraintVector, Limits
+from sim.core import Floats
+from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
+from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
-from sim.scene.objectives import (
-    DisplacementMimicking,
-    RelativeMimicking,
-    StrainEnergyMimicking,
-    combined,
-    extent,
-)
-from sim.scene.plan import Plan, concrete_parameters, make_plan
+from sim.scene.objectives import combined
+from sim.scene.plan import Plan, make_plan
 from sim.scene.scene import Scene
-from sim.solvers import PrescribedMotion, Solver, base, simulate
-from sim.structure import ConcreteParameters, Parameters, parameters, shape
-from sim.time_integration import simpson_weights
+from sim.scene.simulation import mimicking, parameters_of_design
+from sim.scene.warm_starts import Paths
+from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, solve_cases
+from sim.structure import Parameters
 
-Objective = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
-
-
-def objective(
-    scene: Scene, target: Floats | None = None, weights: Floats | None = None
-) -> Objective:
-    """The scene's loss.
-
-    On samples it is the mean over the duration, by Simpson's rule; on load steps an energy is
-    averaged. A motion to mimic gives a relative error: on samples the root of the mean square over
-    the target's greatest size, on load steps the root of the sum of squares over its size at the
-    last step (the authors' measure).
-
-    Args:
-        scene: the scene.
-        target: (n_cases, n_asked, n_region, 3) what ``target_motion`` returned; it is simulated
-            anew if a scene with a reference comes without.
-        weights: (n_asked,) of other samples than the scene's own.
-    """
-    lattice, given = scene.lattice, _weights(scene) if weights is None else weights
-    if scene.objective == "strain_energy":
-        ligaments = scene.region_ligaments
-        return StrainEnergyMimicking(ligaments, lattice.ligament_units[ligaments], given)
-    if scene.reference is None:
-        return DisplacementMimicking(scene.region, lattice.spacing, given)
-    aim = target_motion(scene) if target is None else target
-    size = extent(aim, lattice.spacing)
-    whole = size.max(axis=1) if scene.steps is None else size[:, -1] / np.sqrt(scene.steps)
-    return RelativeMimicking(scene.region, lattice.spacing, given, aim, whole)
-
-
-def _weights(scene: Scene) -> Floats:
-    if scene.steps is None:
-        return simpson_weights(scene.samples, 1.0)
-    return np.full(scene.steps, 1 / scene.steps)
-
-
-def target_motion(scene: Scene, threads: int = 1) -> Floats:
-    """Motion (n_cases, n_asked, n_region, 3) of the reference's region at the loss's samples.
-
-    Raises:
-        SimulationError: the reference cannot be simulated.
-    """
-    reference = scene.reference
-    if reference is None:
-        raise ValueError("the scene has no reference: it is compared with rest")
-    plan = make_plan(reference, reference.lattice.vertices, threads=threads, every_case=True)
-    values = concrete_parameters(reference, reference.lattice.vertices)
-    motion, _, _ = base.forward(plan.solver, values, reference.drives)
-    return motion[:, :, reference.region]
-
-
-def structure(scene: Scene, shifts: Floats | None = None) -> Callable[[Array], Parameters]:
-    """Compiled map from a design vector to the parameters of its structure.
-
-    With ``shifts`` (n_groups, 2) in mm, to those of an imperfect copy of it.
-    """
-    off = 0.0 if shifts is None else jnp.asarray(shifts)[scene.lattice.group]
-
-    @jax.jit
-    def of_design(design: Array) -> Parameters:
-        made = shape(scene.lattice, scene.space.vertices(design) + off)
-        return parameters(scene.lattice, made, scene.material)
-
-    return of_design
-
-
-def losses(scene: Scene, plan: Plan) -> Callable[[Array], Array]:
-    """Differentiable map from a design vector to the losses (n_cases,) of all load cases."""
-    of_design = structure(scene)
-    measure = jax.jit(objective(scene).__call__)
-    drives, place = _simulated(scene, plan)
-
-    def of_cases(design: Array) -> Array:
-        values = of_design(design)
-        response = simulate(plan.solver, values, drives)
-        return measure(response.displacement, values)[place]
-
-    return of_cases
+CONFIRMING = 4
+"""Loads passed for each of the loss when a design's loss is confirmed."""
 
 
 class Memory(Protocol):
@@ -119,80 +41,57 @@ class Memory(Protocol):
         ...
 
 
-def evaluator(
-    scene: Scene, plan: Plan, memory: Memory | None = None
-) -> Callable[[Floats], tuple[float, Floats, Floats]]:
-    """Function from a design vector to loss, gradient (n_variables,) and losses of all cases.
+class GradientChain:
+    """Computes a value of simulated motions and its gradient: design, parameters, motion, value.
 
-    With a ``memory`` the paths of a static scene start from those that it offers; where imperfect
-    copies are simulated, none does.
-
-    It raises ``SimulationError`` where the simulation fails.
-    """
-    drives, place = _simulated(scene, plan)
-    weights, measure = jnp.asarray(scene.weights), objective(scene)
-
-    def mean(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
-        each = measure(displacement, values)[place]
-        return combined(each, weights, scene.sharpness), each
-
-    if scene.copies is None:
-        return value_and_gradient(structure(scene), mean, plan.solver, drives, memory)
-    made = [
-        value_and_gradient(structure(scene, shifts), mean, plan.solver, drives)
-        for shifts in scene.copies
-    ]
-    return lambda design: _averaged([copy(design) for copy in made])
-
-
-def _averaged(found: list[tuple[float, Floats, Floats]]) -> tuple[float, Floats, Floats]:
-    value, gradient, each = (np.mean(part, axis=0) for part in zip(*found, strict=True))
-    return float(value), gradient, each
-
-
-def _simulated(scene: Scene, plan: Plan) -> tuple[tuple[PrescribedMotion, ...], Ints]:
-    """Drives of the simulated cases, and the one among them that each load case stands for."""
-    drives = tuple(scene.drives[case] for case in plan.simulated)
-    return drives, np.searchsorted(plan.simulated, plan.case_of)
-
-
-def value_and_gradient(
-    of_design: Callable[[Array], Parameters[Array]],
-    measure: Callable[[Array, Parameters[Array]], tuple[Array, Array]],
-    solver: Solver,
-    drives: tuple[PrescribedMotion, ...],
-    memory: Memory | None = None,
-) -> Callable[[Floats], tuple[float, Floats, Floats]]:
-    """Compiled chain design -> parameters -> motion -> value, with its gradient.
-
-    The same as ``jax.value_and_grad`` through ``simulate``, without tracing it at every call.
+    The same as ``jax.value_and_grad`` through ``differentiable_motion``, but compiled once.
 
     Args:
         of_design: differentiable map of a design vector to parameters.
-        measure: value and further numbers of displacements (n_cases, n_asked, n_units, 3) and
-            parameters.
-        solver: of the motion.
-        drives: of the cases.
-        memory: of equilibrium paths, for static solvers.
+        measure: value and further numbers of displacements (n_cases, n_times, n_units, 3),
+            parameters, and what a call passes besides.
     """
-    forwards = jax.jit(of_design)
-    measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
-    pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
 
-    def evaluate(design: Floats) -> tuple[float, Floats, Floats]:
-        made = forwards(design)
-        values = ConcreteParameters(*(np.asarray(part) for part in made))
-        motion, velocity, records = base.forward(solver, values, drives, _started(solver, memory))
+    def __init__(
+        self,
+        of_design: Callable[[Array], Parameters[Array]],
+        measure: Callable[..., tuple[Array, Any]],
+    ) -> None:
+        self._parameters = jax.jit(of_design)
+        self._measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
+        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
+
+    def __call__(
+        self,
+        design: Floats,
+        *passed: Any,  # noqa: ANN401  (what the measure takes)
+        solver: Solver,
+        cases: Sequence[PrescribedMotion],
+        memory: Memory | None = None,
+    ) -> tuple[float, Floats, Floats]:
+        """Value, gradient (n_variables,) and further numbers of a design.
+
+        Args:
+            design: (n_variables,).
+            *passed: to the measure.
+            solver: of the motion.
+            cases: what drives it.
+            memory: of equilibrium paths, for static solvers.
+
+        Raises:
+            SimulationError: a step failed, or an equilibrium is not stable.
+        """
+        made = self._parameters(design)
+        motion, velocity, records = solve_cases(
+            solver, concrete(made), cases, _started(solver, memory)
+        )
         if memory is not None and isinstance(solver, StaticSolver):
             memory.keep(design, records.records)
-        (value, more), (bar_motion, direct) = measured(motion, made)
-        through = base.backward(
-            solver, records, np.asarray(bar_motion), np.zeros_like(velocity)
-        ).parameters
+        (value, more), (bar_motion, direct) = self._measured(motion, made, *passed)
+        still = np.zeros_like(velocity)
+        through = adjoint_cases(solver, records, np.asarray(bar_motion), still).parameters
         bar = Parameters(*(one + two for one, two in zip(direct, through, strict=True)))
-        return float(value), np.asarray(pull_back(design, bar)), np.asarray(more)
-
-    return evaluate
+        return float(value), np.asarray(self._pull_back(design, bar)), np.asarray(more)
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
@@ -201,3 +100,137 @@ def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
         return None
     records = memory.start()
     return None if records is None else [replace(solver, start=record) for record in records]
+
+
+class Evaluator:
+    """Computes loss, gradient and losses of the designs of a scene; compiled once.
+
+    Args:
+        scene: the scene.
+        plan: of `make_plan`; by default one from the initial structure.
+        memory: of equilibrium paths, that those of a static scene start from; unused where
+            imperfect copies are simulated.
+
+    Raises:
+        ValueError: the scene has nothing to redesign, or no region of interest.
+    """
+
+    def __init__(
+        self, scene: Scene, plan: Plan | None = None, memory: Memory | None = None
+    ) -> None:
+        self.scene, self.plan = scene, plan or make_plan(scene)
+        if scene.space.n_variables == 0:
+            raise ValueError("the design of the scene has no cloak that could change")
+        simulated, copies = self.plan.simulated, scene.design.copies
+        place = np.searchsorted(simulated, self.plan.case_of)
+        weights, measure = jnp.asarray(scene.loads.case_weights), mimicking(scene)
+
+        def mean(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
+            each = measure(displacement, values)[place]
+            return combined(each, weights, scene.objective.sharpness), each
+
+        self._cases = tuple(scene.loads.cases[case] for case in simulated)
+        self._memory = memory if copies is None else None
+        numbers = [None] if copies is None else range(len(copies))
+        self._chains = [GradientChain(parameters_of_design(scene, k), mean) for k in numbers]
+
+    def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
+        """Loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design vector, mm.
+
+        Raises:
+            SimulationError: the simulation fails.
+        """
+        solver = self.plan.solver
+        found = [
+            chain(design, solver=solver, cases=self._cases, memory=self._memory)
+            for chain in self._chains
+        ]
+        if self.scene.design.copies is None:
+            return found[0]
+        value, gradient, each = (np.mean(part, axis=0) for part in zip(*found, strict=True))
+        return float(value), gradient, each
+
+
+_evaluator = lru_cache(maxsize=4)(Evaluator)
+
+
+def evaluate(
+    scene: Scene, design: Floats | None = None, plan: Plan | None = None
+) -> tuple[float, Floats]:
+    """Computes the loss of a design and its gradient, by the adjoint of the steps taken.
+
+    It is plain NumPy, without transforms of JAX; a loss of one's own is differentiated through
+    `simulate`. What is compiled for a scene is kept.
+
+    Args:
+        scene: the scene, with an objective and a design.
+        design: (n_variables,) design vector, mm; by default the initial structure.
+        plan: of `make_plan`; by default one from the initial structure.
+
+    Returns:
+        the loss, and its gradient (n_variables,) per mm.
+
+    Raises:
+        SimulationError: the simulation fails.
+        ValueError: the scene has nothing to redesign, or no region of interest.
+    """
+    chosen = np.zeros(scene.space.n_variables) if design is None else design
+    loss, gradient, _ = _evaluator(scene, plan)(chosen)
+    return loss, gradient
+
+
+def minimise(
+    scene: Scene,
+    limits: Limits,
+    start: Floats | None = None,
+    *,
+    options: SqpOptions | MmaOptions | None = None,
+    plan: Plan | None = None,
+    journal: Journal | None = None,
+    paths: Paths | None = None,
+    callback: Callable[[Evaluation], None] | None = None,
+) -> Result:
+    """Minimises the loss of a scene over the designs that can be made.
+
+    Args:
+        scene: the scene, with an objective and a design.
+        limits: what a design must keep to.
+        start: (n_variables,) design vector, mm; by default the initial structure.
+        options: of the method, which they choose; by default SQP with its own.
+        plan: of `make_plan`; by default one from the initial structure.
+        journal: of evaluations, from which an interrupted run resumes exactly.
+        paths: of equilibria, that evaluations of a static scene start from.
+        callback: called with each evaluation as it is recorded.
+
+    Raises:
+        InfeasibleStartError: no feasible design near the start.
+        SimulationError: the start cannot be simulated.
+    """
+    made = plan or make_plan(scene)
+    computed = Evaluator(scene, made, paths)
+
+    def record(evaluation: Evaluation) -> None:
+        if paths is not None:
+            paths.accept(evaluation)
+        if callback is not None:
+            callback(evaluation)
+
+    return minimise_loss(
+        "mma" if isinstance(options, MmaOptions) else "sqp",
+        computed if journal is None else journal.wrap(computed),
+        ConstraintVector(scene.space, limits),
+        np.zeros(scene.space.n_variables) if start is None else start,
+        options=options,
+        callback=record,
+        confirm=_from_rest(scene, made),
+    )
+
+
+def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
+    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
+
+    A path that starts from that of a similar design, or steps far, may pass where it should end.
+    """
+    if not isinstance(plan.solver, StaticSolver):
+        return None
+    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))

@@ -20,7 +20,7 @@ class DisplacementMimicking(NamedTuple):
     Attributes:
         units: (n,) region of interest.
         spacing: s, mm.
-        weights: (n_asked,) quadrature weights.
+        weights: (n_times,) quadrature weights.
     """
 
     units: Ints
@@ -28,7 +28,7 @@ class DisplacementMimicking(NamedTuple):
     weights: Floats
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
         del parameters
         normalised = displacement[:, :, self.units] / scales(self.spacing)
         return jnp.einsum("ctud,ctud,t->c", normalised, normalised, self.weights)
@@ -40,8 +40,8 @@ class RelativeMimicking(NamedTuple):
     Attributes:
         units: (n,) region of interest.
         spacing: s, mm.
-        weights: (n_asked,) quadrature weights.
-        target: (n_cases, n_asked, n, 3) displacement to mimic, mm, mm, rad.
+        weights: (n_times,) quadrature weights.
+        target: (n_cases, n_times, n, 3) displacement to mimic, mm, mm, rad.
         size: (n_cases,) what counts as 1.
     """
 
@@ -52,7 +52,7 @@ class RelativeMimicking(NamedTuple):
     size: Floats
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
         del parameters
         missed = (displacement[:, :, self.units] - self.target) / scales(self.spacing)
         return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
@@ -72,7 +72,7 @@ def scales(spacing: float) -> Floats:
 
 
 def extent(motion: Floats, spacing: float) -> Floats:
-    """Size |U| (n_cases, n_asked) of a region's motion (n_cases, n_asked, n, 3)."""
+    """Size |U| (n_cases, n_times) of a region's motion (n_cases, n_times, n, 3)."""
     return np.asarray(np.linalg.norm(motion / scales(spacing), axis=(2, 3)))
 
 
@@ -82,7 +82,7 @@ class StrainEnergyMimicking(NamedTuple):
     Attributes:
         ligaments: (n,) ligaments that touch the region.
         ligament_units: (n, 2) units that they join.
-        weights: (n_asked,) quadrature weights.
+        weights: (n_times,) quadrature weights.
     """
 
     ligaments: Ints
@@ -90,7 +90,7 @@ class StrainEnergyMimicking(NamedTuple):
     weights: Floats
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Losses (n_cases,) of displacements (n_cases, n_asked, n_units, 3)."""
+        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
         energies = strain_energies(displacement, parameters, self.ligaments, self.ligament_units)
         return jnp.einsum("ctl,t->c", energies, self.weights)
 

@@ -10,7 +10,7 @@ import numpy as np
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene.scene import Accuracy, Scene
-from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, refuse_idle
+from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, check_free_dofs
 from sim.structure import (
     QUARTER_TURN,
     ConcreteParameters,
@@ -101,7 +101,7 @@ class Plan:
 def make_plan(
     scene: Scene,
     vertices: Floats | None = None,
-    asked: Floats | None = None,
+    times: Floats | None = None,
     threads: int = 1,
     every_case: bool = False,
 ) -> Plan:
@@ -111,23 +111,23 @@ def make_plan(
         scene: the scene.
         vertices: (n_vertices, 2) the structure, mm; None for a plan that serves an optimisation
             from the initial one.
-        asked: (n_asked,) output times, s; None for the loss's own samples.
+        times: (n_times,) of the output, s; None for the loss's own samples.
         threads: cases to solve side by side.
         every_case: whether the motion of each load case is wanted, and not its loss alone.
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
     """
-    refuse_idle(scene.topology)
+    check_free_dofs(scene.topology)
     structure = scene.lattice.vertices if vertices is None else vertices
     values = concrete_parameters(scene, structure)
-    times = sample_times(scene) if asked is None else asked
+    times = sample_times(scene) if times is None else times
     decisions: list[str] = []
     skipped = [_reference_line(scene)]
 
-    symmetric = scene.symmetry == "C4" and scene.copies is None
+    symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
     may_repeat = not every_case and (vertices is not None or symmetric)
-    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.motions))
+    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.loads.motions))
     if len(np.unique(case_of)) < len(case_of):
         skipped.append(
             f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
@@ -142,7 +142,7 @@ def make_plan(
             " design does not move them"
         )
     solver: Solver
-    if scene.static:
+    if scene.loads.static:
         integrator: Literal["static", "implicit", "explicit"] = "static"
         solver = StaticSolver(scene.topology, times, threads=threads)
         decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
@@ -152,7 +152,7 @@ def make_plan(
         end = float(times[-1])
         if integrator == "implicit":
             implicit = _implicit(scene, values, end, times, threads)
-            kind = "adapted" if scene.frequency is None else "graded"
+            kind = "adapted" if scene.loads.drive_frequency is None else "graded"
             n_steps = len(implicit.times) - 1
             decisions.append(f"grid: {n_steps} {kind} steps over {end:.6g} s, frozen")
             skipped.append(_contact_line(values, implicit))
@@ -169,35 +169,37 @@ def make_plan(
 
 
 def _reference_line(scene: Scene) -> str:
-    if scene.reference is None:
+    if scene.objective.reference is None:
         return "simulation of the unloaded reference: it is zero"
     return "simulation of the intact reference in every evaluation: once will do"
 
 
 def sample_times(scene: Scene) -> Floats:
-    """Times (n_asked,) of the samples or load steps that the loss is taken at."""
-    if scene.steps is not None:
-        return scene.duration * np.arange(1, scene.steps + 1) / scene.steps
-    return np.linspace(0.0, scene.duration, scene.samples)
+    """Times (n_times,) of the samples or load steps that the loss is taken at."""
+    if scene.objective.steps is not None:
+        return (
+            scene.loads.duration * np.arange(1, scene.objective.steps + 1) / scene.objective.steps
+        )
+    return np.linspace(0.0, scene.loads.duration, scene.objective.samples)
 
 
 def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     """Values of a structure as NumPy arrays."""
-    made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.material)
+    made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
     return ConcreteParameters(*(np.asarray(part) for part in made))
 
 
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
-    every = np.arange(len(scene.motions))
-    directed = [m for m in scene.motions if isinstance(m, _DIRECTED)]
-    if len(directed) < len(scene.motions) or scene.reference is not None:
+    every = np.arange(len(scene.loads.motions))
+    directed = [m for m in scene.loads.motions if isinstance(m, _DIRECTED)]
+    if len(directed) < len(scene.loads.motions) or scene.objective.reference is not None:
         return every
     image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
-    clamped_units = np.unique(scene.clamped // 3)
-    whole_units = len(clamped_units) * 3 == len(scene.clamped)
+    clamped_units = np.unique(scene.loads.clamped // 3)
+    whole_units = len(clamped_units) * 3 == len(scene.loads.clamped)
     if image is None or not whole_units:
         return every
-    if not is_invariant(image, clamped_units, scene.driven, scene.region):
+    if not is_invariant(image, clamped_units, scene.loads.driven, scene.objective.region):
         return every
     besides = [motion._replace(direction=0.0) for motion in directed]
     kind = np.array([besides.index(other) for other in besides])
@@ -207,19 +209,19 @@ def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
 def _choose(
     scene: Scene, values: ConcreteParameters, decisions: list[str]
 ) -> Literal["implicit", "explicit"]:
-    if scene.integrator != "auto":
+    if scene.numerics.integrator != "auto":
         decisions.append("integrator as asked for")
-        return scene.integrator
-    if scene.accuracy == "tight":
+        return scene.numerics.integrator
+    if scene.numerics.accuracy == "tight":
         decisions.append("explicit: a tight tolerance needs every frequency resolved")
         return "explicit"
-    if scene.frequency is None:
+    if (driven := scene.loads.drive_frequency) is None:
         decisions.append("implicit: the drive has no frequency of its own")
         return "implicit"
     lowest = lowest_frequency(scene.topology, values) / (2 * np.pi)
-    slow = scene.frequency < SLOW * lowest
+    slow = driven < SLOW * lowest
     decisions.append(
-        f"{'implicit' if slow else 'explicit'}: drive at {scene.frequency:.4g} Hz, lowest"
+        f"{'implicit' if slow else 'explicit'}: drive at {driven:.4g} Hz, lowest"
         f" eigenfrequency {lowest:.4g} Hz"
     )
     return "implicit" if slow else "explicit"
@@ -229,17 +231,18 @@ def _implicit(
     scene: Scene, values: ConcreteParameters, end: float, times: Floats, threads: int
 ) -> ImplicitSolver:
     """Solver on a graded grid, or adapted to the hardest case if the drive has no frequency."""
-    rule = GRIDS[scene.accuracy]
-    period = end if scene.frequency is None else 1 / scene.frequency
+    rule = GRIDS[scene.numerics.accuracy]
+    period = end if scene.loads.drive_frequency is None else 1 / scene.loads.drive_frequency
     largest = period / rule.per_period
     steps = time_grid.graded(end, min(rule.first, largest), rule.growth, largest)
     solver = ImplicitSolver(
         scene.topology, steps, times, rule.newton, threads, turn_allowance=TURN_ALLOWANCE
     )
-    if scene.frequency is not None:
+    if scene.loads.drive_frequency is not None:
         return solver
     adapted_to_each = (
-        adapted(solver, values, drive, rule.per_step, rule.first, largest) for drive in scene.drives
+        adapted(solver, values, drive, rule.per_step, rule.first, largest)
+        for drive in scene.loads.cases
     )
     return max(adapted_to_each, key=lambda made: len(made.times))
 
@@ -256,7 +259,13 @@ def _explicit(
     scene: Scene, values: ConcreteParameters, end: float, times: Floats, threads: int
 ) -> ExplicitSolver:
     highest = STIFFENING * highest_frequency(scene.topology, values)
-    largest = STABLE_FRACTION[scene.accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)
-    if scene.frequency is not None:  # a heavy or soft structure is stable with steps far too long
-        largest = min(largest, 1 / (scene.frequency * GRIDS[scene.accuracy].per_period))
+    largest = (
+        STABLE_FRACTION[scene.numerics.accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)
+    )
+    if (
+        scene.loads.drive_frequency is not None
+    ):  # a heavy or soft structure is stable with steps far too long
+        largest = min(
+            largest, 1 / (scene.loads.drive_frequency * GRIDS[scene.numerics.accuracy].per_period)
+        )
     return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)

@@ -1,117 +1,259 @@
-"""A design problem posed: structure, drives, what counts and what may change."""
+"""Poses a design problem: structure, loads, what counts, what may change, and how it is solved."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from sim.core import Floats, Ints
 from sim.energy import Topology, topology
-from sim.solvers import MotionLaw, PrescribedMotion
-from sim.structure import DesignSpace, Lattice, Material, Symmetry, design_space
+from sim.solvers import Harmonic, MotionLaw, PrescribedMotion
+from sim.structure import (
+    ContactModel,
+    DesignSpace,
+    Lattice,
+    Material,
+    Symmetry,
+    VoidAngleContact,
+    design_space,
+)
 
 Accuracy = Literal["draft", "default", "tight"]
 Integrator = Literal["auto", "implicit", "explicit"]
+Dof = Literal["ux", "uy", "theta"]
+DOFS: tuple[Dof, ...] = ("ux", "uy", "theta")
+
+
+AUTHORS_CONTACT = VoidAngleContact(float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0)))
+
+
+def _none() -> Ints:
+    return np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
-class Scene:
-    """Everything that a simulation and its loss depend on but the design vector.
+class Structure:
+    """Holds what is loaded.
 
     Attributes:
-        lattice: the initial structure.
-        material: constants.
-        barrier, cutoff: contact angles, rad.
-        contact_distance: activation distance of contact on the distance of units, mm; None for
-            contact on the void angles.
-        clamped: (n,) ids (3 unit + dof) of dofs that rest.
-        driven: (n,) units that follow the drive, all three dofs.
-        motions: the drive of each load case.
-        weights: (n_cases,) of the cases in the loss, sum 1.
-        duration: s; the length of the load path in a static scene.
-        frequency: highest frequency of the drive, Hz; None if it has none.
-        static: whether inertia plays no part.
-        cloak: units to redesign.
-        region: units of interest.
-        objective: what is compared with the target.
-        samples: number of samples that the loss is integrated over.
-        steps: number of equal load steps that it is taken at instead; the start is none of them.
-        reference: the scene whose region should move alike, its units in the same order; None to
-            compare with rest.
-        frozen: units whose vertices stay, whoever shares them; None for the driven ones.
-        symmetry: imposed on the design.
-        sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
-            a large one a smooth maximum.
-        copies: (n_copies, n_groups, 2) shifts (mm) of imperfect copies over which the loss is then
-            averaged; None for the structure alone.
-        accuracy, integrator: as asked for.
+        lattice: the initial network, mm.
+        material: constants of units and ligaments.
+        contact: law by which units touch, rad or mm; the authors' by default.
     """
 
     lattice: Lattice
     material: Material
-    barrier: float
-    cutoff: float
-    clamped: Ints
-    driven: Ints
-    motions: tuple[MotionLaw, ...]
-    weights: Floats
-    duration: float
-    frequency: float | None
-    static: bool
-    cloak: Ints
-    region: Ints
-    objective: Literal["displacement", "strain_energy"] = "displacement"
+    contact: ContactModel = AUTHORS_CONTACT
+
+
+@dataclass(frozen=True)
+class Clamp:
+    """Holds units at zero.
+
+    Attributes:
+        units: (n,) ids.
+        dofs: which of their degrees of freedom.
+    """
+
+    units: Ints
+    dofs: tuple[Dof, ...] = DOFS
+
+
+@dataclass(frozen=True)
+class Loads:
+    """Holds what acts on a structure, one load case after the other.
+
+    Attributes:
+        cases: what acts in each load case: a motion and the units that follow it with all three
+            degrees of freedom; units that any case drives are held in all.
+        supports: units that rest in all cases.
+        duration: s; the length of the load path in a static scene.
+        frequency: highest frequency of the drive, Hz; by default that of its harmonic motions,
+            None if there are none.
+        static: whether inertia plays no part.
+        weights: (n_cases,) of the cases in the loss, sum 1; equal ones by default.
+    """
+
+    cases: tuple[PrescribedMotion, ...]
+    supports: tuple[Clamp, ...] = ()
+    duration: float = 1.0
+    frequency: float | None = None
+    static: bool = False
+    weights: Floats | None = None
+
+    @property
+    def case_weights(self) -> Floats:
+        """(n_cases,) weight of each case in the loss."""
+        n = len(self.cases)
+        return np.full(n, 1 / n) if self.weights is None else self.weights
+
+    @property
+    def drive_frequency(self) -> float | None:
+        """Highest frequency of the drive, Hz; None if it has none."""
+        harmonic = [case.motion for case in self.cases if isinstance(case.motion, Harmonic)]
+        found = [float(motion.frequency) for motion in harmonic]
+        return max(found, default=None) if self.frequency is None else self.frequency
+
+    @property
+    def motions(self) -> tuple[MotionLaw, ...]:
+        """The motion of each case."""
+        return tuple(case.motion for case in self.cases)
+
+    @cached_property
+    def driven(self) -> Ints:
+        """(n,) units that any case drives, ascending."""
+        return np.unique(np.concatenate([_none(), *(case.units for case in self.cases)]))
+
+    @cached_property
+    def clamped(self) -> Ints:
+        """(n,) ids (3 unit + dof) of the dofs that rest by a support, ascending."""
+        dofs = [3 * each.units + DOFS.index(dof) for each in self.supports for dof in each.dofs]
+        return np.unique(np.concatenate([_none(), *dofs]))
+
+    @cached_property
+    def held(self) -> Ints:
+        """(n_held,) ids of all prescribed dofs, ascending."""
+        return np.union1d(self.clamped, (3 * self.driven[:, None] + np.arange(3)).ravel())
+
+
+@dataclass(frozen=True)
+class Objective:
+    """Holds what a design is to do.
+
+    Attributes:
+        region: (n,) ids of the units of interest.
+        kind: what is compared: displacements and rotations, or the strain energy.
+        samples: number of samples that the loss is integrated over, odd.
+        steps: number of equal load steps that it is taken at instead; the start is none of them.
+        reference: the scene whose region should move alike, its units in the same order; None to
+            compare with rest.
+        sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
+            a large one a smooth maximum.
+    """
+
+    region: Ints = field(default_factory=_none)
+    kind: Literal["displacement", "strain_energy"] = "displacement"
     samples: int = 201
     steps: int | None = None
     reference: Scene | None = None
-    contact_distance: float | None = None
+    sharpness: float = 1.0
+
+
+@dataclass(frozen=True)
+class Design:
+    """Holds what may change.
+
+    Attributes:
+        cloak: (n,) ids of the units to redesign.
+        frozen: (n,) ids of units whose vertices stay, whoever shares them; None for the driven.
+        symmetry: imposed on the design.
+        copies: (n_copies, n_groups, 2) shifts of imperfect copies over which the loss is averaged,
+            mm; None for the structure alone.
+    """
+
+    cloak: Ints = field(default_factory=_none)
     frozen: Ints | None = None
     symmetry: Symmetry = "none"
-    sharpness: float = 1.0
     copies: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Numerics:
+    """Holds how motions are computed.
+
+    Attributes:
+        accuracy: of steps and tolerances; a draft is good for a look.
+        integrator: in time; ``auto`` chooses by the scene.
+    """
+
     accuracy: Accuracy = "default"
     integrator: Integrator = "auto"
 
-    @cached_property
-    def space(self) -> DesignSpace:
-        """Shifts of the cloak's vertices; those of frozen units stay."""
-        frozen = self.driven if self.frozen is None else self.frozen
-        return design_space(self.lattice, self.cloak, frozen, self.symmetry)
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Holds everything that a simulation and its loss depend on but the design vector.
+
+    Attributes:
+        structure: what is loaded.
+        loads: what acts on it.
+        objective: what a design is to do.
+        design: what may change.
+        numerics: how motions are computed.
+    """
+
+    structure: Structure
+    loads: Loads
+    objective: Objective = Objective()
+    design: Design = Design()
+    numerics: Numerics = Numerics()
+
+    @property
+    def lattice(self) -> Lattice:
+        """The initial network."""
+        return self.structure.lattice
+
+    def updated(self, **changes: Any) -> Scene:  # noqa: ANN401  (fields of the records)
+        """The scene with other values of fields of its records, such as ``accuracy="tight"``.
+
+        Raises:
+            TypeError: no record has a field of that name.
+        """
+        records = {}
+        for record in fields(self):
+            old = getattr(self, record.name)
+            own = {
+                each.name: changes.pop(each.name) for each in fields(old) if each.name in changes
+            }
+            records[record.name] = replace(old, **own)
+        if changes:
+            raise TypeError(f"no record of a scene has the fields {', '.join(changes)}")
+        return Scene(**records)
+
+    def driven_by(self, *motions: MotionLaw, **changes: Any) -> Scene:  # noqa: ANN401
+        """The scene under other motions of its driven units, weighted equally; see `updated`."""
+        cases = tuple(PrescribedMotion(self.loads.driven, motion) for motion in motions)
+        return self.updated(**{"cases": cases, "weights": None, **changes})
 
     def under(self, motions: tuple[MotionLaw, ...], duration: float, frequency: float) -> Scene:
-        """The scene and its reference under other drives, weighted equally."""
-        reference = self.reference
-        return replace(
-            self,
-            motions=motions,
-            weights=np.full(len(motions), 1 / len(motions)),
+        """The scene and its reference under other motions of their driven units."""
+        reference = self.objective.reference
+        return self.driven_by(
+            *motions,
             duration=duration,
             frequency=frequency,
             reference=reference and reference.under(motions, duration, frequency),
         )
 
-    @cached_property
-    def drives(self) -> tuple[PrescribedMotion, ...]:
-        """The cases as the solvers take them."""
-        return tuple(PrescribedMotion(self.driven, motion) for motion in self.motions)
+    def alone(self, case: int) -> Scene:
+        """The scene under one of its load cases."""
+        return self.updated(cases=(self.loads.cases[case],), weights=None)
+
+    def with_contact(self, contact: ContactModel) -> Scene:
+        """The scene, and its reference, with another law of contact."""
+        reference = self.objective.reference
+        return self.updated(
+            contact=contact, reference=reference and reference.with_contact(contact)
+        )
 
     @cached_property
-    def held(self) -> Ints:
-        """Ids of all prescribed dofs, ascending."""
-        driven = (3 * self.driven[:, None] + np.arange(3)).ravel()
-        return np.union1d(self.clamped, driven)
+    def space(self) -> DesignSpace:
+        """Shifts of the cloak's vertices; those of frozen units stay."""
+        design = self.design
+        frozen = self.loads.driven if design.frozen is None else design.frozen
+        return design_space(self.lattice, design.cloak, frozen, design.symmetry)
 
     @cached_property
     def topology(self) -> Topology:
         """The fixed structure; differentiable by what the design can change."""
         moved = np.unique(self.lattice.unit[self.space.free_vertices])
-        distance = self.contact_distance
-        return topology(self.lattice, self.held, self.barrier, self.cutoff, moved, distance)
+        return topology(self.lattice, self.loads.held, self.structure.contact, moved)
 
     @cached_property
     def region_ligaments(self) -> Ints:
         """Ligaments that touch the region of interest."""
-        return np.flatnonzero(np.isin(self.lattice.ligament_units, self.region).any(axis=1))
+        touched = np.isin(self.lattice.ligament_units, self.objective.region)
+        return np.flatnonzero(touched.any(axis=1))

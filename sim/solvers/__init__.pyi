@@ -1,9 +1,13 @@
 from . import base as base
 from . import loads as loads
+from .base import CaseMotions as CaseMotions
 from .base import PrescribedMotion as PrescribedMotion
 from .base import Solver as Solver
-from .base import simulate as simulate
+from .base import adjoint_cases as adjoint_cases
+from .base import concrete as concrete
+from .base import differentiable_motion as differentiable_motion
 from .base import solve_case as solve_case
+from .base import solve_cases as solve_cases
 from .batch import Case as Case
 from .batch import Measure as Measure
 from .batch import Outcome as Outcome
@@ -17,8 +21,8 @@ from .loads import TanhRamp as TanhRamp
 from .loads import TimeSeries as TimeSeries
 from .loads import held_dofs as held_dofs
 from .loads import held_values as held_values
+from .validation import check_connected as check_connected
+from .validation import check_free_dofs as check_free_dofs
+from .validation import check_masses as check_masses
+from .validation import check_start as check_start
 from .validation import inadmissible as inadmissible
-from .validation import refuse_floating as refuse_floating
-from .validation import refuse_idle as refuse_idle
-from .validation import refuse_massless as refuse_massless
-from .validation import refuse_start as refuse_start

@@ -1,10 +1,7 @@
-"""Simulated motion of a structure under several drives, as one differentiable function.
+"""Integrates a structure under several load cases, as one differentiable function.
 
-    motion = simulate(solver, parameters, drives)
-
-is the displacement and velocity of every case at the asked times; ``jax.grad`` through it runs the
-exact adjoint of the steps taken. The solvers are ``ImplicitSolver`` (slow drives) and
-``explicit.ExplicitSolver`` (waves, tight tolerances).
+The solvers behind it are ``StaticSolver`` (equilibria), ``ImplicitSolver`` (slow drives) and
+``ExplicitSolver`` (waves, tight tolerances).
 """
 
 from __future__ import annotations
@@ -23,19 +20,19 @@ from jax.custom_derivatives import SymbolicZero
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology
 from sim.solvers.loads import MotionLaw, held_values
-from sim.solvers.validation import refuse_idle, refuse_nonsense
+from sim.solvers.validation import check_free_dofs, check_parameters
 from sim.structure import ConcreteParameters, Parameters
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
-class Response(NamedTuple):
-    """Motion of all cases at the asked times.
+class CaseMotions(NamedTuple):
+    """Holds the motion of all cases at the solver's output times.
 
     Attributes:
-        displacement: (n_cases, n_asked, n_units, 3) mm, mm, rad.
-        velocity: (n_cases, n_asked, n_units, 3) mm/s, mm/s, rad/s.
+        displacement: (n_cases, n_times, n_units, 3) mm, mm, rad.
+        velocity: (n_cases, n_times, n_units, 3) mm/s, mm/s, rad/s.
     """
 
     displacement: Array
@@ -84,8 +81,8 @@ class Solver(Protocol):
         ...
 
     @property
-    def asked(self) -> Floats:
-        """Times (n_asked,) of the output, s."""
+    def output_times(self) -> Floats:
+        """Times (n_times,) of the output, s."""
         ...
 
     @property
@@ -104,13 +101,13 @@ class Solver(Protocol):
     def forward(
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, Any]:
-        """Displacement and velocity (n_asked, n_dofs), and what ``backward`` needs.
+        """Displacement and velocity (n_times, n_dofs), and what ``backward`` needs.
 
         The held dofs' own entries are of no account: they follow from the drive.
 
         Raises:
             SimulationError: a step failed.
-            StrangersMeet: units met whose coupling the tangent has no room for.
+            NewContactPairs: units met whose coupling the tangent has no room for.
         """
         ...
 
@@ -124,20 +121,20 @@ class Solver(Protocol):
 def solve_case(
     solver: Solver, values: ConcreteParameters, drive: PrescribedMotion
 ) -> tuple[Floats, Floats, Any]:
-    """One case: displacement and velocity (n_asked, n_dofs), and the solver's record.
+    """One case: displacement and velocity (n_times, n_dofs), and the solver's record.
 
     Raises:
         SimulationError: a step failed, or there is nothing meaningful to start from.
     """
-    refuse_idle(solver.topology)
-    refuse_nonsense(values, drive.motion)
+    check_free_dofs(solver.topology)
+    check_parameters(values, drive.motion)
     try:
         displacement, velocity, record = solver.forward(values, drive)
     except NewContactPairs as met:
         return solve_case(solver.coupling(met.pairs), values, drive)
     held = solver.topology.held
-    displacement[:, held] = drive.values(held, solver.asked)
-    velocity[:, held] = drive.rates(held, solver.asked)
+    displacement[:, held] = drive.values(held, solver.output_times)
+    velocity[:, held] = drive.rates(held, solver.output_times)
     return displacement, velocity, record
 
 
@@ -153,6 +150,11 @@ class Records:
         self.records = records
 
 
+def concrete(parameters: Parameters[Any]) -> ConcreteParameters:
+    """Converts parameters to arrays of NumPy, as the solvers take them."""
+    return ConcreteParameters(*(np.asarray(part) for part in parameters))
+
+
 class Gradients(NamedTuple):
     """Loss derivatives that a reverse sweep returns.
 
@@ -166,13 +168,13 @@ class Gradients(NamedTuple):
     drive: list[Floats]
 
 
-def forward(
+def solve_cases(
     solver: Solver,
     values: ConcreteParameters,
     drives: Sequence[PrescribedMotion],
     solvers: Sequence[Solver] | None = None,
 ) -> tuple[Floats, Floats, Records]:
-    """Displacement and velocity (n_cases, n_asked, n_units, 3) of all cases, and their records.
+    """Displacement and velocity (n_cases, n_times, n_units, 3) of all cases, and their records.
 
     With ``solvers`` (n_cases,) each case is solved by its own, otherwise alike.
 
@@ -187,8 +189,8 @@ def forward(
     return displacement, velocity, Records(values, drives, [record for _, _, record in results])
 
 
-def backward(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
-    """Reverse sweep of ``forward`` from loss derivatives shaped as its outputs."""
+def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
+    """Sweeps back through ``solve_cases``, from loss derivatives shaped as its outputs."""
     # copies, as jax's arrays are read only: loops would be compiled once more for these
     flat_u, flat_v = (
         np.array(bar).reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v)
@@ -205,34 +207,55 @@ def backward(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> 
     return Gradients(summed, list(times), list(drive))
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0,))
-def simulate(
-    solver: Solver, parameters: Parameters[Any], drives: tuple[PrescribedMotion, ...]
-) -> Response:
-    """Integrates every case and returns its motion at the solver's asked times.
+def differentiable_motion(
+    solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
+) -> CaseMotions:
+    """Integrates every case; differentiable by the parameters and the numbers of the motions.
 
-    Not for use under ``jit``: the solvers run compiled code of their own on concrete arrays.
+    ``jax.grad``, ``jax.vjp`` and ``jax.jacrev`` run the exact adjoint of the steps taken, once for
+    each row. Under ``jax.jit`` and ``jax.vmap`` it cannot run: the solvers loop over concrete
+    arrays. There are no forward or second derivatives.
 
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
+        TypeError: a transform that is not supported.
     """
-    return _forward(solver, parameters, drives)[0]
+    try:
+        return _motion(solver, parameters, cases)
+    except TypeError as error:
+        if "jvp" not in str(error):
+            raise
+        raise TypeError(
+            "a simulation has no forward derivative (jax.jvp, jacfwd, hessian); use jax.grad, vjp"
+            " or jacrev"
+        ) from error
 
 
-def _forward(
-    solver: Solver, parameters: Parameters[Any], drives: tuple[PrescribedMotion, ...]
-) -> tuple[Response, Records]:
-    values = ConcreteParameters(*(np.asarray(part) for part in parameters))
-    displacement, velocity, records = forward(solver, values, drives)
-    return Response(jnp.asarray(displacement), jnp.asarray(velocity)), records
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _motion(
+    solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
+) -> CaseMotions:
+    return _solved(solver, parameters, cases)[0]
+
+
+def _solved(
+    solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
+) -> tuple[CaseMotions, Records]:
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((parameters, cases))):
+        raise TypeError(
+            "a simulation loops over concrete arrays and cannot be traced; call it outside jax.jit"
+            " and jax.vmap, once for each structure, and differentiate it once"
+        )
+    displacement, velocity, records = solve_cases(solver, concrete(parameters), cases)
+    return CaseMotions(jnp.asarray(displacement), jnp.asarray(velocity)), records
 
 
 def _forward_rule(
     solver: Solver, parameters: Any, drives: Any
-) -> tuple[Response, tuple[Records, bool]]:
+) -> tuple[CaseMotions, tuple[Records, bool]]:
     plain = jax.tree.map(lambda primal: primal.value, (parameters, drives), is_leaf=_is_primal)
     driven = any(leaf.perturbed for leaf in jax.tree.leaves(drives, is_leaf=_is_primal))
-    response, records = _forward(solver, *plain)
+    response, records = _solved(solver, *plain)
     return response, (records, driven)
 
 
@@ -241,11 +264,11 @@ def _is_primal(node: Any) -> bool:
 
 
 def _backward_rule(
-    solver: Solver, residual: tuple[Records, bool], bar: Response
+    solver: Solver, residual: tuple[Records, bool], bar: CaseMotions
 ) -> tuple[Parameters[Array], Any]:
     records, driven = residual
     bar_u, bar_v = (_dense(part) for part in bar)
-    pulled = backward(solver, records, bar_u, bar_v)
+    pulled = adjoint_cases(solver, records, bar_u, bar_v)
     total = Parameters(*(jnp.asarray(part) for part in pulled.parameters))
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
@@ -255,14 +278,14 @@ def _backward_rule(
         _drive_cotangent(
             held,
             drive,
-            (pulled.times[case], solver.asked),
+            (pulled.times[case], solver.output_times),
             (pulled.drive[case], held_u[case], held_v[case]),
         )
         for case, drive in enumerate(records.drives)
     )
 
 
-simulate.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
+_motion.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
 
 
 def _dense(cotangent: Any) -> Floats:
@@ -292,14 +315,14 @@ def _drive_cotangent(
         times: those of the solver's stages and of the output.
         bars: derivatives by the held values at both, and by their rates at the output.
     """
-    within, asked = times
+    within, outputs = times
     units = np.asarray(drive.units)
 
     def prescribed(motion: MotionLaw) -> tuple[Array, Array, Array]:
         return (
             held_values(held, units, motion, within),
-            held_values(held, units, motion, asked),
-            _held_rates(held, units, motion, asked),
+            held_values(held, units, motion, outputs),
+            _held_rates(held, units, motion, outputs),
         )
 
     _, pull_back = jax.vjp(prescribed, drive.motion)

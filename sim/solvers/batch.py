@@ -31,7 +31,7 @@ class Solved:
 
     Attributes:
         case: the case.
-        displacement, velocity: (n_asked, n_units, 3).
+        displacement, velocity: (n_times, n_units, 3).
         record: the solver's.
     """
 

@@ -16,7 +16,7 @@ from sim.collision import ContactArrays, contact_arrays, find, raise_new_pairs
 from sim.core import Floats, SimulationError
 from sim.energy import Topology
 from sim.solvers.loads import MotionLaw
-from sim.structure import ConcreteParameters
+from sim.structure import ConcreteParameters, VoidAngleContact
 
 NEVER_NEGATIVE = {
     "law": "stiffness of the ligaments",
@@ -25,7 +25,7 @@ NEVER_NEGATIVE = {
 }
 
 
-def refuse_nonsense(values: ConcreteParameters, motion: MotionLaw) -> None:
+def check_parameters(values: ConcreteParameters, motion: MotionLaw) -> None:
     """Raises an error that names what is not finite, or negative where that has no meaning."""
     parts = {f"{name} of the structure": part for name, part in values._asdict().items()}
     parts["motion of the driven units"] = ravel_pytree(motion)[0]
@@ -43,7 +43,7 @@ def refuse_nonsense(values: ConcreteParameters, motion: MotionLaw) -> None:
             )
 
 
-def refuse_idle(topology: Topology) -> None:
+def check_free_dofs(topology: Topology) -> None:
     """Raises an error if nothing can move, or nothing acts on what does."""
     if topology.n_free == 0:
         raise SimulationError(
@@ -53,7 +53,7 @@ def refuse_idle(topology: Topology) -> None:
         raise SimulationError("no two units are joined; try a structure that has ligaments")
 
 
-def refuse_floating(topology: Topology) -> None:
+def check_connected(topology: Topology) -> None:
     """Raises an error that names a unit which hangs on nothing: it has no equilibrium."""
     one, other = topology.ligament_units.T
     joined = coo_array((np.ones(len(one)), (one, other)), shape=(topology.n_units,) * 2)
@@ -67,7 +67,7 @@ def refuse_floating(topology: Topology) -> None:
         )
 
 
-def refuse_massless(values: ConcreteParameters) -> None:
+def check_masses(values: ConcreteParameters) -> None:
     """Raises an error that names a unit which nothing accelerates, or the wrong way round."""
     lightest = values.mass.min(axis=1)
     if (lightest <= 0.0).any():
@@ -79,24 +79,25 @@ def refuse_massless(values: ConcreteParameters) -> None:
         )
 
 
-def refuse_start(
+def check_start(
     topology: Topology, values: ConcreteParameters, contacts: ContactArrays, start: Floats
 ) -> None:
     """Raises an error that names two units which are in one another in a state (n_dofs,)."""
     if len(contacts.pairs) > 0 and find(start, contacts) < 0:
         raise_new_pairs(contacts)
         raise SimulationError(
-            f"units {contacts.watch.overlap[0]} and {contacts.watch.overlap[1]} overlap at"
+            f"units {contacts.cache.overlap[0]} and {contacts.cache.overlap[1]} overlap at"
             f" {_moment(start)}; ask for a gap between units, or take contact: angle"
         )
-    if topology.meeting is None and len(values.void) > 0:
+    law = topology.contact
+    if isinstance(law, VoidAngleContact) and len(values.void) > 0:
         angles = topology.smallest_void_angles(values.void, start.reshape(-1, 3))
-        if angles.min() <= topology.barrier:
+        if angles.min() <= law.barrier:
             one, other = topology.ligament_units[angles.argmin()]
             raise SimulationError(
                 f"the void between units {one} and {other} is closed to"
                 f" {np.rad2deg(angles.min()):.4g} deg at {_moment(start)}, its barrier is at"
-                f" {np.rad2deg(topology.barrier):.4g} deg; ask for a larger smallest void angle, or"
+                f" {np.rad2deg(law.barrier):.4g} deg; ask for a larger smallest void angle, or"
                 " try a drive that starts from rest",
                 unit=int(one),
             )
@@ -106,10 +107,11 @@ def inadmissible(
     topology: Topology, values: ConcreteParameters, states: Floats
 ) -> NDArray[np.bool_]:
     """Which of the states (n_states, n_dofs) have a void beyond its barrier, or an overlap."""
-    if topology.meeting is None:
+    law = topology.contact
+    if isinstance(law, VoidAngleContact):
         motion = states.reshape(len(states), -1, 3)
-        return topology.smallest_void_angle(values.void, motion) <= topology.barrier
-    contacts = contact_arrays(topology.meeting, values, topology.n_units)
+        return topology.smallest_void_angle(values.void, motion) <= law.barrier
+    contacts = contact_arrays(law, values, topology.n_units)
     found = np.array([find(state, contacts) < 0 for state in states], dtype=bool)
     raise_new_pairs(contacts)
     return found

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from sim.core import Floats, Ints
+from sim.structure.contact_laws import ContactModel, VoidAngleContact
 from sim.structure.gaps import overlapping_pairs, polygons
 from sim.structure.geometry import void_angles
 from sim.structure.lattice import Lattice
@@ -40,18 +41,22 @@ class PerturbedStructure:
 
 
 def shifted(
-    lattice: Lattice, vertices: Floats, largest: float, cutoff: float, random: np.random.Generator
+    lattice: Lattice,
+    vertices: Floats,
+    largest: float,
+    contact: ContactModel,
+    random: np.random.Generator,
 ) -> PerturbedStructure:
     """A copy with every vertex moved by up to ``largest`` (mm) along x and y, evenly spread.
 
-    The ends of a ligament move together, so it keeps its vector. Void angles stay above ``cutoff``
-    (rad), where contact sets in: the copy is at rest without a load.
+    The ends of a ligament move together, so it keeps its vector. Void angles stay above the cutoff
+    of contact on them: the copy is at rest without a load.
     """
     shifts = random.uniform(-largest, largest, (lattice.n_groups, 2))
     first = redrawn = 0
     for tries in range(MOST_ROUNDS):
         moved = vertices + shifts[lattice.group]
-        clashing = clashing_units(lattice, moved, cutoff)
+        clashing = clashing_units(lattice, moved, contact)
         first = len(clashing) if tries == 0 else first
         if len(clashing) == 0:
             return PerturbedStructure(moved, first, redrawn, sound=True)
@@ -65,7 +70,7 @@ def assembled(
     lattice: Lattice,
     copy: PerturbedStructure,
     spread: tuple[float, float],
-    cutoff: float,
+    contact: ContactModel,
     random: np.random.Generator,
 ) -> PerturbedStructure:
     """The copy once its units are joined, each off its place.
@@ -78,14 +83,14 @@ def assembled(
         copy: its units as they were cut.
         spread: standard deviations of the units' shifts along x and along y, mm, and of their
             rotations, rad.
-        cutoff: void angle at which contact sets in, rad.
+        contact: law of contact.
         random: draws the places.
     """
     deviation = np.array([spread[0], *spread])
     pose = deviation * random.standard_normal((lattice.n_units, 3))
     for _ in range(MOST_ROUNDS):
         placed = _placed(lattice, copy.vertices, pose)
-        clashing = clashing_units(lattice, placed, cutoff)
+        clashing = clashing_units(lattice, placed, contact)
         if len(clashing) == 0:
             return replace(copy, vertices=placed)
         pose[clashing] = deviation * random.standard_normal((len(clashing), 3))
@@ -102,10 +107,11 @@ def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
     return np.asarray((middle + pose[:, :2])[lattice.unit] + cos * arm + sin * across)
 
 
-def clashing_units(lattice: Lattice, vertices: Floats, cutoff: float) -> Ints:
+def clashing_units(lattice: Lattice, vertices: Floats, contact: ContactModel) -> Ints:
     """Units (n,) that overlap another, cross themselves or touch another by their void angle."""
     pairs = overlapping_pairs(lattice, vertices)
     crossed = np.flatnonzero(~shapely.is_valid(polygons(lattice, vertices)))
+    cutoff = contact.cutoff if isinstance(contact, VoidAngleContact) else -np.inf
     closed = (np.asarray(void_angles(lattice, vertices)) <= cutoff).any(axis=1)
     return np.unique(
         np.concatenate([pairs.ravel(), crossed, lattice.ligament_units[closed].ravel()])

@@ -9,8 +9,8 @@ import numpy as np
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, observe, system_of
-from sim.solvers import PrescribedMotion, refuse_massless, refuse_start
-from sim.structure import ConcreteParameters
+from sim.solvers import PrescribedMotion, check_masses, check_start
+from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
 from sim.time_integration.coefficients import BLANES_MOAN, Splitting
 from sim.time_integration.contact_substeps import Pace
@@ -46,7 +46,7 @@ class ExplicitRecord:
 
 @dataclass(frozen=True)
 class ExplicitSolver:
-    """Integrates one case explicitly with equal steps (``dynamics.Solver``).
+    """Integrates one case explicitly with equal steps (``Solver``).
 
     The step is cut to one that is likely to be stable for the structure, judged at rest, and after
     a run to one that is in the state that stores the most energy; and halved as long as the run
@@ -58,7 +58,7 @@ class ExplicitSolver:
         topology: the structure.
         duration: s.
         n_steps: number of steps to take if that is stable.
-        asked: (n_asked,) times of the output, ascending, s.
+        output_times: (n_times,) times of the output, ascending, s.
         threads: cases solved side by side.
         splitting: the method.
     """
@@ -66,32 +66,32 @@ class ExplicitSolver:
     topology: Topology
     duration: float
     n_steps: int
-    asked: Floats
+    output_times: Floats
     threads: int = 1
     splitting: Splitting = BLANES_MOAN
 
     def refined(self, record: ExplicitRecord) -> ExplicitSolver:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         return replace(self, n_steps=2 * record.steps.n_steps)
 
     def coupling(self, pairs: Ints) -> ExplicitSolver:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         return replace(self, topology=self.topology.coupling(pairs))
 
     def forward(
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, ExplicitRecord]:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         top = self.topology
-        time_grid.refuse_outside(self.asked, self.duration)
+        time_grid.check_output_times(self.output_times, self.duration)
         system = system_of(top, values, NONE)
-        refuse_massless(values)
-        refuse_start(top, values, system.contacts, drive.start(top, 0.0))
+        check_masses(values)
+        check_start(top, values, system.contacts, drive.start(top, 0.0))
         stable = self._steps_for(MOVING * highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
             steps = self._steps(values, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
-            u, v = (np.zeros((len(self.asked), top.n_dofs)) for _ in range(2))
+            u, v = (np.zeros((len(self.output_times), top.n_dofs)) for _ in range(2))
             outputs = self._outputs(steps.n_steps)
             failed = run(steps, outputs, system, self._watched, checkpoints, u, v)
             raise_new_pairs(system.contacts)
@@ -130,14 +130,13 @@ class ExplicitSolver:
     @property
     def _watched(self) -> Ints:
         """Ligaments whose voids may come to contact."""
-        if self.topology.meeting is not None:
-            return NONE
-        return np.arange(len(self.topology.ligament_units))
+        by_angle = isinstance(self.topology.contact, VoidAngleContact)
+        return np.arange(len(self.topology.ligament_units)) if by_angle else NONE
 
     def backward(
         self, values: ConcreteParameters, record: ExplicitRecord, bar_u: Floats, bar_v: Floats
     ) -> tuple[ConcreteParameters, Floats, Floats]:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         top, steps = record.topology, record.steps
         system = system_of(top, values, NONE)
         bars = empty_bars(system, steps.drive.shape)
@@ -181,7 +180,7 @@ class ExplicitSolver:
 
     def _outputs(self, n_steps: int) -> Outputs:
         times = np.linspace(0, self.duration, n_steps + 1)
-        return Outputs(*time_grid.hermite_stencils(times, self.asked))
+        return Outputs(*time_grid.hermite_stencils(times, self.output_times))
 
 
 def _segment(n_steps: int) -> int:

@@ -9,8 +9,8 @@ import numpy as np
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
-from sim.solvers import PrescribedMotion, inadmissible, refuse_massless, refuse_start
-from sim.structure import ConcreteParameters
+from sim.solvers import PrescribedMotion, check_masses, check_start, inadmissible
+from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
 from sim.time_integration.coefficients import ESDIRK3, Tableau
 from sim.time_integration.esdirk import march
@@ -45,7 +45,7 @@ class ImplicitRecord:
 
 @dataclass(frozen=True)
 class ImplicitSolver:
-    """Integrates one case with an L-stable implicit method on a frozen grid (``dynamics.Solver``).
+    """Integrates one case with an L-stable implicit method on a frozen grid (``Solver``).
 
     A step that fails is cut in two, for this solve alone, until it passes, and now and then all
     steps after it; so is one within which the output, interpolated, has units in one another.
@@ -53,7 +53,7 @@ class ImplicitSolver:
     Attributes:
         topology: the structure.
         times: (n_steps + 1,) grid, s.
-        asked: (n_asked,) times of the output, s.
+        output_times: (n_times,) times of the output, s.
         tolerance: of the stage velocities, mm/s.
         threads: cases solved side by side.
         turn_allowance: contact is skipped in ligaments whose units can turn by this much against
@@ -64,38 +64,41 @@ class ImplicitSolver:
 
     topology: Topology
     times: Floats
-    asked: Floats
+    output_times: Floats
     tolerance: float = 1e-4
     threads: int = 1
     turn_allowance: float = np.inf
     tableau: Tableau = ESDIRK3
 
     def refined(self, record: ImplicitRecord) -> ImplicitSolver:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         return replace(self, times=time_grid.halved(record.times))
 
     def touching(self, values: ConcreteParameters) -> Ints:
         """Ligaments in which contact is computed."""
-        return np.flatnonzero(values.void.min(axis=1) < self.topology.cutoff + self.turn_allowance)
+        law = self.topology.contact
+        if not isinstance(law, VoidAngleContact):
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(values.void.min(axis=1) < law.cutoff + self.turn_allowance)
 
     def coupling(self, pairs: Ints) -> ImplicitSolver:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         return replace(self, topology=self.topology.coupling(pairs))
 
     def forward(
         self, values: ConcreteParameters, drive: PrescribedMotion
     ) -> tuple[Floats, Floats, ImplicitRecord]:
-        """See ``dynamics.Solver``."""
-        time_grid.refuse_outside(self.asked, float(self.times[-1]))
+        """See ``Solver``."""
+        time_grid.check_output_times(self.output_times, float(self.times[-1]))
         record = self._march(values, drive, self.touching(values), self.times)
         if self._untouched_voids_close(values, record):
             record = self._march(values, drive, np.arange(len(values.void)), self.times)
         for _ in range(MAX_SPLITS):
-            value, slope = time_grid.hermite_matrices(record.times, self.asked)
+            value, slope = time_grid.hermite_matrices(record.times, self.output_times)
             states = np.concatenate([record.u[:, 0], record.v[:, 0]])
             u, v = value @ states, slope @ states
-            u[:, self.topology.held] = drive.values(self.topology.held, self.asked)
-            beyond = self.asked[inadmissible(record.topology, values, u)]
+            u[:, self.topology.held] = drive.values(self.topology.held, self.output_times)
+            beyond = self.output_times[inadmissible(record.topology, values, u)]
             if len(beyond) == 0:
                 return u, v, record
             times = time_grid.split_steps(record.times, time_grid.steps_of(record.times, beyond))
@@ -107,18 +110,21 @@ class ImplicitSolver:
 
     def _untouched_voids_close(self, values: ConcreteParameters, record: ImplicitRecord) -> bool:
         """Whether a void whose contact was skipped came to the cutoff in any stage."""
+        law = self.topology.contact
+        if not isinstance(law, VoidAngleContact):
+            return False
         stages = record.u[:-1].reshape(-1, self.topology.n_units, 3)
         closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
         closest[record.touching] = np.inf
-        return bool(closest.min() < self.topology.cutoff)
+        return bool(closest.min() < law.cutoff)
 
     def _march(
         self, values: ConcreteParameters, drive: PrescribedMotion, touching: Ints, times: Floats
     ) -> ImplicitRecord:
         top, tableau = self.topology, self.tableau
         system = system_of(top, values, touching)
-        refuse_massless(values)
-        refuse_start(top, values, system.contacts, drive.start(top, float(times[0])))
+        check_masses(values)
+        check_start(top, values, system.contacts, drive.start(top, float(times[0])))
         counts = np.zeros(3, dtype=np.int64)
         for attempt in range(1, MAX_SPLITS + 1):
             shape = (len(times), len(tableau.nodes), top.n_dofs)
@@ -143,10 +149,10 @@ class ImplicitSolver:
     def backward(
         self, values: ConcreteParameters, record: ImplicitRecord, bar_u: Floats, bar_v: Floats
     ) -> tuple[ConcreteParameters, Floats, Floats]:
-        """See ``dynamics.Solver``."""
+        """See ``Solver``."""
         top, n_times = record.topology, len(record.times)
         system = system_of(top, values, record.touching)
-        value, slope = time_grid.hermite_matrices(record.times, self.asked)
+        value, slope = time_grid.hermite_matrices(record.times, self.output_times)
         bar_states = value.T @ bar_u + slope.T @ bar_v
         stage_times = time_grid.stage_times(record.times, self.tableau.nodes)
         bars = empty_bars(system, (len(stage_times), len(top.held)))

@@ -46,9 +46,9 @@ class Outputs(NamedTuple):
     """Interpolation of the outputs between the ends of a step.
 
     Attributes:
-        interval: (n_asked,) step in which each output lies, ascending.
-        values: (n_asked, 4) weights of (u, u', v, v') in the displacement.
-        rates: (n_asked, 4) the same in the velocity.
+        interval: (n_times,) step in which each output lies, ascending.
+        values: (n_times, 4) weights of (u, u', v, v') in the displacement.
+        rates: (n_times, 4) the same in the velocity.
     """
 
     interval: Ints
@@ -125,7 +125,7 @@ def run(
     out_u: Floats,
     out_v: Floats,
 ) -> int:
-    """Integrates from rest; fills outputs (n_asked, n_dofs) and checkpoints.
+    """Integrates from rest; fills outputs (n_times, n_dofs) and checkpoints.
 
     Checkpoints are (n_segments, 2, n_dofs) displacement and velocity. Contact of ``watched`` voids
     is that of the flights; the system must have none of its own.
@@ -137,7 +137,7 @@ def run(
     work, flight, trace = workspace(system), flight_of(watched, n_dofs // 3), _trace(1, steps)
     u, v = np.zeros(n_dofs), np.zeros(n_dofs)
     last_u, last_v = np.zeros(n_dofs), np.zeros(n_dofs)
-    asked = 0
+    output = 0
     for n in range(steps.n_steps):
         if n % steps.segment == 0:
             checkpoints[n // steps.segment, 0] = u
@@ -146,11 +146,11 @@ def run(
         last_v[:] = v
         if not np.isfinite(_step(n, u, v, steps, system, work, flight, trace)):
             return n
-        while asked < len(outputs.interval) and outputs.interval[asked] == n:
-            w, r = outputs.values[asked], outputs.rates[asked]
-            out_u[asked] = w[0] * last_u + w[1] * u + w[2] * last_v + w[3] * v
-            out_v[asked] = r[0] * last_u + r[1] * u + r[2] * last_v + r[3] * v
-            asked += 1
+        while output < len(outputs.interval) and outputs.interval[output] == n:
+            w, r = outputs.values[output], outputs.rates[output]
+            out_u[output] = w[0] * last_u + w[1] * u + w[2] * last_v + w[3] * v
+            out_v[output] = r[0] * last_u + r[1] * u + r[2] * last_v + r[3] * v
+            output += 1
     return -1
 
 
@@ -220,7 +220,7 @@ def sweep_back(
     out_bar_u: Floats, out_bar_v: Floats, which: Ints, bars: Bars, bar_decay: Floats,
     bar_gain: Floats,
 ) -> None:  # fmt: skip
-    """Reverse sweep of ``run`` from the loss derivatives by its outputs (n_asked, n_dofs).
+    """Reverse sweep of ``run`` from the loss derivatives by its outputs (n_times, n_dofs).
 
     Adds to ``bars``, but for damping and what mass does to the kicks: these enter through
     ``bar_decay`` and ``bar_gain``.
@@ -231,7 +231,7 @@ def sweep_back(
     u, v = np.empty(n_dofs), np.empty(n_dofs)
     bar_u, bar_v = np.zeros(n_dofs), np.zeros(n_dofs)
     left_u, left_v = np.zeros(n_dofs), np.zeros(n_dofs)
-    asked = len(outputs.interval) - 1
+    output = len(outputs.interval) - 1
     for part in range((steps.n_steps - 1) // steps.segment, -1, -1):
         start = part * steps.segment
         count = min(steps.segment, steps.n_steps - start)
@@ -244,12 +244,12 @@ def sweep_back(
             bar_v += left_v
             left_u[:] = 0.0
             left_v[:] = 0.0
-            while asked >= 0 and outputs.interval[asked] == start + n:
-                w, r = outputs.values[asked], outputs.rates[asked]
-                left_u += w[0] * out_bar_u[asked] + r[0] * out_bar_v[asked]
-                bar_u += w[1] * out_bar_u[asked] + r[1] * out_bar_v[asked]
-                left_v += w[2] * out_bar_u[asked] + r[2] * out_bar_v[asked]
-                bar_v += w[3] * out_bar_u[asked] + r[3] * out_bar_v[asked]
-                asked -= 1
+            while output >= 0 and outputs.interval[output] == start + n:
+                w, r = outputs.values[output], outputs.rates[output]
+                left_u += w[0] * out_bar_u[output] + r[0] * out_bar_v[output]
+                bar_u += w[1] * out_bar_u[output] + r[1] * out_bar_v[output]
+                left_v += w[2] * out_bar_u[output] + r[2] * out_bar_v[output]
+                bar_v += w[3] * out_bar_u[output] + r[3] * out_bar_v[output]
+                output -= 1
             _step_back(start + n, bar_u, bar_v, trace, steps, system, work, flight, which, bars,
                        bar_decay, bar_gain)  # fmt: skip

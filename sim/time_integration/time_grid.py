@@ -35,20 +35,24 @@ def split_steps(times: Floats, steps: Ints) -> Floats:
     return np.insert(times, steps + 1, (times[steps] + times[steps + 1]) / 2)
 
 
-def steps_of(times: Floats, asked: Floats) -> Ints:
-    """The steps (n,) in which the asked times lie, each once."""
-    found = np.searchsorted(times, asked, side="right") - 1
+def steps_of(times: Floats, output_times: Floats) -> Ints:
+    """The steps (n,) in which the output times lie, each once."""
+    found = np.searchsorted(times, output_times, side="right") - 1
     return np.unique(np.clip(found, 0, len(times) - 2))
 
 
-def refuse_outside(asked: Floats, end: float) -> None:
+def check_output_times(output_times: Floats, end: float) -> None:
     """Refuses times of output that do not ascend, or that lie outside of the run.
 
     Raises:
         ValueError: they do so by more than rounding.
     """
     slack = 1e-9 * end
-    if len(asked) and (asked[0] < -slack or asked[-1] > end + slack or (np.diff(asked) < 0).any()):
+    if len(output_times) and (
+        output_times[0] < -slack
+        or output_times[-1] > end + slack
+        or (np.diff(output_times) < 0).any()
+    ):
         raise ValueError(f"output times must ascend from 0 to {end:g} s, the end of the run")
 
 
@@ -58,16 +62,16 @@ def stage_times(times: Floats, nodes: Floats) -> Floats:
     return np.concatenate([times[:1], stages.ravel()])
 
 
-def hermite_stencils(times: Floats, asked: Floats) -> tuple[np.ndarray, Floats, Floats]:
+def hermite_stencils(times: Floats, output_times: Floats) -> tuple[np.ndarray, Floats, Floats]:
     """Cubic Hermite interpolation between grid points.
 
     Returns:
-        (n_asked,) step in which each asked time lies, and the weights (n_asked, 4) of value at the
+        (n_times,) step in which each output time lies, and the weights (n_times, 4) of value at the
         left and right end, slope at the left and right end, in the value and in the slope.
     """
-    interval = np.clip(np.searchsorted(times, asked, side="right") - 1, 0, len(times) - 2)
+    interval = np.clip(np.searchsorted(times, output_times, side="right") - 1, 0, len(times) - 2)
     h = times[interval + 1] - times[interval]
-    x = (asked - times[interval]) / h
+    x = (output_times - times[interval]) / h
     value = [
         (1 + 2 * x) * (1 - x) ** 2,
         x**2 * (3 - 2 * x),
@@ -78,14 +82,14 @@ def hermite_stencils(times: Floats, asked: Floats) -> tuple[np.ndarray, Floats, 
     return interval, np.stack(value, axis=1), np.stack(slope, axis=1)
 
 
-def hermite_matrices(times: Floats, asked: Floats) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The same as matrices (n_asked, 2 n_times) that act on all values followed by all slopes."""
-    interval, value, slope = hermite_stencils(times, asked)
+def hermite_matrices(times: Floats, output_times: Floats) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """The same as matrices (n_times, 2 n_times) that act on all values followed by all slopes."""
+    interval, value, slope = hermite_stencils(times, output_times)
     n = len(times)
     columns = interval[:, None] + np.array([0, 1, n, n + 1])
-    rows = np.repeat(np.arange(len(asked)), 4)
+    rows = np.repeat(np.arange(len(output_times)), 4)
     return tuple(
-        sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(asked), 2 * n))
+        sp.csr_matrix((weights.ravel(), (rows, columns.ravel())), shape=(len(output_times), 2 * n))
         for weights in (value, slope)
     )
 

@@ -23,7 +23,7 @@ from sim.energy import (
     ligament_energy,
     ligament_strain,
 )
-from sim.structure import ConcreteParameters, Lattice
+from sim.structure import ConcreteParameters, Lattice, VoidAngleContact
 
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""
@@ -106,7 +106,10 @@ def cell_of(
     _check(lattice, of_home)
     begin, end = lattice.ligament_units.T
     mine = np.flatnonzero(number[begin] >= 0)
-    limits = np.tile([topology.barrier, topology.cutoff], (len(mine), 1))
+    contact = topology.contact
+    if not isinstance(contact, VoidAngleContact):
+        raise ValueError("the unit cell of a lattice knows contact on void angles alone")
+    limits = np.tile([contact.barrier, contact.cutoff], (len(mine), 1))
     return UnitCell(
         unit=unit,
         joined=number[of_home[lattice.ligament_units[mine]]],

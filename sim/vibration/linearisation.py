@@ -67,7 +67,7 @@ def linearised(
     """The structure about a state ``motion`` (n_units, 3); by default about rest."""
     whole = replace(topology, held=np.zeros(0, dtype=np.int64))
     place, pattern = number_free_dofs(
-        topology.site, _coupled(topology), whole.held, by_fronts=False
+        topology.site, topology.coupled_units, whole.held, by_fronts=False
     )
     system = system_of(whole, values)._replace(free=place, pattern=pattern)
     made = matrix(pattern)
@@ -88,12 +88,6 @@ def linearised(
         free=free,
         held=topology.held,
     )
-
-
-def _coupled(topology: Topology) -> Ints:
-    if topology.meeting is None:
-        return topology.ligament_units
-    return np.concatenate([topology.ligament_units, topology.meeting.pairs])
 
 
 def modes(of: Linear, count: int, near: float = 0.0) -> Modes:

@@ -89,7 +89,7 @@ def _copied(source: Path, folder: Path) -> Path:
 def _problem(path: Path) -> Told:
     asked = load(path)
     scene = scene_of(asked, path.parent)
-    return [canonical_json(asked), len(scene.motions)]
+    return [canonical_json(asked), len(scene.loads.motions)]
 
 
 def _figure(folder: Path) -> Path:

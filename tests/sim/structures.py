@@ -206,7 +206,7 @@ class Rig:
 
 @jax.jit
 def _uneven(motion: Array, scale: float) -> Array:
-    """Sum of squares of (n_cases, n_asked, n_units, 3) with weights that differ everywhere."""
+    """Sum of squares of (n_cases, n_times, n_units, 3) with weights that differ everywhere."""
     weights = 1.5 + jnp.sin(jnp.arange(motion.size, dtype=float)).reshape(motion.shape)
     lengths = scale * motion * jnp.array([1.0, 1.0, 7.5])
     return jnp.sum(weights * lengths**2) / motion.shape[1]

@@ -18,22 +18,24 @@ PROBLEM = ROOT / "experiments/fig7/problem.yaml"
 
 
 def motion(scene: Scene, finer: int) -> Floats:
-    """Displacement (n_asked, n_units, 3)."""
+    """Displacement (n_times, n_units, 3)."""
     solver = make_plan(scene, scene.lattice.vertices).solver
     assert isinstance(solver, ExplicitSolver)
     solver = replace(solver, n_steps=finer * solver.n_steps)
     values = concrete_parameters(scene, scene.lattice.vertices)
-    return solve_case(solver, values, scene.drives[0])[0].reshape(scene.samples, -1, 3)
+    return solve_case(solver, values, scene.loads.cases[0])[0].reshape(
+        scene.objective.samples, -1, 3
+    )
 
 
 def test_they_agree_with_steps_of_a_sixth() -> None:
     holed = scene_of(problem.load(PROBLEM), PROBLEM.parent)
-    assert holed.reference is not None
+    assert holed.objective.reference is not None
     values = concrete_parameters(holed, holed.lattice.vertices)
     losses = []
     for finer in (1, 6):
-        whole, part = motion(holed.reference, finer), motion(holed, finer)
-        measure = objective(holed, whole[None][:, :, holed.reference.region])
+        whole, part = motion(holed.objective.reference, finer), motion(holed, finer)
+        measure = objective(holed, whole[None][:, :, holed.objective.reference.region])
         losses.append((whole, part, float(measure(part[None], values)[0])))
     (*coarse, loss), (*fine, exact) = losses
     for one, other in zip(coarse, fine, strict=True):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -17,8 +15,7 @@ from sim.structure import quads
 def small() -> Scene:
     """A lattice of 3 x 3 units shaken for a moment, explicit and tight."""
     lattice = quads(3, 3, 15.0, 2.25, np.deg2rad(20.0))
-    return replace(
-        paper_scenes.fig2(accuracy="tight"),
+    return paper_scenes.fig2(accuracy="tight").updated(
         lattice=lattice,
         clamped=held_dofs(np.array([0, 2, 6, 8]), np.array([], dtype=np.int64)),
         driven=np.array([4]),

@@ -69,7 +69,7 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
             yield StressCase(name, attempt, "refusal" if beyond else "solution")
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
-            case = replace(gentle, scene=replace(gentle.scene, integrator=integrator))
+            case = replace(gentle, scene=gentle.scene.updated(integrator=integrator))
             name = f"voids of {angle:g} deg at rest, shaken, {integrator}"
             yield StressCase(name, partial(_shaken, case), "refusal" if beyond else "either")
     yield from _jolts()
@@ -91,10 +91,10 @@ def _jolts() -> Iterator[StressCase]:
 
 
 def _shaken(case: StressScene) -> Sequence[Check]:
-    return motions(case, np.linspace(0.0, case.scene.duration, 101), CHAOS)
+    return motions(case, np.linspace(0.0, case.scene.loads.duration, 101), CHAOS)
 
 
 def _too_large(case: StressScene, n_steps: int) -> Sequence[Check]:
-    asked = np.array([case.scene.duration])
-    solver = ExplicitSolver(case.topology, case.scene.duration, n_steps, asked)
+    asked = np.array([case.scene.loads.duration])
+    solver = ExplicitSolver(case.topology, case.scene.loads.duration, n_steps, asked)
     return motions(case, asked, CHAOS, solver)

@@ -81,4 +81,4 @@ def _tried(name: str, constants: dict[str, Any], stiff: bool = False) -> Iterato
 
 
 def _shaken(case: StressScene) -> Sequence[Check]:
-    return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 26), 0.05)
+    return motions_as_advised(case, np.linspace(0.0, case.scene.loads.duration, 26), 0.05)

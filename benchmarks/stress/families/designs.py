@@ -71,5 +71,5 @@ def _equilibria(case: StressScene, vertices: np.ndarray) -> Sequence[Check]:
 
 
 def _motion(case: StressScene, error: float, vertices: np.ndarray) -> Sequence[Check]:
-    asked = np.linspace(0.0, case.scene.duration, 26)
+    asked = np.linspace(0.0, case.scene.loads.duration, 26)
     return motions_as_advised(replace(case, vertices=vertices), asked, error)

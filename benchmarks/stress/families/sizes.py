@@ -61,7 +61,7 @@ def _cases(small: bool) -> Iterator[StressCase]:
 
 
 def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
-    duration, asked = case.scene.duration, np.linspace(0.0, case.scene.duration, 6)
+    duration, asked = case.scene.loads.duration, np.linspace(0.0, case.scene.loads.duration, 6)
     if integrator == "explicit":
         return motions(case, asked, 0.05, ExplicitSolver(case.topology, duration, 50, asked))
     times = np.linspace(0.0, duration, 41)

@@ -55,6 +55,9 @@ def _attempt(draws: RandomDesigns, seed: int, case: StressScene) -> Sequence[Che
     vertices = draws(seed)
     margin = Check("smallest margin, mm", draws.at_bounds(vertices), AT_BOUNDS)
     made = replace(case, vertices=vertices)
-    if case.scene.static:
+    if case.scene.loads.static:
         return [margin, *equilibria(made, np.array([0.5, 1.0]))]
-    return [margin, *motions_as_advised(made, np.linspace(0.0, case.scene.duration, 26), 0.05)]
+    return [
+        margin,
+        *motions_as_advised(made, np.linspace(0.0, case.scene.loads.duration, 26), 0.05),
+    ]

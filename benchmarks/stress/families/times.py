@@ -70,7 +70,7 @@ def _at_frequency(frequency: float, accuracy: str) -> StressCase:
 
 
 def _shaken(case: StressScene, error: float) -> Sequence[Check]:
-    return motions_as_advised(case, np.linspace(0.0, case.scene.duration, 51), error)
+    return motions_as_advised(case, np.linspace(0.0, case.scene.loads.duration, 51), error)
 
 
 def _small() -> StressScene:

@@ -94,7 +94,7 @@ def simulation(
     towards = np.array([*DIRECTIONS[asked.test], 0.0])
     steps = np.arange(len(displacement) + 1.0)
     motion = np.concatenate([[0.0], displacement])[:, None] * towards
-    fixed = topology(lattice, held_dofs(bottom, top), *begin.angles)
+    fixed = topology(lattice, held_dofs(bottom, top), begin.law)
     return SpecimenSimulation(
         lattice,
         lattice.vertices,

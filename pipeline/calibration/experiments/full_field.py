@@ -28,7 +28,7 @@ from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
 from sim.scene import TURN_ALLOWANCE, Scene
-from sim.structure import Parameters
+from sim.structure import DistanceContact, Parameters
 from sim.time_integration import ImplicitSolver
 
 TOLERANCE = 1e-12
@@ -156,7 +156,7 @@ def experiment(
         driven.lattice,
         vertices,
         begin.material.density,
-        float(np.max(driven.material.contact)),
+        float(np.max(driven.structure.material.contact)),
         _solver(
             driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
         ),
@@ -165,7 +165,7 @@ def experiment(
         made.stiffer,
     )
     remarks = (COARSE,) if drive.coarse else ()
-    sees = ELASTIC if driven.static else (*ELASTIC, *DAMPING)
+    sees = ELASTIC if driven.loads.static else (*ELASTIC, *DAMPING)
     return FullFieldExperiment(replace(measured, remarks=remarks), simulation, sees, drive.changes)
 
 
@@ -178,7 +178,8 @@ def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
     """Raises a UserError where the cut-off is wanted of contact that the study has otherwise."""
     if begin.cutoff is None:
         return
-    if scene.contact_distance is not None or not np.isclose(scene.barrier, begin.angles[0]):
+    law = scene.structure.contact
+    if isinstance(law, DistanceContact) or not np.isclose(law.barrier, begin.law.barrier):
         what = "the contact of the problem is not that of which the cut-off is wanted"
         remedy = "give the calibration's contact the law and the barrier_angle of the problem"
         raise UserError(what, file=path, key="contact", remedy=remedy)
@@ -196,7 +197,7 @@ def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
     counts = np.isfinite(motion) & (sigma > 0) & good[..., None]
     counts[0] = False
     counts = counts[:, driven.lattice.id].transpose(1, 2, 0).copy()
-    counts.reshape(-1, counts.shape[2])[driven.held] = False
+    counts.reshape(-1, counts.shape[2])[driven.loads.held] = False
     return np.argwhere(counts)
 
 
@@ -237,10 +238,8 @@ def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
 
 def _solver(driven: Scene, asked: Floats, knots: int) -> AnySolver:
     """The solver of the motion at the asked times, differentiable by every ligament's constants."""
-    whole = topology(
-        driven.lattice, driven.held, driven.barrier, driven.cutoff, None, driven.contact_distance
-    )
-    if driven.static:
+    whole = topology(driven.lattice, driven.loads.held, driven.structure.contact)
+    if driven.loads.static:
         return StaticSolver(whole, asked, relative=TOLERANCE)
-    steps = np.linspace(0.0, driven.duration, STEPS * (knots - 1) + 1)
+    steps = np.linspace(0.0, driven.loads.duration, STEPS * (knots - 1) + 1)
     return ImplicitSolver(whole, steps, asked, STAGES, turn_allowance=TURN_ALLOWANCE)

@@ -16,6 +16,7 @@ from pipeline.calibration.experiments.tracked_specimen import TrackedSpecimen
 from pipeline.calibration.inputs import LoadCell
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
+from sim.structure import DistanceContact
 
 
 class LoadCellReadings(NamedTuple):
@@ -63,12 +64,12 @@ def load_of(
     scene, towards = made.scene, made.towards(case)
     for wrong, what, remedy in (
         (
-            not scene.static,
+            not scene.loads.static,
             "in a motion in time the cell feels the inertia of the grips, too",
             "leave out load: forces count in slow, static motions",
         ),
         (
-            scene.contact_distance is not None,
+            isinstance(scene.structure.contact, DistanceContact),
             "the force of contact by the law of distance is not known",
             "leave out load, or use contact of law: angle",
         ),
@@ -94,6 +95,6 @@ def load_of(
         value[frame],
         asked.noise,
         asked.tare,
-        force_on(scene.lattice, scene.driven, towards),
+        force_on(scene.lattice, scene.loads.driven, towards),
         3 * track.sizes["unit"] + 2,
     )

@@ -15,14 +15,21 @@ from jax import Array
 from pipeline.calibration.inputs import Constants
 from sim.core import Floats, Ints, Numbers
 from sim.quasistatics import StaticSolver
-from sim.solvers import MotionLaw, PrescribedMotion, base, held_values
+from sim.solvers import (
+    MotionLaw,
+    PrescribedMotion,
+    adjoint_cases,
+    differentiable_motion,
+    held_values,
+    solve_cases,
+)
 from sim.structure import ConcreteParameters, Lattice, Material, Parameters, parameters, shape
 from sim.time_integration import ImplicitSolver, time_grid
 
 AnySolver = StaticSolver | ImplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
-"""What is measured of a motion (n_asked, n_units, 3) of given parameters."""
+"""What is measured of a motion (n_times, n_units, 3) of given parameters."""
 
 
 class KnownDrive(PrescribedMotion):
@@ -119,7 +126,7 @@ class SpecimenSimulation:
         """
         made = self.parameters(constants.numbers)
         values = ConcreteParameters(*(np.asarray(part) for part in made))
-        found, _, _ = base.forward(self._solver(constants), values, (drive or self.drive,))
+        found, _, _ = solve_cases(self._solver(constants), values, (drive or self.drive,))
         return np.asarray(self._compiled(found[0], made))
 
     def pulled_back(
@@ -133,10 +140,10 @@ class SpecimenSimulation:
         solver, numbers = self._solver(constants), jnp.asarray(constants.numbers)
         made = self.parameters(numbers)
         values = ConcreteParameters(*(np.asarray(part) for part in made))
-        motion, velocity, records = base.forward(solver, values, (drive or self.drive,))
+        motion, velocity, records = solve_cases(solver, values, (drive or self.drive,))
         by_motion, direct = self._seen_back(motion[0], made, bar)
         still = np.zeros_like(velocity)
-        pulled = base.backward(solver, records, np.asarray(by_motion)[None], still)
+        pulled = adjoint_cases(solver, records, np.asarray(by_motion)[None], still)
         total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
         return np.asarray(self._parameters_back(numbers, Parameters(*total)))
 
@@ -153,7 +160,7 @@ class SpecimenSimulation:
 
         def seen(motion: MotionLaw) -> Array:
             drives = (PrescribedMotion(known.units, motion),)
-            return self.seen(base.simulate(solver, made, drives).displacement[0], made)
+            return self.seen(differentiable_motion(solver, made, drives).displacement[0], made)
 
         return jax.vjp(seen, known.motion)[1](jnp.asarray(bar))[0]
 
@@ -175,4 +182,5 @@ class SpecimenSimulation:
     def _solver(self, constants: Constants) -> AnySolver:
         if constants.cutoff is None:
             return self.solver
-        return replace(self.solver, topology=replace(self.solver.topology, cutoff=constants.cutoff))
+        topology = replace(self.solver.topology, contact=constants.law)
+        return replace(self.solver, topology=topology)

@@ -73,15 +73,15 @@ def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
     path = folder / asked.problem
     problem = problems.load(path, asked.preset)
     scene = scene_of(problem, path.parent)
-    if asked.case >= len(scene.motions):
-        what = f"the problem has {len(scene.motions)} load cases, numbered from zero"
+    if asked.case >= len(scene.loads.motions):
+        what = f"the problem has {len(scene.loads.motions)} load cases, numbered from zero"
         remedy = "give the number of one of them"
         raise UserError(what, file=path, key="case", value=asked.case, remedy=remedy)
-    if asked.structure == "intact" and scene.reference is not None:
-        scene = scene.reference
+    if asked.structure == "intact" and scene.objective.reference is not None:
+        scene = scene.objective.reference
     ones = np.ones(scene.lattice.n_ligaments)
     return TrackedSpecimen(
-        problem, scene, ones * scene.material.axial / problem.material.axial_stiffness
+        problem, scene, ones * scene.structure.material.axial / problem.material.axial_stiffness
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.calibration.inputs.description import Calibration, Name
 from pipeline.problem.sections import UNROTATED_MOMENT, Contact, MaterialConstants
 from sim.core import Floats
+from sim.structure import VoidAngleContact
 
 UNITS: dict[Name, str] = {
     "axial_stiffness": "N/mm",
@@ -69,7 +70,7 @@ class Constants(NamedTuple):
     def value(self, name: Name) -> float:
         """The value of one constant in its working unit."""
         if name == "contact_cutoff":
-            return self.angles[1]
+            return self.law.cutoff
         if name == "damping_ratio":
             return self.ratio
         if name.startswith("damping_"):
@@ -78,16 +79,18 @@ class Constants(NamedTuple):
         return float(getattr(self.material, name))
 
     @property
-    def angles(self) -> tuple[float, float]:
-        """Barrier and cut-off of contact on the void angles, rad; none where there is none."""
+    def law(self) -> VoidAngleContact:
+        """Law of contact on the void angles; of angles that no void has where there is none."""
         if self.contact is None:
-            return -math.inf, -math.inf
+            return VoidAngleContact(-math.inf, -math.inf)
         given = self.contact.cutoff_angle
-        return self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
+        return VoidAngleContact(
+            self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
+        )
 
     def logs(self, names: Sequence[Name]) -> Floats:
         """Natural logarithms of constants; of the cut-off, that of its distance to the barrier."""
-        barrier = self.angles[0]
+        barrier = self.law.barrier
         return np.log(
             [self.value(name) - (barrier if name == "contact_cutoff" else 0.0) for name in names]
         )
@@ -99,7 +102,7 @@ class Constants(NamedTuple):
         cutoff = self.cutoff
         for name, value in zip(names, np.exp(logs).tolist(), strict=True):
             if name == "contact_cutoff":
-                cutoff = self.angles[0] + value
+                cutoff = self.law.barrier + value
             elif name.startswith("damping_"):
                 damping[name.removeprefix("damping_")] = value
             else:
@@ -112,4 +115,4 @@ class Constants(NamedTuple):
 def start(asked: Calibration) -> Constants:
     """The constants that a calibration starts from."""
     made = Constants(asked.material, asked.contact, asked.spacing)
-    return made._replace(cutoff=made.angles[1]) if "contact_cutoff" in asked.fit else made
+    return made._replace(cutoff=made.law.cutoff) if "contact_cutoff" in asked.fit else made

@@ -20,7 +20,7 @@ def test_counts_of_variables() -> None:
 
 
 def test_one_case_keeps_its_direction() -> None:
-    (motion,) = paper_scenes.one_case(paper_scenes.fig2(), 135.0).motions
+    (motion,) = paper_scenes.one_case(paper_scenes.fig2(), 135.0).loads.motions
     assert isinstance(motion, Harmonic)
     assert float(motion.direction) == pytest.approx(np.deg2rad(135.0))
 

@@ -25,7 +25,7 @@ def tracked(scene: Scene, end: float, frames: int) -> tuple[xr.Dataset, np.ndarr
     time = np.linspace(0, end, frames)
     plan = make_plan(scene, scene.lattice.vertices, time)
     values = concrete_parameters(scene, scene.lattice.vertices)
-    motion = solve_case(plan.solver, values, scene.drives[0])[0].reshape(frames, -1, 3)
+    motion = solve_case(plan.solver, values, scene.loads.cases[0])[0].reshape(frames, -1, 3)
     noise = SIGMA * np.random.default_rng(7).standard_normal(motion.shape)
     dims = ("time", "unit", "dof")
     track = xr.Dataset(
@@ -74,7 +74,7 @@ def test_a_motion_in_time_is_found_again() -> None:
 def test_frames_that_show_nothing_are_bridged(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 40)
     units = track["unit"].values
-    clamped, driven, hidden = units[0], units[-1], pressed.lattice.id[pressed.driven[1]]
+    clamped, driven, hidden = units[0], units[-1], pressed.lattice.id[pressed.loads.driven[1]]
     measured = track["displacement"]
     measured.loc[{"unit": clamped}] = np.nan
     measured.loc[{"unit": hidden}] = np.nan
@@ -93,7 +93,7 @@ def test_frames_that_show_nothing_are_bridged(pressed: Scene) -> None:
 
 def test_a_drive_that_nobody_saw_is_refused(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 9)
-    track["displacement"][:, pressed.driven] = np.nan
+    track["displacement"][:, pressed.loads.driven] = np.nan
     with pytest.raises(UserError, match="no driven unit was seen"):
         held_motion(track, pressed)
 
@@ -109,7 +109,9 @@ def test_the_filter_departs_by_the_uncertainty_and_keeps_a_jump_of_speed() -> No
 
 def test_a_path_that_cannot_be_followed_is_kept_so_far(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 20)
-    track["displacement"][:, pressed.driven[0], 2] += np.linspace(0, 3, 20)  # into its neighbour
+    track["displacement"][:, pressed.loads.driven[0], 2] += np.linspace(
+        0, 3, 20
+    )  # into its neighbour
     structure = PosedStructure(pressed, pressed.lattice.vertices)
     made = redriven(structure, held_motion(track, pressed), track["time"].values)
     assert "no equilibrium" in (made.failure or "")

@@ -39,14 +39,14 @@ def robust(fig2: Path, tmp_path: Path) -> Path:
 
 def test_the_drives_own_cases_come_first(robust: Path) -> None:
     scene = design_scene(load(robust), robust.parent)
-    drives = [motion for motion in scene.motions if isinstance(motion, Harmonic)]
+    drives = [motion for motion in scene.loads.motions if isinstance(motion, Harmonic)]
     assert [each.frequency for each in drives] == [2.0] * 4 + [8.0] * 4 + [2.0] * 4
     assert [each.amplitude for each in drives] == [4.5] * 8 + [3.0] * 4
-    np.testing.assert_allclose(scene.weights, np.repeat([0.1, 0.1, 0.05], 4))
-    assert scene.frequency == 8.0
-    assert scene.copies is not None
-    assert scene.copies.shape == (2, scene.lattice.n_groups, 2)
-    assert 0.29 < np.abs(scene.copies).max() <= 0.3
+    np.testing.assert_allclose(scene.loads.case_weights, np.repeat([0.1, 0.1, 0.05], 4))
+    assert scene.loads.drive_frequency == 8.0
+    assert scene.design.copies is not None
+    assert scene.design.copies.shape == (2, scene.lattice.n_groups, 2)
+    assert 0.29 < np.abs(scene.design.copies).max() <= 0.3
 
 
 def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
@@ -108,7 +108,7 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
     assert not load(fig2, "edge3").asks_more_than(own)
     scene = design_scene(pulse, fig2.parent)
     times = np.linspace(0.0, 0.4, 401)
-    largest = max(np.abs(drive.motion(times)).max() for drive in scene.drives)
+    largest = max(np.abs(drive.motion(times)).max() for drive in scene.loads.cases)
     assert largest == pytest.approx(4.5)
 
 

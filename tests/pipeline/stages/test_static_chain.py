@@ -67,7 +67,7 @@ def stopping(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
         def forward(
             solver: StaticSolver, values: ConcreteParameters, drive: PrescribedMotion
         ) -> tuple[Floats, Floats, StaticRecord]:
-            beyond = np.flatnonzero(solver.asked > load * (1 + 1e-9))
+            beyond = np.flatnonzero(solver.output_times > load * (1 + 1e-9))
             if solver.topology.n_units == 24 and len(beyond):
                 raise SimulationError("no equilibrium found", step=int(beyond[0]), unit=12)
             return whole(solver, values, drive)

@@ -49,7 +49,7 @@ def drive(scene: Scene, **asked: object) -> Shaken:
 def test_a_drive_without_faults_is_the_planned_one(study: tuple[Problem, Scene]) -> None:
     scene = study[1]
     every = np.asarray(drive(scene)(TIMES))
-    planned = np.asarray(scene.motions[0](TIMES))
+    planned = np.asarray(scene.loads.motions[0](TIMES))
     np.testing.assert_allclose(every, np.repeat(planned[:, None], 5, axis=1), atol=1e-12)
 
 

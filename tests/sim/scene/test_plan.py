@@ -64,7 +64,7 @@ def test_skipped_contact_changes_nothing() -> None:
     assert isinstance(solver, ImplicitSolver)
     assert len(solver.touching(values)) < posed.lattice.n_ligaments
     complete = replace(solver, turn_allowance=np.inf)
-    for drive in posed.drives:
+    for drive in posed.loads.cases:
         skipping, full = (solve_case(s, values, drive)[0] for s in (solver, complete))
         assert relative(skipping, full) < NEGLIGIBLE
 
@@ -79,8 +79,8 @@ def test_a_void_that_closes_after_all_is_not_skipped() -> None:
     assert isinstance(solver, ImplicitSolver)
     careless = replace(solver, turn_allowance=0.01)
     assert len(careless.touching(values)) < posed.lattice.n_ligaments
-    motion = solve_case(careless, values, posed.drives[0])[0]
-    complete = solve_case(replace(solver, turn_allowance=np.inf), values, posed.drives[0])[0]
+    motion = solve_case(careless, values, posed.loads.cases[0])[0]
+    complete = solve_case(replace(solver, turn_allowance=np.inf), values, posed.loads.cases[0])[0]
     states = complete.reshape(len(complete), -1, 3)
     assert posed.topology.smallest_void_angle(values.void, states).min() < CUTOFF
     assert relative(motion, complete) < NEGLIGIBLE
@@ -135,7 +135,7 @@ def test_skipped_derivatives_change_nothing(integrator: str) -> None:
     )
     plan = make_plan(posed)
     assert len(posed.topology.designed) < posed.lattice.n_ligaments
-    complete = topology(posed.lattice, posed.held, BARRIER, CUTOFF)
+    complete = topology(posed.lattice, posed.loads.held, BARRIER, CUTOFF)
     solver = plan.solver
     assert isinstance(solver, ImplicitSolver | ExplicitSolver)
     design = design_of(posed)
@@ -153,7 +153,7 @@ def test_skipped_derivatives_of_equilibria_change_nothing() -> None:
     assert len(posed.topology.designed) < posed.lattice.n_ligaments
     solver = plan.solver
     assert isinstance(solver, StaticSolver)
-    complete = replace(solver, topology=topology(posed.lattice, posed.held, BARRIER, CUTOFF))
+    complete = replace(solver, topology=topology(posed.lattice, posed.loads.held, BARRIER, CUTOFF))
     design = design_of(posed)
     _, gradient, _ = evaluator(posed, plan)(design)
     _, full, _ = evaluator(posed, replace(plan, solver=complete))(design)
@@ -169,7 +169,9 @@ def test_the_evaluator_is_the_derivative_of_the_losses() -> None:
     of_cases = losses(posed, plan)
     np.testing.assert_allclose(each, of_cases(jnp.asarray(design)), rtol=1e-13)
     assert loss == pytest.approx(0.3 * each[0] + 0.7 * each[1], rel=1e-13)
-    by_jax = jax.grad(lambda x: jnp.asarray(posed.weights) @ of_cases(x))(jnp.asarray(design))
+    by_jax = jax.grad(lambda x: jnp.asarray(posed.loads.case_weights) @ of_cases(x))(
+        jnp.asarray(design)
+    )
     assert relative(gradient, np.asarray(by_jax)) < NEGLIGIBLE
 
 

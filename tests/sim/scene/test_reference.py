@@ -58,7 +58,7 @@ def test_inertia_and_damping_are_the_references() -> None:
 
 def test_regions_are_the_references() -> None:
     stored = reference("A")
-    np.testing.assert_array_equal(scene_a().region, stored["roi_blocks"])
+    np.testing.assert_array_equal(scene_a().objective.region, stored["roi_blocks"])
     designed = sum(int(stored[f"mask_{kind}_design"].sum()) for kind in ("horizontal", "vertical"))
     assert scene_a().space.n_variables == 2 * designed == 304
 
@@ -72,19 +72,24 @@ class Outcome(NamedTuple):
 
 def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
     scene = scene_a(accuracy=accuracy)
-    plan = make_plan(scene, asked=SAMPLES)
-    measure = DisplacementMimicking(scene.region, scene.lattice.spacing, np.ones(len(SAMPLES)))
+    plan = make_plan(scene, times=SAMPLES)
+    measure = DisplacementMimicking(
+        scene.objective.region, scene.lattice.spacing, np.ones(len(SAMPLES))
+    )
     of_design = structure(scene)
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        response = simulate(plan.solver, values, scene.drives)
+        response = simulate(plan.solver, values, scene.loads.cases)
         return measure(response.displacement, values)[0], response.displacement
 
     design = jnp.zeros(scene.space.n_variables)
     (value, motion), gradient = jax.value_and_grad(loss, has_aux=True)(design)
     return Outcome(
-        plan.integrator, np.asarray(motion)[0][:, scene.region], float(value), np.asarray(gradient)
+        plan.integrator,
+        np.asarray(motion)[0][:, scene.objective.region],
+        float(value),
+        np.asarray(gradient),
     )
 
 
@@ -123,15 +128,15 @@ def test_scene_a_at_tight_accuracy(tight_a: Outcome) -> None:
 def test_error_estimate_by_halving_the_steps() -> None:
     """Each step cut in two: what changes is the true error within a factor of 3."""
     scene, stored = scene_a(), reference("A")
-    solver = make_plan(scene, asked=SAMPLES).solver
+    solver = make_plan(scene, times=SAMPLES).solver
     values = concrete_parameters(scene, scene.lattice.vertices)
     scale = np.array([15.0, 15.0, 1.0])
 
     def in_region(motion: Floats) -> Floats:
-        return motion.reshape(len(SAMPLES), -1, 3)[:, scene.region] / scale
+        return motion.reshape(len(SAMPLES), -1, 3)[:, scene.objective.region] / scale
 
-    coarse, _, record = solve_case(solver, values, scene.drives[0])
-    fine = solve_case(solver.refined(record), values, scene.drives[0])[0]
+    coarse, _, record = solve_case(solver, values, scene.loads.cases[0])
+    fine = solve_case(solver.refined(record), values, scene.loads.cases[0])[0]
     found, finer = in_region(coarse), in_region(fine)
     exact = stored["roi_displacement_tight_mm_mm_rad"] / scale
     assert 1 / 3 < relative(found, finer) / relative(found, exact) < 3
@@ -149,13 +154,13 @@ def static_measure(scene: Scene, name: str, n_loads: int) -> StrainEnergyMimicki
 @pytest.mark.parametrize("name", ["B", "C"])
 def test_final_equilibrium(name: str) -> None:
     scene, stored = compressed(name), reference(name)
-    end = np.array([scene.duration])
-    plan = make_plan(scene, asked=end)
+    end = np.array([scene.loads.duration])
+    plan = make_plan(scene, times=end)
     measure, of_design = static_measure(scene, name, 1), structure(scene)
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        response = simulate(plan.solver, values, scene.drives)
+        response = simulate(plan.solver, values, scene.loads.cases)
         return measure(response.displacement, values)[0], response.displacement
 
     design = jnp.zeros(scene.space.n_variables)
@@ -169,9 +174,9 @@ def test_final_equilibrium(name: str) -> None:
 def test_path_of_scene_b() -> None:
     scene, stored = compressed("B"), reference("B")
     amplitudes = stored["static_path_amps_mm"]
-    plan = make_plan(scene, asked=amplitudes)
+    plan = make_plan(scene, times=amplitudes)
     values = concrete_parameters(scene, scene.lattice.vertices)
-    motion = simulate(plan.solver, values, scene.drives).displacement[0]
+    motion = simulate(plan.solver, values, scene.loads.cases).displacement[0]
     np.testing.assert_allclose(motion, stored["static_path_u"], rtol=0, atol=1e-6)
     measure = static_measure(scene, "B", 1)
     each = [measure(state[None, None], values)[0] for state in motion]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -48,7 +46,7 @@ def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
     design = design_of(posed, 0.2)
     value, gradient, each = evaluate(design)
     assert each.shape == (8,)
-    assert posed.weights @ each < value < each.max()
+    assert posed.loads.case_weights @ each < value < each.max()
     steepest = float(np.linalg.norm(gradient))
     way = gradient / steepest
     ahead, behind = (evaluate(design + s * way)[0] for s in (1e-4, -1e-4))
@@ -57,19 +55,19 @@ def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
 
 def test_the_loss_over_copies_is_the_mean_of_theirs() -> None:
     posed = robust()
-    assert posed.copies is not None
+    assert posed.design.copies is not None
     design = design_of(posed, 0.2)
     whole = evaluator(posed, make_plan(posed))(design)[0]
     alone = []
-    for shifts in posed.copies:
-        one = replace(posed, copies=shifts[None])
+    for shifts in posed.design.copies:
+        one = posed.updated(copies=shifts[None])
         alone.append(evaluator(one, make_plan(one))(design)[0])
     assert whole == pytest.approx(np.mean(alone), rel=1e-12)
     assert alone[0] != pytest.approx(alone[1], rel=1e-3)
 
 
 def test_turned_copies_of_cases_are_skipped_for_each_load() -> None:
-    plan = make_plan(replace(robust(), copies=None, symmetry="C4"))
+    plan = make_plan(robust().updated(copies=None, symmetry="C4"))
     np.testing.assert_array_equal(plan.case_of, [0, 1, 0, 1, 4, 5, 4, 5])
 
 

@@ -44,34 +44,36 @@ def shaken_lattice() -> Scene:
     )
     holed = intact.without(HOLE)
     places = holed.positions(kept)
-    return replace(
-        whole, lattice=holed, driven=holed.positions(left), region=places, reference=whole
+    return whole.updated(
+        lattice=holed, driven=holed.positions(left), region=places, reference=whole
     )
 
 
 def motion(scene: Scene, finer: int = 1) -> tuple[Floats, Floats]:
-    """Displacement (n_asked, n_units, 3), and smallest void angle at each time."""
+    """Displacement (n_times, n_units, 3), and smallest void angle at each time."""
     values = concrete_parameters(scene, scene.lattice.vertices)
     solver = make_plan(scene, scene.lattice.vertices).solver
     assert isinstance(solver, ExplicitSolver)
     finer_solver = replace(solver, n_steps=finer * solver.n_steps)
-    states = solve_case(finer_solver, values, scene.drives[0])[0].reshape(scene.samples, -1, 3)
+    states = solve_case(finer_solver, values, scene.loads.cases[0])[0].reshape(
+        scene.objective.samples, -1, 3
+    )
     return states, scene.topology.smallest_void_angle(values.void, states)
 
 
 def loss(scene: Scene, whole: Floats, part: Floats) -> float:
     """Of a holed lattice whose intact one moves as ``whole``."""
-    assert scene.reference is not None
-    measure = objective(scene, whole[None][:, :, scene.reference.region])
+    assert scene.objective.reference is not None
+    measure = objective(scene, whole[None][:, :, scene.objective.reference.region])
     values = concrete_parameters(scene, scene.lattice.vertices)
     return float(measure(part[None], values)[0])
 
 
 def test_the_chosen_steps_agree_with_much_shorter_ones() -> None:
     holed = shaken_lattice()
-    assert holed.reference is not None
-    (whole, closed), (part, _) = motion(holed.reference), motion(holed)
-    (fine_whole, _), (fine_part, _) = motion(holed.reference, 6), motion(holed, 6)
+    assert holed.objective.reference is not None
+    (whole, closed), (part, _) = motion(holed.objective.reference), motion(holed)
+    (fine_whole, _), (fine_part, _) = motion(holed.objective.reference, 6), motion(holed, 6)
     assert BARRIER < closed.min() < CUTOFF
     for coarse, fine in ((whole, fine_whole), (part, fine_part)):
         np.testing.assert_allclose(coarse, fine, atol=1e-2 * np.abs(fine).max())
@@ -106,7 +108,7 @@ def pushed(bias_deg: float) -> Rig:
 
 
 def undamped(rig: Rig, step: float, n_steps: int) -> tuple[Floats, Floats]:
-    """Displacement and velocity (n_asked, n_dofs) every second step after the push."""
+    """Displacement and velocity (n_times, n_dofs) every second step after the push."""
     values = rig.values._replace(damping=np.zeros_like(rig.values.damping))
     asked = np.asarray(step * np.arange(500, n_steps + 1, 2))
     solver = ExplicitSolver(rig.topology, n_steps * step, n_steps, asked)

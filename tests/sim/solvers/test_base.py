@@ -66,7 +66,7 @@ def test_gradients_of_cases_add_up(solver: Solver) -> None:
 @EVERY_SOLVER
 def test_held_units_follow_their_drive_exactly(solver: Solver) -> None:
     response = simulate(solver, RIG.parameters(RIG.numbers), drives(0.6))
-    times = np.asarray(solver.asked)
+    times = np.asarray(solver.output_times)
     along = np.array([np.cos(0.6), np.sin(0.6), 0.0])
     wave = 0.5 * np.sin(100 * np.pi * times)
     rate = 50 * np.pi * np.cos(100 * np.pi * times)

@@ -49,7 +49,7 @@ DYNAMIC: dict[str, Callable[[Rig], Solver]] = {
 
 
 def path(rig: Rig, solver: Solver) -> Floats:
-    """States (n_asked, n_units, 3) of a rig."""
+    """States (n_times, n_units, 3) of a rig."""
     found = solve_case(solver, rig.values, rig.drive)[0]
     return found.reshape(len(found), -1, 3)
 

@@ -154,7 +154,7 @@ class Ray:
 
     def in_contact(self, step: float, times: Floats) -> NDArray[np.bool_]:
         """Which ligaments are in contact when."""
-        watching = replace(self.solver, asked=times)  # type: ignore[type-var]
+        watching = replace(self.solver, output_times=times)  # type: ignore[type-var]
         values = self.rig.parameters(self.at(step))
         drive = PrescribedMotion(self.rig.driven, self.at(step).drive)
         motion = np.asarray(simulate(watching, values, (drive,)).displacement[0])
@@ -189,10 +189,10 @@ def test_equilibria_in_contact(quantity: str) -> None:
     rig = squeezed(9.0)
     solver = SOLVERS["static"](rig)
     ray = Ray(rig, solver, quantity)
-    pattern = ray.in_contact(0.0, solver.asked)
+    pattern = ray.in_contact(0.0, solver.output_times)
     assert pattern.any()
     for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
-        np.testing.assert_array_equal(ray.in_contact(step, solver.asked), pattern)
+        np.testing.assert_array_equal(ray.in_contact(step, solver.output_times), pattern)
     assert_exact_in_contact(ray)
 
 

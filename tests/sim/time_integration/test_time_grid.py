@@ -50,9 +50,9 @@ def test_dense_output_reproduces_cubics() -> None:
 
 @pytest.mark.parametrize("asked", [[0.0, 1.1], [-0.1, 1.0], [0.5, 0.4]])
 def test_output_outside_of_the_run_or_out_of_order_is_refused(asked: list[float]) -> None:
-    time_grid.refuse_outside(np.array([0.0, 0.5, 0.5, 1.0 + 1e-12]), 1.0)
+    time_grid.check_output_times(np.array([0.0, 0.5, 0.5, 1.0 + 1e-12]), 1.0)
     with pytest.raises(ValueError, match="must ascend from 0 to 1 s"):
-        time_grid.refuse_outside(np.array(asked), 1.0)
+        time_grid.check_output_times(np.array(asked), 1.0)
 
 
 def test_simpson_weights_are_exact_for_cubics() -> None:

@@ -1,0 +1,242 @@
+"""Simulates a scene: the one way from a structure to its motion, forces and losses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Floats, Numbers
+from sim.energy import Observables, observe
+from sim.scene.objectives import (
+    DisplacementMimicking,
+    RelativeMimicking,
+    StrainEnergyMimicking,
+    combined,
+    extent,
+)
+from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
+from sim.scene.scene import Scene
+from sim.solvers import Case, Solver, differentiable_motion, solve_cases
+from sim.structure import ConcreteParameters, Parameters, parameters, shape
+from sim.time_integration import simpson_weights
+
+Mimicking = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
+
+
+@dataclass(frozen=True)
+class Response:
+    """Holds the simulated motion of a structure, and what follows from it.
+
+    Attributes:
+        scene: what was simulated.
+        plan: how.
+        parameters: of the structure.
+        cases: (n_cases,) numbers of the load cases that were simulated.
+        displacement: (n_cases, n_times, n_units, 3) mm, mm, rad.
+        velocity: (n_cases, n_times, n_units, 3) mm/s, mm/s, rad/s.
+        solvers, records: of each case; none where the response is differentiated by JAX.
+    """
+
+    scene: Scene
+    plan: Plan
+    parameters: Parameters[Any]
+    cases: tuple[int, ...]
+    displacement: Any
+    velocity: Any
+    solvers: tuple[Solver, ...] = ()
+    records: tuple[Any, ...] = ()
+
+    @property
+    def times(self) -> Floats:
+        """(n_times,) s; load parameters of a static scene."""
+        return self.plan.solver.output_times
+
+    @cached_property
+    def observables(self) -> tuple[Observables, ...]:
+        """(n_cases,) energies, reactions and strains of every state."""
+        topology = self.scene.topology
+        return tuple(observe(topology, self.parameters, motion) for motion in self.displacement)
+
+    @cached_property
+    def drive_force(self) -> Floats:
+        """(n_cases, n_times, 2) force on the driven units, N."""
+        driven = self.scene.loads.driven
+        return np.stack([each.force_on(driven) for each in self.observables])
+
+    @cached_property
+    def losses(self) -> Array:
+        """(n_cases,) of all load cases; differentiable by JAX.
+
+        Raises:
+            ValueError: the times are not those of the scene's loss, or load cases are missing.
+        """
+        if not np.array_equal(self.times, sample_times(self.scene)):
+            raise ValueError("the loss is taken at sample_times(scene): leave the times out")
+        place = [self.cases.index(case) for case in self.plan.case_of]
+        return mimicking(self.scene)(self.displacement, self.parameters)[np.array(place)]
+
+    @property
+    def loss(self) -> Array:
+        """What is minimised: the weighted mean of the losses, or their p-mean."""
+        scene = self.scene
+        return combined(self.losses, scene.loads.case_weights, scene.objective.sharpness)
+
+    def refined(self) -> Response:
+        """The same with half the steps, to estimate the error by.
+
+        Raises:
+            SimulationError: a step failed.
+        """
+        pairs = zip(self.solvers, self.records, strict=True)
+        return _solved(self, tuple(solver.refined(record) for solver, record in pairs))
+
+
+def simulate(
+    scene: Scene,
+    design: Numbers | None = None,
+    *,
+    vertices: Floats | None = None,
+    times: Floats | None = None,
+    cases: Iterable[int] | None = None,
+    plan: Plan | None = None,
+    threads: int = 1,
+) -> Response:
+    """Simulates a structure under the load cases of a scene.
+
+    It is differentiable by the ``design``: ``jax.grad``, ``vjp`` and ``jacrev`` of functions of the
+    displacement, the velocity or the losses run the exact adjoint of the steps taken. Under
+    ``jax.jit``, ``vmap`` and ``jvp`` it raises a TypeError.
+
+    Args:
+        scene: the scene.
+        design: (n_variables,) design vector, mm; by default the initial structure.
+        vertices: (n_vertices, 2) of the structure instead, mm.
+        times: (n_times,) of the output, s; by default those of the loss.
+        cases: numbers of the load cases; by default all, or those of the ``plan``.
+        plan: of `make_plan`, to be made once where many designs are simulated alike.
+        threads: cases solved side by side.
+
+    Raises:
+        SimulationError: a step failed even after it was cut; the error names it.
+    """
+    made = plan or make_plan(scene, vertices, times, threads, every_case=True)
+    chosen = tuple(int(case) for case in (made.simulated if cases is None else cases))
+    if vertices is not None or design is None:
+        network = scene.lattice.vertices if vertices is None else vertices
+        values: Parameters[Any] = concrete_parameters(scene, network)
+    else:
+        values = parameters_of_design(scene)(jnp.asarray(design))
+    if isinstance(values.arm, jax.core.Tracer):
+        drives = tuple(scene.loads.cases[case] for case in chosen)
+        return Response(
+            scene, made, values, chosen, *differentiable_motion(made.solver, values, drives)
+        )
+    concrete = ConcreteParameters(*(np.asarray(part) for part in values))
+    empty = Response(scene, made, concrete, chosen, np.empty(0), np.empty(0))
+    return _solved(empty, (made.solver,) * len(chosen))
+
+
+def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:
+    """The response by other solvers."""
+    drives = [response.scene.loads.cases[case] for case in response.cases]
+    solver = response.plan.solver
+    displacement, velocity, made = solve_cases(solver, response.parameters, drives, solvers)
+    return replace(
+        response,
+        displacement=displacement,
+        velocity=velocity,
+        solvers=solvers,
+        records=tuple(made.records),
+    )
+
+
+def cases_of(
+    scene: Scene, vertices: Floats, solver: Solver, numbers: Iterable[int] | None = None
+) -> Iterator[Case]:
+    """Load cases of a structure for `run_batch`; all, or those of the ``numbers``."""
+    values, drives = concrete_parameters(scene, vertices), scene.loads.cases
+    chosen = range(len(drives)) if numbers is None else numbers
+    return (Case(values, drives[number], solver, int(number)) for number in chosen)
+
+
+def mimicking(
+    scene: Scene, target: Floats | None = None, weights: Floats | None = None
+) -> Mimicking:
+    """Builds the loss of a scene, a function of the motion and the parameters.
+
+    On samples it is the mean over the duration, by Simpson's rule; on load steps an energy is
+    averaged. A motion to mimic gives a relative error: on samples the root of the mean square over
+    the target's greatest size, on load steps the root of the sum of squares over its size at the
+    last step (the authors' measure).
+
+    Args:
+        scene: the scene.
+        target: (n_cases, n_times, n_region, 3) what ``target_motion`` returned; it is simulated
+            anew if a scene with a reference comes without.
+        weights: (n_times,) of other samples than the scene's own.
+
+    Raises:
+        ValueError: the scene has no region of interest.
+    """
+    lattice, asked = scene.lattice, scene.objective
+    given = _weights(scene) if weights is None else weights
+    if len(asked.region) == 0:
+        raise ValueError("the objective of the scene has no region of interest")
+    if asked.kind == "strain_energy":
+        ligaments = scene.region_ligaments
+        return StrainEnergyMimicking(ligaments, lattice.ligament_units[ligaments], given)
+    if asked.reference is None:
+        return DisplacementMimicking(asked.region, lattice.spacing, given)
+    aim = target_motion(scene) if target is None else target
+    size = extent(aim, lattice.spacing)
+    whole = size.max(axis=1) if asked.steps is None else size[:, -1] / np.sqrt(asked.steps)
+    return RelativeMimicking(asked.region, lattice.spacing, given, aim, whole)
+
+
+def _weights(scene: Scene) -> Floats:
+    asked = scene.objective
+    if asked.steps is None:
+        return simpson_weights(asked.samples, 1.0)
+    return np.full(asked.steps, 1 / asked.steps)
+
+
+def target_motion(scene: Scene, threads: int = 1) -> Floats:
+    """Simulates the region of the reference: motion (n_cases, n_times, n_region, 3) at the samples.
+
+    Raises:
+        SimulationError: the reference cannot be simulated.
+    """
+    reference = scene.objective.reference
+    if reference is None:
+        raise ValueError("the scene has no reference: it is compared with rest")
+    response = simulate(reference, vertices=reference.lattice.vertices, threads=threads)
+    return np.asarray(response.displacement[:, :, reference.objective.region])
+
+
+@lru_cache(maxsize=16)
+def parameters_of_design(
+    scene: Scene, copy: int | None = None
+) -> Callable[[Array], Parameters[Array]]:
+    """Compiles the map from a design vector to the parameters of its structure.
+
+    With a ``copy``, to those of that one of the design's imperfect copies.
+    """
+    copies = scene.design.copies
+    of_group = (
+        np.zeros((scene.lattice.n_groups, 2)) if copies is None or copy is None else copies[copy]
+    )
+    off = jnp.asarray(of_group)[scene.lattice.group]
+
+    @jax.jit
+    def of_design(design: Array) -> Parameters[Array]:
+        made = shape(scene.lattice, scene.space.vertices(design) + off)
+        return parameters(scene.lattice, made, scene.structure.material)
+
+    return of_design

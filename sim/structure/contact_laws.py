@@ -1,0 +1,33 @@
+"""Defines the two laws of contact between units; the stiffness is a constant of the material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+
+@dataclass(frozen=True)
+class VoidAngleContact:
+    """Lets joined units touch where the void between them closes (the authors' law).
+
+    Attributes:
+        barrier: void angle at which the energy is infinite, rad.
+        cutoff: void angle above which there is no contact, rad.
+    """
+
+    barrier: float
+    cutoff: float
+
+
+@dataclass(frozen=True)
+class DistanceContact:
+    """Lets any two units touch where their outlines come near each other.
+
+    Attributes:
+        distance: activation distance, beyond which there is no contact, mm.
+    """
+
+    distance: float
+
+
+ContactModel: TypeAlias = VoidAngleContact | DistanceContact
