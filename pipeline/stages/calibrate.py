@@ -36,7 +36,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-
     asked = section(path, Calibration)
     fit = fitted(asked, path)
     try:
@@ -57,7 +56,6 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
 
 
 def _synthesise(path: Path, args: argparse.Namespace) -> None:
-
     asked = section(path, Calibration)
     if asked.virtual is None:
         remedy = "its data are measured: run python -m pipeline calibrate FILE --out NC"

@@ -6,7 +6,9 @@ import argparse
 import logging
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
@@ -22,28 +24,24 @@ from pipeline.posing import (
     start_of,
     unit_coordinates,
 )
+from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
 from sim.constraints import KIND_NAMES, ConstraintVector, margins
-from sim.core import SimulationError
+from sim.core import Floats, SimulationError
 from sim.optimise import (
+    Evaluate,
+    Evaluation,
     InfeasibleStartError,
     Journal,
     JournalInUseError,
     MmaOptions,
+    Result,
     SqpOptions,
     minimise,
 )
 from sim.quasistatics import StaticSolver
-from sim.scene import Evaluator, Paths, make_plan
+from sim.scene import Evaluator, Paths, Plan, Scene, make_plan
 from sim.structure import overlapping_pairs, shape, smallest_gap
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from sim.core import Floats
-    from sim.optimise import Evaluate, Evaluation, MmaOptions, Result, SqpOptions
-    from sim.scene import Plan, Scene
 
 LOG = logging.getLogger(__name__)
 
@@ -107,8 +105,6 @@ def optimise(
 
     It starts from the initial lattice, or from the design vector ``start`` (n_variables,).
     """
-    import numpy as np
-
     budget = asked.optimiser.methods.chosen.get(method)
     if budget is None:
         raise UserError(
@@ -161,7 +157,6 @@ def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
-
     wanted = asked.optimiser
     evaluations = wanted.methods.chosen[method].evaluations
     if method == "mma":
@@ -177,9 +172,6 @@ def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
 
 def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     """The dataset ``design_method`` of an optimisation."""
-    import numpy as np
-    import xarray as xr
-
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))

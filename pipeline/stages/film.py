@@ -6,13 +6,14 @@ import argparse
 import logging
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
 from pipeline.runtime import UserError, cli, found_in, write_atomically
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import WORD, Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import of_design
 from pipeline.virtual_lab import (
@@ -23,12 +24,6 @@ from pipeline.virtual_lab import (
     of_structure,
     prepared,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem.sections import VirtualRecording
-    from pipeline.tracking.frames import Recording
 
 LOG = logging.getLogger(__name__)
 
@@ -87,7 +82,6 @@ def _plan(args: argparse.Namespace) -> None:
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
-
     asked, virtual = _virtual(path)
     if out.suffix not in virtual.codec.suffixes:
         raise UserError(

@@ -6,23 +6,17 @@ import argparse
 import hashlib
 import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
 from pipeline.posing import loss_units, read_design, setting_losses
-from pipeline.problem.sections import sweep_cases, taken_apart
-from pipeline.runtime import SweepResult, UserError, case_log, cli, source_hash
+from pipeline.problem import Problem
+from pipeline.problem.sections import DirectionGroup, Word, sweep_cases, taken_apart
+from pipeline.runtime import Casebook, SweepResult, UserError, case_log, cli, source_hash
 from sim.core import SimulationError
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from pipeline.problem.sections import DirectionGroup, Word
-    from pipeline.runtime import Casebook, SweepResult
 
 LOG = logging.getLogger(__name__)
 
@@ -33,7 +27,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
-
     asked = problem.load(args.problem, args.preset)
     if asked.sweep is None:
         raise UserError(
@@ -84,7 +77,6 @@ def _simulate(
 def _results(
     args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: DirectionGroup
 ) -> list[SweepResult]:
-
     setting = group.together
     try:
         found = setting_losses.results(asked, setting, args.problem.parent, vertices, args.threads)
@@ -99,8 +91,6 @@ def dataset(
     asked: Problem, cases: Sequence[tuple[int, dict[str, Word]]], found: dict[int, SweepResult]
 ) -> xr.Dataset:
     """The dataset ``sweep`` of some cases."""
-    import xarray as xr
-
     assert asked.sweep is not None
     keys = asked.sweep.keys
     numbers = [number for number, _ in cases]

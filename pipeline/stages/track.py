@@ -10,15 +10,16 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
     WORD,
+    Recording,
     frames,
     import_video,
     length,
@@ -29,15 +30,9 @@ from pipeline.tracking.frames import (
 )
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, of_design
-from pipeline.tracking.motion import follow
+from pipeline.tracking.motion import Track, follow
 from pipeline.tracking.output import assemble_track, dic_points, is_driven, track_table
 from pipeline.tracking.reference_frame import Setup, proposal
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.tracking.frames import Recording
-    from pipeline.tracking.motion import Track
 
 LOG = logging.getLogger(__name__)
 
@@ -62,7 +57,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _points(path: Path, args: argparse.Namespace) -> None:
-
     asked = dic_points.load(path)
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
@@ -111,7 +105,6 @@ def _init(video: Path, args: argparse.Namespace) -> None:
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:
-
     described = import_video.description(path)
     shown = import_video.video_of(path) if args.video is None else args.video
     name, folder = shown.stem, args.out_dir
@@ -127,7 +120,6 @@ def _import(path: Path, args: argparse.Namespace) -> None:
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:
-
     if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
         remedy = f"python -m pipeline track init {path} --design NC proposes a recording of it"
         raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
