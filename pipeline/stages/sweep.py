@@ -15,7 +15,7 @@ from pipeline.datasets import chunked, provenance
 from pipeline.posing import loss_units, read_design, setting_losses
 from pipeline.problem import Problem
 from pipeline.problem.sections import DirectionGroup, Word, sweep_cases, taken_apart
-from pipeline.runtime import Casebook, SweepResult, UserError, case_log, cli, source_hash
+from pipeline.runtime import CaseLog, SweepResult, UserError, case_log, cli, source_hash
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ def _run(args: argparse.Namespace) -> None:
     here = sweep_cases.part(asked.sweep, args.chunk, args.chunks)
     found = case_log.known(folder)
     path = folder / f"part_{args.chunk}.csv"
-    with case_log.Casebook(path, asked.sweep.keys) as book:
+    with case_log.CaseLog(path, asked.sweep.keys) as book:
         LOG.info("results as they come: %s", path)
         _simulate(args, asked, design["vertices"], here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
@@ -58,7 +58,7 @@ def _simulate(
     vertices: xr.DataArray,
     groups: Sequence[DirectionGroup],
     found: dict[int, SweepResult],
-    book: Casebook,
+    book: CaseLog,
 ) -> None:
     """Adds what is missing to ``found`` and to the casebook."""
     failed = 0

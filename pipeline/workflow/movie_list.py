@@ -1,4 +1,4 @@
-"""Which movie shows which studies, one after another: the movies of the paper."""
+"""Lists the movies of the paper, with the studies that each shows one after another."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ MOVIES: dict[str, tuple[str, ...]] = {
 
 
 def showing(studies: Collection[str]) -> list[str]:
-    """Names of the movies that show any of these studies."""
+    """Lists the movies that show any of these studies."""
     return [name for name, shown in MOVIES.items() if not set(shown).isdisjoint(studies)]
