@@ -23,7 +23,7 @@ def calibrations(root: Path = WORK) -> list[str]:
 
 
 def measurements(wildcards: Wildcards) -> dict[str, str]:
-    """Lists the files that a fit depends on: YAML, measured files and problems, or computed ones."""
+    """Lists the files that a fit depends on: YAML, measured files, problems, or computed ones."""
     source = f"{_FOLDER}/{wildcards.calibration}.yaml"
     asked = _described(source)
     if asked is not None and asked.virtual is not None:

@@ -1,8 +1,8 @@
 """Answers the rules before anything runs: what a stage needs of a study.
 
 A stage depends on sections of its problem file and on source (pipeline/runtime/source_closure.py).
-Both enter the rules as hashes: a rerun follows from what a file says, never from its date. Nothing heavy
-is imported here: this is the time one waits for "nothing to be done".
+Both enter the rules as hashes: a rerun follows from what a file says, never from its date. Nothing
+heavy is imported here: this is the time one waits for "nothing to be done".
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def check_room(folder: str) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=path) as probe:
-            os.posix_fallocate(probe.fileno(), 0, ROOM)
+            if sys.platform != "darwin":  # macOS has no such call
+                os.posix_fallocate(probe.fileno(), 0, ROOM)
     except OSError as error:
         told = UserError(
             f"results cannot be written: {error.strerror}",

@@ -32,7 +32,14 @@ SMALLER = {
     "presets": {},
 }
 ROOMS = ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim")
-FILES = ("Snakefile", "Makefile", "CITATION.cff", "requirements.lock", ".gitignore")
+FILES = (
+    "Snakefile",
+    "Makefile",
+    "CITATION.cff",
+    "requirements.lock",
+    "requirements-dev.lock",
+    ".gitignore",
+)
 _CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
