@@ -15,7 +15,7 @@ from jax import Array
 from benchmarks.harness import Run, Sample, SettingLadder, Task
 from benchmarks.methods.jax_baseline import RungeKutta, respond
 from benchmarks.scenes import LoadCase, case
-from sim.scene import Scene, structure
+from sim.scene import Scene, parameters_of_design
 from sim.solvers import LinearRamp, TanhRamp
 from sim.structure import damping_of_ratio
 
@@ -77,9 +77,9 @@ def _slowly(posed: LoadCase, duration: Any) -> DiffraxProblem:  # noqa: ANN401  
     )
     most = np.tanh(6.0)
     share = np.clip(2 * posed.times / ramp.duration - 1, -most, most)
-    slow = scene.updated(
+    slow = scene.driven_by(
+        TanhRamp(ramp.amplitude, duration, ramp.direction),
         material=heavy,
-        motions=(TanhRamp(ramp.amplitude, duration, ramp.direction),),
         duration=duration,
         static=False,
     )
@@ -121,7 +121,7 @@ def _compiled(name: str, pose: Pose, task: Task) -> Callable[[Array], Any]:
 
     def evaluate(design: Array, value: Array) -> tuple[Array, Any]:
         posed = pose(case_, value)
-        values = structure(posed.scene)(design)
+        values = parameters_of_design(posed.scene)(design)
         motion, counts = respond(
             posed.scene, posed.scene.loads.cases[0], posed.method, posed.times
         )(values)

@@ -21,9 +21,9 @@ from jax import Array
 from benchmarks.harness import Run, Sample
 from sim.core import Floats
 from sim.energy import ContactLaw, LigamentLaw, contact_energy, contact_void_angles, ligament_energy
-from sim.scene import Objective, Scene, structure
+from sim.scene import Mimicking, Scene, parameters_of_design
 from sim.solvers import PrescribedMotion, held_values
-from sim.structure import Parameters
+from sim.structure import Parameters, VoidAngleContact
 
 Force = Callable[[Parameters, Array], Array]
 Loss = Callable[[Array], tuple[Array, dict[str, Array]]]
@@ -50,19 +50,15 @@ class RungeKutta:
 
 def force(scene: Scene) -> Force:
     """Function (parameters, motion (n_units, 3)) -> energy gradient (n_units, 3), N and N mm."""
-    pairs = scene.lattice.ligament_units
+    pairs, angle = scene.lattice.ligament_units, scene.structure.contact
+    assert isinstance(angle, VoidAngleContact)
 
     def energy(ends: Array, values: tuple[Array, ...]) -> Array:
         arm, vector, void, law, contact = values
         strain = ligament_energy(ends[0], ends[1], arm[0], arm[1], vector, LigamentLaw(*law))
         angles = contact_void_angles(void, ends[0, 2], ends[1, 2])
         return strain + jnp.sum(
-            contact_energy(
-                angles,
-                ContactLaw(
-                    contact, scene.structure.contact.barrier, scene.structure.contact.cutoff
-                ),
-            )
+            contact_energy(angles, ContactLaw(contact, angle.barrier, angle.cutoff))
         )
 
     of_ends = jax.vmap(jax.grad(energy))
@@ -132,7 +128,7 @@ def loss(
     case: int,
     method: RungeKutta,
     times: Floats,
-    measure: Objective,
+    measure: Mimicking,
 ) -> Loss:
     """Map from a design vector to the loss of one load case, differentiable, and counts.
 
@@ -143,7 +139,7 @@ def loss(
         times: (n_times,) of the saved samples, s.
         measure: the loss (1,) of motions (1, n_times, n_units, 3).
     """
-    of_design = structure(scene)
+    of_design = parameters_of_design(scene)
     of_parameters = respond(scene, scene.loads.cases[case], method, jnp.asarray(times))
 
     def of_case(design: Array) -> tuple[Array, dict[str, Array]]:

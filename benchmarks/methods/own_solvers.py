@@ -15,7 +15,7 @@ from sim.core import Floats
 from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
-from sim.scene import STIFFENING, make_plan, structure, value_and_gradient
+from sim.scene import STIFFENING, GradientChain, make_plan, parameters_of_design
 from sim.solvers import Solver, solve_cases
 from sim.structure import ConcreteParameters
 from sim.time_integration import (
@@ -80,7 +80,7 @@ def _differences(name: str, apart: float, task: Task) -> Run:
     del task
     posed = case(name)
     solver = make_plan(posed.scene).solver
-    of_design = structure(posed.scene)
+    of_design = parameters_of_design(posed.scene)
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
         values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))
@@ -126,8 +126,10 @@ def _loss(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
 
 
 def _gradient(posed: LoadCase, solver: Solver) -> Callable[[], dict[str, Floats]]:
-    of_design = structure(posed.scene)
-    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.loads.cases)
+    of_design = parameters_of_design(posed.scene)
+    evaluate = partial(
+        GradientChain(of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+    )
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> dict[str, Floats]:

@@ -17,7 +17,7 @@ from benchmarks.methods.own_solvers import gradient_of
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats
 from sim.energy import gradient, system_of
-from sim.scene import structure
+from sim.scene import parameters_of_design
 from sim.solvers import Harmonic
 from sim.structure import ConcreteParameters
 from sim.vibration import linearised
@@ -142,7 +142,7 @@ def _solve(
 def reference(name: str) -> Run:
     """Motion, loss and slope by DOP853 at 1e-11; the whole gradient by our tightest adjoint."""
     posed = case(name)
-    of_design = structure(posed.scene)
+    of_design = parameters_of_design(posed.scene)
 
     def loss(design: Floats) -> tuple[Floats, Floats]:
         values = ConcreteParameters(*(np.asarray(part) for part in of_design(jnp.asarray(design))))

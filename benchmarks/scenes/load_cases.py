@@ -16,8 +16,16 @@ from pipeline.posing import limits_of, scene_of
 from pipeline.problem.reading import load
 from sim.constraints import Limits
 from sim.core import Floats
-from sim.scene import Objective, Scene, concrete_parameters, objective, sample_times, target_motion
-from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.scene import (
+    Clamp,
+    Mimicking,
+    Scene,
+    concrete_parameters,
+    mimicking,
+    sample_times,
+    target_motion,
+)
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
 from sim.structure import ConcreteParameters, Parameters, quads
 
 DIRECTION_SEED = 0
@@ -58,9 +66,9 @@ class LoadCase:
         return concrete_parameters(self.scene, self.scene.lattice.vertices)
 
     @cached_property
-    def objective(self) -> Objective:
+    def objective(self) -> Mimicking:
         """The loss (1,) of motions (1, n_times, n_units, 3)."""
-        return objective(self.scene, self.target)
+        return mimicking(self.scene, self.target)
 
     @cached_property
     def direction(self) -> Floats:
@@ -111,7 +119,7 @@ def symmetric(name: str) -> Scene:
     if name == "fig2":
         return paper_scenes.fig2(symmetry="C4")
     turns = tuple(Harmonic(1.0, 20.0, angle) for angle in (0.0, np.pi / 2))
-    return scene(name).updated(symmetry="C4", motions=turns, weights=np.full(2, 0.5))
+    return scene(name).driven_by(*turns, symmetry="C4")
 
 
 def designed(name: str) -> tuple[Scene, Limits]:
@@ -131,10 +139,9 @@ def _small_wave() -> Scene:
     corners = np.array([0, 4, 20, 24])
     return paper_scenes.fig2().updated(
         lattice=lattice,
-        clamped=held_dofs(corners, np.array([], dtype=np.int64)),
-        driven=np.array([12]),
-        motions=(Harmonic(1.0, 20.0, 0.3),),
-        weights=np.ones(1),
+        supports=(Clamp(corners),),
+        cases=(PrescribedMotion(np.array([12]), Harmonic(1.0, 20.0, 0.3)),),
+        weights=None,
         duration=0.05,
         frequency=20.0,
         cloak=CLOAK,
@@ -149,9 +156,8 @@ def _small_push() -> Scene:
     return paper_scenes.fig4().updated(
         lattice=lattice,
         material=paper_scenes.fig2().structure.material,
-        clamped=held_dofs(left, np.array([], dtype=np.int64)),
-        driven=left + 4,
-        motions=(LinearRamp(-4.0, 1.0),),
+        supports=(Clamp(left),),
+        cases=(PrescribedMotion(left + 4, LinearRamp(-4.0, 1.0)),),
         steps=4,
         cloak=CLOAK,
         region=REGION,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,17 @@ from pipeline.posing import scene_of
 from pipeline.problem.reading import load
 from sim.core import Floats
 from sim.quasistatics import static_solver
-from sim.scene import Scene, StrainEnergyMimicking, concrete_parameters
-from sim.solvers import Harmonic, LinearRamp, Solver, TanhRamp, held_dofs, solve_case
+from sim.scene import (
+    Clamp,
+    Design,
+    Loads,
+    Objective,
+    Scene,
+    StrainEnergyMimicking,
+    Structure,
+    concrete_parameters,
+)
+from sim.solvers import LinearRamp, PrescribedMotion, Solver, TanhRamp, solve_case
 from sim.structure import Material, damping_of_ratio, quads
 from sim.time_integration import explicit, implicit
 
@@ -28,14 +36,13 @@ def fig2(**changes: Any) -> Scene:  # noqa: ANN401  (fields of a scene)
     problem = ROOT / "experiments/fig2/problem.yaml"
     scene = scene_of(load(problem), problem.parent)
     plain: dict[str, Any] = {"symmetry": "none", "accuracy": "default", "integrator": "auto"}
-    return replace(scene, **{**plain, **changes})
+    return scene.updated(**{**plain, **changes})
 
 
 def one_case(scene: Scene, degrees: float) -> Scene:
     """The scene with its load case of that direction alone."""
-    motions = [motion for motion in scene.loads.motions if isinstance(motion, Harmonic)]
-    wanted = next(m for m in motions if np.isclose(float(m.direction), np.deg2rad(degrees)))
-    return scene.updated(motions=(wanted,), weights=np.ones(1))
+    angles = [getattr(motion, "direction", np.nan) for motion in scene.loads.motions]
+    return scene.alone(int(np.flatnonzero(np.isclose(angles, np.deg2rad(degrees)))[0]))
 
 
 @cache
@@ -48,20 +55,10 @@ def fig4() -> Scene:
     distance = np.linalg.norm(lattice.site - lattice.site[112], axis=1)
     left = 15 * np.arange(15)
     return Scene(
-        lattice=lattice,
-        material=Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0),
-        barrier=float(np.deg2rad(-15.0)),
-        cutoff=float(np.deg2rad(-10.0)),
-        clamped=held_dofs(left, np.array([], dtype=np.int64)),
-        driven=left + 14,
-        motions=(LinearRamp(-PUSH, 1.0),),
-        weights=np.ones(1),
-        duration=1.0,
-        frequency=None,
-        static=True,
-        cloak=np.flatnonzero((distance > 45.0 + 1e-9) & (distance <= 75.0 + 1e-9)),
-        region=np.flatnonzero(distance <= 45.0 + 1e-9),
-        objective="strain_energy",
+        Structure(lattice, Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)),
+        Loads((PrescribedMotion(left + 14, LinearRamp(-PUSH, 1.0)),), (Clamp(left),), static=True),
+        Objective(np.flatnonzero(distance <= 45.0 + 1e-9), "strain_energy"),
+        Design(np.flatnonzero((distance > 45.0 + 1e-9) & (distance <= 75.0 + 1e-9))),
     )
 
 
@@ -69,9 +66,9 @@ def fig4_as_dynamics() -> Scene:
     """The same as the authors solve it: density 1 tonne/mm^2, damped, pushed slowly over 3500 s."""
     scene, duration = fig4(), 3500.0
     damping = damping_of_ratio(0.0186, 1.0, 15.0, 1.19, 1.5)
-    return scene.updated(
+    return scene.driven_by(
+        TanhRamp(-15.0, duration),
         material=Material(1.0, 120.0, 1.19, 1.5, 1.5, *damping),
-        motions=(TanhRamp(-15.0, duration),),
         duration=duration,
         static=False,
     )

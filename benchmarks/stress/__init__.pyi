@@ -13,7 +13,7 @@ from .checks import work as work
 from .random_designs import RandomDesigns as RandomDesigns
 from .reference_energy import balance as balance
 from .reference_energy import stiffness as stiffness
-from .stress_scenes import DISTANCE as DISTANCE
+from .stress_scenes import LAWS as LAWS
 from .stress_scenes import NONE as NONE
 from .stress_scenes import StressScene as StressScene
 from .stress_scenes import posed as posed

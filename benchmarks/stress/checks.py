@@ -15,7 +15,7 @@ from benchmarks.stress.verdicts import Check
 from sim.core import Floats, Ints, SimulationError
 from sim.quasistatics import static_solver
 from sim.solvers import Solver, solve_case
-from sim.structure import clearance, displaced, void_angles
+from sim.structure import DistanceContact, clearance, displaced, void_angles
 from sim.time_integration import explicit, implicit
 
 FAR_FROM_BALANCE = 1e-6
@@ -127,8 +127,8 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
     checks = [Check("numbers that are not finite", int((~np.isfinite(states)).sum()), 0)]
     if not checks[0].kept:
         return checks
-    lattice, scene = case.scene.lattice, case.scene
-    if scene.contact_distance is not None:
+    lattice, law = case.scene.lattice, case.scene.structure.contact
+    if isinstance(law, DistanceContact):
         overlaps = clearance(lattice, case.vertices, motion).overlaps
         return [*checks, Check("overlapping pairs of units", int(overlaps.max()), 0)]
     if lattice.n_ligaments == 0:
@@ -136,7 +136,7 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
     turned = np.array([case.values.void + _turns(case, state) for state in motion])
     seen = np.array([np.asarray(_void_angles(case, state)) for state in motion])
     off = np.abs((turned - seen + np.pi) % (2 * np.pi) - np.pi).max()
-    beyond = np.rad2deg(scene.structure.contact.barrier - turned.min())
+    beyond = np.rad2deg(law.barrier - turned.min())
     return [
         *checks,
         Check("void angles off their geometry, rad", float(off), 1e-8),

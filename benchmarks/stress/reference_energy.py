@@ -26,7 +26,15 @@ from sim.energy import (
     ligament_energy,
     pair_energy,
 )
-from sim.structure import ConcreteParameters, Lattice, close_pairs, displaced
+from sim.structure import (
+    ConcreteParameters,
+    ContactModel,
+    DistanceContact,
+    Lattice,
+    VoidAngleContact,
+    close_pairs,
+    displaced,
+)
 
 
 class ReferenceStructure(NamedTuple):
@@ -36,16 +44,13 @@ class ReferenceStructure(NamedTuple):
         lattice: its polygons, all with the same number of corners.
         vertices: (n_vertices, 2) where they are at rest, mm.
         values: of its parameters.
-        barrier, cutoff: contact angles, rad.
-        distance: activation distance of contact between units, mm; None for that on void angles.
+        contact: law by which units touch.
     """
 
     lattice: Lattice
     vertices: Floats
     values: ConcreteParameters
-    barrier: float
-    cutoff: float
-    distance: float | None = None
+    contact: ContactModel
 
 
 class ReferenceForces(NamedTuple):
@@ -88,7 +93,7 @@ def balance(of: ReferenceStructure, state: Floats) -> ReferenceForces:
     energy, slope = _ligaments(motion[units], of.values, _angles(of))
     total, force = float(np.sum(energy)), np.zeros_like(motion)
     np.subtract.at(force, units, np.asarray(slope))
-    if of.distance is not None:
+    if isinstance(of.contact, DistanceContact):
         pairs, given = _near(of, state)
         energy, slope = _pairs(*given)
         total += float(np.sum(np.asarray(energy)[: len(pairs)]))
@@ -101,7 +106,7 @@ def stiffness(of: ReferenceStructure, state: Floats) -> sp.csc_array:
     motion = state.reshape(-1, 3)
     units = of.lattice.ligament_units
     blocks = np.asarray(_ligament_blocks(motion[units], of.values, _angles(of)))
-    if of.distance is not None:
+    if isinstance(of.contact, DistanceContact):
         pairs, given = _near(of, state)
         units = np.concatenate([units, pairs])
         blocks = np.concatenate([blocks, np.asarray(_pair_blocks(*given))[: len(pairs)]])
@@ -112,21 +117,24 @@ def stiffness(of: ReferenceStructure, state: Floats) -> sp.csc_array:
 
 def _angles(of: ReferenceStructure) -> Floats:
     """Barrier and cutoff, out of reach where contact acts on the distance of units."""
-    out = of.distance is not None
-    return np.array([-1e3, -1e3 + 1.0]) if out else np.array([of.barrier, of.cutoff])
+    law = of.contact
+    if isinstance(law, VoidAngleContact):
+        return np.array([law.barrier, law.cutoff])
+    return np.array([-1e3, -1e3 + 1.0])
 
 
 def _near(
     of: ReferenceStructure, state: Floats
 ) -> tuple[Ints, tuple[Floats, Floats, Floats, DistanceLaw]]:
     """Pairs of units in contact, and the same padded as the definition takes them."""
-    assert of.distance is not None
+    assert isinstance(of.contact, DistanceContact)
+    reach = of.contact.distance
     moved = displaced(of.lattice, of.vertices, state.reshape(1, -1, 3))[0]
-    pairs = close_pairs(of.lattice, moved, of.distance)
+    pairs = close_pairs(of.lattice, moved, reach)
     room = -(-max(len(pairs), 1) // ROOM) * ROOM
     padded = np.concatenate([pairs, np.tile([[0, 1]], (room - len(pairs), 1))])
     length = np.linalg.norm(of.lattice.ligament_vectors, axis=1).mean()
-    scale = (of.distance / length) ** 2
-    law = DistanceLaw(float(of.values.contact.mean() * scale), of.distance)
+    scale = (reach / length) ** 2
+    law = DistanceLaw(float(of.values.contact.mean() * scale), reach)
     corners = of.values.corner.reshape(of.lattice.n_units, -1, 2)
     return pairs, (state.reshape(-1, 3)[padded], of.values.centroid[padded], corners[padded], law)

@@ -13,12 +13,32 @@ from benchmarks.scenes import BARRIER, BIAS, CUTOFF, LIGAMENT, MATERIAL, SPACING
 from benchmarks.stress.reference_energy import ReferenceStructure
 from sim.core import Floats, Ints
 from sim.energy import Topology
-from sim.scene import Scene, concrete_parameters, make_plan
-from sim.solvers import LinearRamp, MotionLaw, PrescribedMotion, Solver, held_dofs
-from sim.structure import ConcreteParameters, Lattice, quads
+from sim.scene import (
+    Clamp,
+    Design,
+    Loads,
+    Objective,
+    Scene,
+    Structure,
+    concrete_parameters,
+    make_plan,
+)
+from sim.solvers import LinearRamp, MotionLaw, PrescribedMotion, Solver
+from sim.structure import (
+    ConcreteParameters,
+    ContactModel,
+    DistanceContact,
+    Lattice,
+    VoidAngleContact,
+    quads,
+)
 
 DISTANCE = LIGAMENT / 12
 """Activation distance of contact between units, mm."""
+LAWS: dict[str, ContactModel] = {
+    "angles": VoidAngleContact(BARRIER, CUTOFF),
+    "distances": DistanceContact(DISTANCE),
+}
 NONE = np.zeros(0, dtype=np.int64)
 
 
@@ -52,13 +72,8 @@ class StressScene:
     @property
     def structure(self) -> ReferenceStructure:
         """As the definition takes it."""
-        scene = self.scene
-        limits = (
-            scene.structure.contact.barrier,
-            scene.structure.contact.cutoff,
-            scene.contact_distance,
-        )
-        return ReferenceStructure(scene.lattice, self.vertices, self.values, *limits)
+        posed = self.scene.structure
+        return ReferenceStructure(posed.lattice, self.vertices, self.values, posed.contact)
 
     def solver(self, asked: Floats) -> Solver:
         """What the plan chooses for output at these times."""
@@ -89,24 +104,19 @@ def posed(
         clamped: units that rest.
         driven: units that follow the motion.
         motion: of these.
-        **more: further fields of the scene; by default it lasts 1 s and the drive has no frequency.
+        **more: further fields of the scene; by default it lasts 1 s.
     """
     every = np.arange(lattice.n_units)
-    fields: dict[str, Any] = {
-        "material": MATERIAL,
-        "barrier": BARRIER,
-        "cutoff": CUTOFF,
-        "clamped": held_dofs(np.asarray(clamped, dtype=np.int64), NONE),
-        "driven": np.asarray(driven, dtype=np.int64),
-        "motions": (motion,),
-        "weights": np.ones(1),
-        "duration": 1.0,
-        "frequency": None,
-        "static": False,
-        "cloak": every,
-        "region": every,
-    }
-    return StressScene(Scene(lattice=lattice, **(fields | more)), lattice.vertices)
+    scene = Scene(
+        Structure(lattice, MATERIAL, LAWS["angles"]),
+        Loads(
+            (PrescribedMotion(np.asarray(driven, dtype=np.int64), motion),),
+            (Clamp(np.asarray(clamped, dtype=np.int64)),),
+        ),
+        Objective(region=every),
+        Design(cloak=every),
+    )
+    return StressScene(scene.updated(**more), lattice.vertices)
 
 
 def pressed(lattice: Lattice, share: float, **more: Any) -> StressScene:  # noqa: ANN401

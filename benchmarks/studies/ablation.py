@@ -30,7 +30,7 @@ from benchmarks.suites import warm
 from sim.core import Ints
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
-from sim.scene import evaluator, make_plan, structure, value_and_gradient
+from sim.scene import Evaluator, GradientChain, make_plan, parameters_of_design
 from sim.solvers import Harmonic, LinearRamp, Solver, solve_cases
 from sim.time_integration import ImplicitSolver
 
@@ -97,9 +97,9 @@ def inertia(name: str, skipped: float, task: Task) -> Run:
     scene = load_cases.scene(name)
     (ramp,) = scene.loads.motions
     assert isinstance(ramp, LinearRamp)
-    slow = scene.updated(
+    slow = scene.driven_by(
+        ramp._replace(duration=SLOWLY),
         static=False,
-        motions=(ramp._replace(duration=SLOWLY),),
         duration=SLOWLY,
         integrator="implicit",
     )
@@ -131,8 +131,10 @@ def far_derivatives(name: str, skipped: float, task: Task) -> Run:
     if not skipped:
         every = np.arange(posed.scene.lattice.n_ligaments, dtype=np.int64)
         solver = _on(solver, designed=every)
-    of_design = structure(posed.scene)
-    evaluate = value_and_gradient(of_design, posed.measure, solver, posed.scene.loads.cases)
+    of_design = parameters_of_design(posed.scene)
+    evaluate = partial(
+        GradientChain(of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+    )
     start = np.zeros(posed.scene.space.n_variables)
 
     def run() -> Sample:
@@ -151,7 +153,7 @@ def equal_cases(name: str, skipped: float, task: Task) -> Run:
     """Load cases that are copies of others, turned by a quarter."""
     del task
     scene = load_cases.symmetric(name)
-    evaluate = evaluator(scene, make_plan(scene, every_case=not skipped))
+    evaluate = Evaluator(scene, make_plan(scene, every_case=not skipped))
     start = np.zeros(scene.space.n_variables)
 
     def run() -> Sample:

@@ -19,7 +19,7 @@ from benchmarks.scenes import load_cases
 from sim.constraints import ConstraintVector
 from sim.core import Floats, SimulationError
 from sim.optimise import MmaOptions, SqpOptions, minimise, stationarity
-from sim.scene import evaluator, make_plan
+from sim.scene import Evaluator, make_plan
 
 REACH = 3.0
 """Bound of every variable, mm."""
@@ -217,7 +217,7 @@ def prepare(name: str, terms: OptimiserBudget, optimiser: str) -> Run:
     """Run of one optimiser on a scene's design problem, judged."""
     scene, limits = load_cases.designed(name)
     plan = make_plan(scene)
-    evaluate = evaluator(scene, plan)
+    evaluate = Evaluator(scene, plan)
     constraints = ConstraintVector(scene.space, limits)
     start = np.zeros(scene.space.n_variables)
     evaluate(start)

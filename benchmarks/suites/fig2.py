@@ -18,7 +18,7 @@ from benchmarks.harness import (
 )
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
-from sim.scene import evaluator, make_plan, objective, sample_times
+from sim.scene import Evaluator, make_plan, mimicking, sample_times
 from sim.structure import Symmetry
 
 ANGLES = (0.0, 45.0, 90.0, 135.0)
@@ -63,7 +63,7 @@ def _tight() -> Run:
     """Our explicit integrator of order 4 at the tight accuracy, each angle by itself."""
     scene = paper_scenes.fig2(accuracy="tight")
     angles = [paper_scenes.one_case(scene, degrees) for degrees in ANGLES]
-    evaluates = [evaluator(angle, make_plan(angle)) for angle in angles]
+    evaluates = [Evaluator(angle, make_plan(angle)) for angle in angles]
     symmetric = paper_scenes.fig2(symmetry="C4").space.basis
 
     def run() -> Sample:
@@ -86,7 +86,7 @@ def _tight() -> Run:
 def _ours(symmetry: Symmetry) -> Run:
     scene = paper_scenes.fig2(symmetry=symmetry)
     plan = make_plan(scene)
-    evaluate, start = evaluator(scene, plan), np.zeros(scene.space.n_variables)
+    evaluate, start = Evaluator(scene, plan), np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, plan.solver, [int(case) for case in plan.simulated])
     name = "gradient" if symmetry == "none" else f"gradient@{symmetry}"
 
@@ -111,7 +111,7 @@ def _diffrax_loss() -> Run:
 def _loss() -> jax_baseline.Loss:
     scene = paper_scenes.one_case(paper_scenes.fig2(), MEASURED_ANGLE)
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-4)
-    return jax_baseline.loss(scene, 0, method, sample_times(scene), objective(scene))
+    return jax_baseline.loss(scene, 0, method, sample_times(scene), mimicking(scene))
 
 
 def _at_one_angle(whole: Run) -> Run:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from jax import Array
 
@@ -19,7 +21,7 @@ from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
 from sim.core import Floats
 from sim.quasistatics import StaticSolver
-from sim.scene import structure, value_and_gradient
+from sim.scene import GradientChain, parameters_of_design
 from sim.structure import Parameters
 
 OURS, THEIRS, THEIRS_FORWARD = (
@@ -67,7 +69,9 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
         value = energy(displacement[:, -1:], values)[0]
         return value, value
 
-    evaluate = value_and_gradient(structure(scene), final, solver, scene.loads.cases)
+    evaluate = partial(
+        GradientChain(parameters_of_design(scene), final), solver=solver, cases=scene.loads.cases
+    )
     start = np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, solver, [0])
 

@@ -13,8 +13,8 @@ from jax import Array
 
 from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_of
 from benchmarks.scenes import paper_scenes
-from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, structure
-from sim.solvers import Solver, simulate
+from sim.scene import Accuracy, DisplacementMimicking, Scene, make_plan, parameters_of_design
+from sim.solvers import Solver, differentiable_motion
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -103,13 +103,13 @@ def _explicit(method: str, n_steps: int, scene: Scene) -> Solver:
 def _run_with(make: partial[Solver], warm: bool = True) -> Run:
     scene = _scene()
     solver = make(scene)
-    of_design, spacing = structure(scene), scene.lattice.spacing
+    of_design, spacing = parameters_of_design(scene), scene.lattice.spacing
     measure = jax.jit(DisplacementMimicking(scene.objective.region, spacing, np.ones(200)).__call__)
     scale = np.array([spacing, spacing, 1.0])
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        displacement = simulate(solver, values, scene.loads.cases).displacement
+        displacement = differentiable_motion(solver, values, scene.loads.cases).displacement
         return measure(displacement, values)[0], displacement[0]
 
     evaluate = jax.value_and_grad(loss, has_aux=True)

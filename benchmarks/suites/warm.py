@@ -11,7 +11,7 @@ from benchmarks.harness import Benchmark, Candidate, Run, Sample, Target, error_
 from benchmarks.scenes import paper_scenes
 from sim.core import Floats
 from sim.quasistatics import StaticRecord, StaticSolver
-from sim.scene import Scene, evaluator, make_plan
+from sim.scene import Evaluator, Scene, make_plan
 
 COLD, WARM = "from rest", "from the last design"
 STEPS, DESIGNS = 10, 10
@@ -88,7 +88,7 @@ def walk(scene: Scene, relative: float, warm: bool) -> Run:
     assert isinstance(plan.solver, StaticSolver)
     memory = WarmStart(warm)
     strict = replace(plan, solver=replace(plan.solver, relative=relative))
-    evaluate = evaluator(scene, strict, memory)
+    evaluate = Evaluator(scene, strict, memory)
     rng = np.random.default_rng(0)
     walk = np.cumsum(rng.uniform(-STEP, STEP, (DESIGNS, scene.space.n_variables)), axis=0)
 

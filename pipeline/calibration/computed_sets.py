@@ -21,9 +21,9 @@ from pipeline.calibration.inputs import (
 )
 from pipeline.datasets import provenance
 from pipeline.problem.reading import yaml_file
-from pipeline.problem.sections import UNROTATED_MOMENT
 from pipeline.runtime import write_atomically
 from sim.core import Floats
+from sim.structure import unrotated_inertia
 
 LABEL = "SYNTHETIC: computed, not measured"
 YAML = "calibration.yaml"
@@ -51,7 +51,7 @@ def decay_of(
     """Times in s and noisy angles in rad, of the oscillation about one hinge."""
     given = asked.virtual
     assert given is not None
-    inertia = UNROTATED_MOMENT * true.material.density * true.spacing**4
+    _, inertia = unrotated_inertia(true.material.density, true.spacing)
     frequency = float(np.sqrt(true.material.bending_stiffness / inertia))
     time = np.arange(int(given.duration * given.rate)) / given.rate
     course = free_decay.terms(time, true.ratio, frequency) @ [0.0, 0.0, given.amplitude, 0.0]

@@ -1,6 +1,6 @@
 """How far a simulation spreads under the tolerances of specimens and the doubt about constants.
 
-Specimens are drawn (pipeline/posing/drawn_specimen.py) and simulated under the same drive. The
+Specimens are drawn (pipeline/posing/perturbed.py) and simulated under the same drive. The
 band between
 two quantiles of theirs, taken at p (n + 1) (Weibull's), holds the next specimen with the stated
 probability, at each instant and for each unit by itself.

@@ -12,7 +12,7 @@ from .case_result import measure as measure
 from .case_result import structures_of as structures_of
 from .case_result import times_of as times_of
 from .dispersion import waves as waves
-from .drawn_specimen import drawn as drawn
+from .perturbed import drawn as drawn
 from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions
 from .response_dataset import loss_units as loss_units

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from pipeline.problem.sections import Robustness
+from pipeline.problem.sections import Robustness, Tolerances
 from pipeline.runtime import cli
 from sim.core import Floats
 from sim.energy import observe
@@ -24,7 +24,8 @@ from sim.scene import (
     target_motion,
 )
 from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
-from sim.structure import MOST_ROUNDS, PerturbedStructure, shifted, stiffened
+from sim.structure import MOST_ROUNDS, Perturbation, PerturbedStructure
+from sim.structure import perturbed as perturbed_structure
 
 GEOMETRY, STIFFNESS = "geometry", "stiffness"
 
@@ -59,19 +60,36 @@ def noises(asked: Robustness) -> list[Noise]:
     ]
 
 
-def draw(
-    scene: Scene, vertices: Floats, noise: Noise, seed: Sequence[int]
+def drawn(
+    scene: Scene, vertices: Floats, asked: Tolerances | Noise, seed: Sequence[int]
 ) -> tuple[Scene, PerturbedStructure]:
-    """One copy of a structure: the scene with its stiffnesses, and its vertices.
+    """Draws one copy of a structure: the scene with its constants, and its vertices.
 
-    Equal seeds give equal copies, whatever else is drawn.
+    Args:
+        scene: of the structure as designed.
+        vertices: (n_vertices, 2) of the design, mm.
+        asked: how far things may be off, or a single kind of imperfection.
+        seed: equal seeds give equal copies, whatever else is drawn.
     """
-    random = np.random.default_rng(seed)
-    if noise.kind == GEOMETRY:
-        largest = noise.size * scene.lattice.spacing
-        return scene, shifted(scene.lattice, vertices, largest, scene.structure.contact, random)
-    material = stiffened(scene.structure.material, scene.lattice.n_ligaments, noise.size, random)
-    return scene.updated(material=material), PerturbedStructure(vertices, 0, 0, sound=True)
+    sizes = _sizes(asked, scene.lattice.spacing)
+    of = scene.structure
+    copy = perturbed_structure(scene.lattice, vertices, of.material, sizes, of.contact, seed)
+    return scene.updated(material=copy.material), copy
+
+
+def _sizes(asked: Tolerances | Noise, spacing: float) -> Perturbation:
+    if isinstance(asked, Tolerances):
+        return Perturbation(
+            asked.geometry * spacing,
+            asked.ligaments,
+            asked.stiffness,
+            asked.units,
+            asked.damping,
+            (asked.assembly.shift, asked.assembly.turn),
+        )
+    if asked.kind == GEOMETRY:
+        return Perturbation(geometry=asked.size * spacing)
+    return Perturbation(ligaments=asked.size)
 
 
 def simulate(
@@ -95,10 +113,10 @@ def simulate(
     with cli.progress(len(noises(asked)) * len(samples), "copies") as bar:
         for number, noise in enumerate(noises(asked)):
             seeds = [(asked.seed, number, sample) for sample in samples]
-            drawn = [draw(scene, vertices, noise, seed) for seed in seeds]
-            outcomes = _outcomes(scene, vertices, drawn, target, threads)
+            copies = [drawn(scene, vertices, noise, seed) for seed in seeds]
+            outcomes = _outcomes(scene, vertices, copies, target, threads)
             rows = []
-            for (_, copy), outcome in zip(drawn, outcomes, strict=True):
+            for (_, copy), outcome in zip(copies, outcomes, strict=True):
                 rows.append(_row(scene, copy, outcome))
                 bar.update(failed=sum(row["status"].item() != "ok" for row in rows))
             part = xr.concat(rows, dim=xr.DataArray(list(samples), dims="sample", name="sample"))
@@ -110,7 +128,7 @@ def simulate(
 def _outcomes(
     scene: Scene,
     vertices: Floats,
-    drawn: Sequence[tuple[Scene, PerturbedStructure]],
+    copies: Sequence[tuple[Scene, PerturbedStructure]],
     target: Floats | None,
     threads: int,
 ) -> Iterator[list[Outcome[PerturbedResponse]]]:
@@ -118,13 +136,13 @@ def _outcomes(
     plan = make_plan(scene, vertices, sample_times(scene), every_case=True)
     cases = (
         case
-        for imperfect, copy in drawn
+        for imperfect, copy in copies
         if copy.sound
         for case in cases_of(imperfect, copy.vertices, plan.solver)
     )
     n_cases = len(scene.loads.cases)
     done = run_batch(cases, _measure(scene, target), threads)
-    for _, copy in drawn:
+    for _, copy in copies:
         yield list(islice(done, n_cases)) if copy.sound else []
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import logging
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +28,6 @@ from pipeline.runtime import UserError, cli, source_hash
 from sim.constraints import KIND_NAMES, ConstraintVector, margins
 from sim.core import Floats, SimulationError
 from sim.optimise import (
-    Evaluate,
     Evaluation,
     InfeasibleStartError,
     Journal,
@@ -37,16 +35,11 @@ from sim.optimise import (
     MmaOptions,
     Result,
     SqpOptions,
-    minimise,
 )
-from sim.quasistatics import StaticSolver
-from sim.scene import Evaluator, Paths, Plan, Scene, make_plan
+from sim.scene import Paths, Plan, Scene, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 LOG = logging.getLogger(__name__)
-
-CONFIRMING = 4
-"""Loads passed for each of the loss when a design's loss is confirmed."""
 
 
 def work(args: argparse.Namespace) -> None:
@@ -113,15 +106,12 @@ def optimise(
             key="optimiser.methods",
             remedy=f"add optimiser.methods.{method}.evaluations",
         )
-    constraints = ConstraintVector(scene.space, limits_of(asked))
     key = problem.section_hash(asked, "design", method)
     folder = results / ".journal" / key[:16]
     folder.mkdir(parents=True, exist_ok=True)
-    paths = Paths(folder / f"{method}.paths")
     with cli.progress(budget.evaluations, f"design by {method}") as bar:
 
         def show(evaluation: Evaluation) -> None:
-            paths.accept(evaluation)
             bar.update(loss=evaluation.loss, violation=evaluation.violation)
 
         try:
@@ -129,31 +119,23 @@ def optimise(
                 folder / f"{method}.journal", f"{key} {source_hash('pipeline.stages.design')}"
             ) as journal:
                 return minimise(
-                    method,  # type: ignore[arg-type]
-                    journal.wrap(Evaluator(scene, plan, paths)),
-                    constraints,
-                    np.zeros(scene.space.n_variables) if start is None else start,
+                    scene,
+                    limits_of(asked),
+                    start,
                     options=_options(asked, method),
+                    plan=plan,
+                    journal=journal,
+                    paths=Paths(folder / f"{method}.paths"),
                     callback=show,
-                    confirm=_from_rest(scene, plan),
                 )
         except InfeasibleStartError as error:
+            constraints = ConstraintVector(scene.space, limits_of(asked))
             raise failures.infeasible(error, constraints, source) from error
         except SimulationError as error:
             tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
             raise failures.unsolved(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
-
-
-def _from_rest(scene: Scene, plan: Plan) -> Evaluate | None:
-    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
-
-    A path that starts from that of a similar design, or steps far, may pass where it should end.
-    """
-    if not isinstance(plan.solver, StaticSolver):
-        return None
-    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:

@@ -1,4 +1,4 @@
-"""The requirements on a design as one vector function, with a sparse Jacobian.
+"""Evaluates the requirements on a design as one vector function with a sparse Jacobian.
 
 Values and local derivatives are evaluated together, place by place, and scattered into the Jacobian
 through a map computed once.
@@ -37,16 +37,16 @@ class ConstraintVector:
 
     @cached_property
     def kinds(self) -> tuple[ConstraintKind, ...]:
-        """Requirements at the places that the design variables can change."""
+        """Lists the requirements at the places that the design variables can change."""
         return kinds(self.space.lattice, self.limits, self.space.free_vertices)
 
     @property
     def n_constraints(self) -> int:
-        """Number of values."""
+        """Counts the values."""
         return sum(len(kind.places) for kind in self.kinds)
 
     def __call__(self, design: Floats) -> tuple[Floats, sp.csr_array]:
-        """Values (n_constraints,) at a design vector (n_variables,) and their sparse Jacobian.
+        """Evaluates c (n_constraints,) at a design vector (n_variables,) and their sparse Jacobian.
 
         The pattern of the Jacobian (n_constraints, n_variables) never changes.
         """
@@ -57,20 +57,20 @@ class ConstraintVector:
         return np.array(values), sp.csr_array((data, *pattern), shape=shape)
 
     def values(self, design: Floats) -> Floats:
-        """Constraint values (n_constraints,) alone."""
+        """Evaluates c (n_constraints,) alone."""
         return np.array(self._local(jnp.asarray(self.vertices(design)))[0])
 
     def vertices(self, design: Floats) -> Floats:
-        """Vertices (n_vertices, 2) of a design vector."""
+        """Returns the vertices (n_vertices, 2) of a design vector."""
         shifts = (self._expansion @ design).reshape(-1, 2)
         return self.space.lattice.vertices + shifts
 
     def margins(self, design: Floats) -> dict[str, Margin]:
-        """Smallest margin of each kind at the places that the design can change."""
+        """Finds the smallest margin of each kind at the places that the design can change."""
         return worst(self.space.lattice, self.kinds, self.vertices(design))
 
     def named(self, number: int) -> tuple[str, str]:
-        """Kind of one of the values, and the vertices and units that it is about, in words."""
+        """Names the kind of one of the values, and the vertices and units that it is about."""
         for kind in self.kinds:
             if number < len(kind.places):
                 return kind.name, vertices_of(self.space.lattice, kind.places[number])
@@ -94,7 +94,7 @@ class ConstraintVector:
 
     @cached_property
     def _expansion(self) -> sp.csr_array:
-        """(2 n_vertices, n_variables) linear map from the design vector to the vertex shifts."""
+        """Maps the design vector linearly to the vertex shifts (2 n_vertices, n_variables)."""
         space = self.space
         position = np.full(space.lattice.n_groups, -1)
         position[space.groups] = np.arange(len(space.groups))
@@ -108,7 +108,7 @@ class ConstraintVector:
 
     @cached_property
     def _scatter(self) -> tuple[tuple[Ints, Ints], sp.csr_array]:
-        """Pattern (indices, indptr) of the Jacobian and the map from local slopes to its data."""
+        """Builds the pattern (indices, indptr) of the Jacobian and the map of slopes to it."""
         rows, coordinates = _slope_targets(self.kinds)
         spread = self._expansion[coordinates].tocoo()
         slope, variable = spread.coords
@@ -121,7 +121,7 @@ class ConstraintVector:
 
 
 def _slope_targets(requirements: tuple[ConstraintKind, ...]) -> tuple[Ints, Ints]:
-    """Constraint row and vertex coordinate of every local slope, in the order of evaluation."""
+    """Lists constraint row and vertex coordinate of every local slope, as they are evaluated."""
     rows, coordinates, start = [np.zeros(0, int)], [np.zeros(0, int)], 0
     for kind in requirements:
         flat = kind.places.reshape(len(kind.places), -1)

@@ -1,4 +1,4 @@
-"""Manufacturability: can the units of a design be cut, joined and moved?
+"""Checks manufacturability: that the units of a design can be cut, joined and moved.
 
 Every requirement is one number per place (an edge, a corner, a side of a ligament, a pair of
 units) that depends on a few vertices only.
@@ -24,7 +24,7 @@ ANGLE_LENGTH = 5.0
 
 @dataclass(frozen=True)
 class Limits:
-    """What a design must respect; ``None`` leaves a requirement out.
+    """Limits that a design must respect; ``None`` leaves a requirement out.
 
     Attributes:
         edge_length: smallest edge of any unit, mm.
@@ -43,22 +43,22 @@ class Limits:
 
 
 def edge_length(ends: Array) -> Array:
-    """Length of the edge between two vertices (2, 2)."""
+    """Measures the edge between two vertices (2, 2)."""
     return jnp.linalg.norm(ends[1] - ends[0])
 
 
 def block_angle(corner: Array) -> Array:
-    """Interior angle at the second of three consecutive vertices (3, 2), on [-pi/4, 7 pi/4)."""
+    """Measures the interior angle at the second of three vertices (3, 2), on [-pi/4, 7 pi/4)."""
     return unwrap(angle_between(corner[2] - corner[1], corner[0] - corner[1]), VOID_BRANCH)
 
 
 def void_angle(sides: Array) -> Array:
-    """Angle from one edge to another, each given by two vertices (4, 2), on [-pi/4, 7 pi/4)."""
+    """Measures the angle from one edge to another, two vertices each (4, 2), on [-pi/4, 7 pi/4)."""
     return unwrap(angle_between(sides[1] - sides[0], sides[3] - sides[2]), VOID_BRANCH)
 
 
 def separation(pair: Array) -> Array:
-    """Signed distance of the convex hulls of two vertex rings (2, k, 2).
+    """Measures the signed distance of the convex hulls of two vertex rings (2, k, 2).
 
     The largest gap between the rings' projections over the normals of their edges and the lines
     between their vertices: the distance if they are apart, minus the depth of penetration if not.
@@ -99,15 +99,15 @@ class ConstraintKind:
 
     @property
     def scale(self) -> float:
-        """Factor from the margin to the constraint value (mm)."""
+        """Returns the factor from the margin to the constraint value (mm)."""
         return ANGLE_LENGTH if self.unit == "rad" else 1.0
 
     def margins(self, measured: Numbers) -> Numbers:
-        """Margins (n_places,) of what was measured there, in the unit of the kind."""
+        """Returns the margins (n_places,) of measured values, in the unit of the kind."""
         return self.sign * (measured - self.limit)
 
     def values_and_slopes(self, vertices: Array) -> tuple[Array, Array]:
-        """Constraint values (n_places,) and their slopes to their vertices, flattened."""
+        """Evaluates c (n_places,) and its slopes to the vertices, flattened."""
         values, slopes = jax.vmap(jax.value_and_grad(self.measure))(vertices[self.places])
         factor = self.sign * self.scale
         return factor * (values - self.limit), factor * slopes.ravel()
@@ -135,7 +135,7 @@ class Margin:
 def kinds(
     lattice: Lattice, limits: Limits, moving: Ints | None = None
 ) -> tuple[ConstraintKind, ...]:
-    """The requirements of a lattice, at the places that moving certain vertices can change.
+    """Lists the requirements of a lattice at the places that moving certain vertices can change.
 
     Args:
         lattice: the network; the units kept apart are those nearer than one lattice spacing.
@@ -172,7 +172,7 @@ def _corners(lattice: Lattice, free: np.ndarray) -> Ints:
 
 
 def _voids(lattice: Lattice, free: np.ndarray) -> Ints:
-    """Both sides of each ligament, as two edges starting at its ends (clockwise one first)."""
+    """Lists both sides of each ligament, as two edges starting at its ends (clockwise first)."""
     a, b = lattice.ligaments.T
     after, before = lattice.next_vertex, lattice.previous_vertex
     one = np.stack([b, before[b], a, after[a]], axis=1)
@@ -181,7 +181,7 @@ def _voids(lattice: Lattice, free: np.ndarray) -> Ints:
 
 
 def _pairs(lattice: Lattice, free: np.ndarray) -> Ints:
-    """Rings of neighbouring units, padded to equal length by repeating a vertex."""
+    """Pairs up the rings of neighbouring units, padded to equal length by repeating a vertex."""
     pairs = close_pairs(lattice, lattice.vertices, lattice.spacing)
     size = np.diff(lattice.first_vertex)
     step = np.minimum(np.arange(size.max())[None], size[:, None] - 1)
@@ -194,14 +194,14 @@ def _touched(places: Ints, free: np.ndarray) -> Ints:
 
 
 def margins(lattice: Lattice, vertices: Floats, limits: Limits) -> dict[str, Margin]:
-    """Smallest margin of each kind over the whole structure, free or not."""
+    """Finds the smallest margin of each kind over the whole structure, free or not."""
     return worst(lattice, kinds(lattice, limits), vertices)
 
 
 def worst(
     lattice: Lattice, requirements: tuple[ConstraintKind, ...], vertices: Floats
 ) -> dict[str, Margin]:
-    """Smallest margin of each kind among some requirements, and the units that it is about."""
+    """Finds the smallest margin of each kind among some requirements, and the units concerned."""
     found: dict[str, Margin] = {}
     present = [kind for kind in requirements if len(kind.places)]
     measures, places = tuple(k.measure for k in present), tuple(k.places for k in present)
@@ -218,13 +218,13 @@ def worst(
 def _measured(
     measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], vertices: Floats
 ) -> list[Array]:
-    """What every measure finds at its places, compiled as one."""
+    """Measures at all places, compiled as one."""
     corners = jnp.asarray(vertices)
     return [jax.vmap(of)(corners[at]) for of, at in zip(measures, places, strict=True)]
 
 
 def vertices_of(lattice: Lattice, place: Ints) -> str:
-    """The vertices of a place, by their numbers within their units."""
+    """Names the vertices of a place by their numbers within their units."""
     words = []
     for unit in np.unique(lattice.unit[place]):
         own = np.unique(place[lattice.unit[place] == unit]) - lattice.first_vertex[unit]

@@ -1,4 +1,4 @@
-"""Banded Cholesky in compiled code, and an order of the dofs with a small bandwidth."""
+"""Factorises and solves banded systems, and orders the dofs for a small bandwidth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NARROW = 100
 
 @compiled
 def factorise(band: Floats) -> bool:
-    """Cholesky factor in place of a lower band (n, width + 1); False if not positive definite."""
+    """Factorises a lower band (n, width + 1) in place; False if not positive definite."""
     if band.shape[1] <= NARROW:
         return factorise_narrow(band)
     uplo = np.full(1, ord("L"), dtype=np.uint8)

@@ -21,7 +21,7 @@ _TYPES = {"d": _POINTER, "i": _INTEGER, "c": _CHARACTER}
 
 
 def _routine(library: str, name: str, arguments: str) -> Callable[..., None]:
-    """A routine by symbol, so that compiled callers can be cached across processes.
+    """Looks a routine up by symbol, so that compiled callers can be cached across processes.
 
     Args:
         library: "blas" or "lapack".

@@ -17,7 +17,7 @@ from sim.linalg.nested_dissection import Fronts
 def entry(
     row: int, column: int, owner: Ints, firsts: Ints, edge: Ints, boundary: Ints, panel: Ints
 ) -> int:
-    """Where the entry (row >= column) lies among the factor's values; its dofs must be coupled.
+    """Finds the entry (row >= column) among the factor's values; its dofs must be coupled.
 
     It takes the arrays of ``Fronts`` one by one: passing a tuple of them costs more
     than the search.
@@ -40,7 +40,7 @@ def entry(
 
 @compiled
 def factorise_fronts(values: Floats, scratch: Floats, fronts: Fronts) -> bool:
-    """Factor in place of the matrix in ``values``; False if it is not positive definite."""
+    """Factorises the matrix in ``values`` in place; False if it is not positive definite."""
     text = np.array([ord("L"), ord("R"), ord("T"), ord("N")], dtype=np.uint8)
     lower, right, transposed, plain = text[0:1], text[1:2], text[2:3], text[3:4]
     numbers, size = np.array([1.0, -1.0]), np.zeros(4, dtype=np.int32)

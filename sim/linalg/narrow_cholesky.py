@@ -51,7 +51,7 @@ def _gather_panel(band: Floats, first: int, rows: int, panel: Floats) -> None:
 
 @compiled
 def factorise_narrow(band: Floats) -> bool:
-    """Factor in place of a lower band ``band[column, row - column]`` (n, width + 1).
+    """Factorises a lower band ``band[column, row - column]`` (n, width + 1) in place.
 
     Returns:
         False if the matrix is not positive definite.

@@ -48,7 +48,7 @@ class Fronts(NamedTuple):
 
 
 def no_fronts() -> Fronts:
-    """Fronts of nothing."""
+    """Returns the fronts of nothing."""
     start, none = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     return Fronts(start, start, none, none, start, none, start, none, none, start)
 
@@ -56,7 +56,7 @@ def no_fronts() -> Fronts:
 def dissect(
     site: Floats, pairs: Ints, n_dofs: Ints
 ) -> tuple[NDArray[np.int64], list[NDArray[np.int64]], list[NDArray[np.int64]]]:
-    """Order of the units that have dofs, and the fronts.
+    """Orders the units that have dofs, and groups them in fronts.
 
     Args:
         site: (n_units, 2) where the units are.
@@ -85,7 +85,7 @@ def dissect(
 
 
 def _neighbours(n_units: int, pairs: Ints) -> Ints:
-    """(n_units, most) coupled units of each, filled up with the unit itself."""
+    """Tabulates the coupled units (n_units, most) of each, filled up with the unit itself."""
     both = np.concatenate([pairs, pairs[:, ::-1]])
     both = both[np.argsort(both[:, 0], kind="stable")]
     counts = np.bincount(both[:, 0], minlength=n_units)
@@ -96,7 +96,7 @@ def _neighbours(n_units: int, pairs: Ints) -> Ints:
 
 
 def _cut(units: Ints, site: Floats, neighbour: Ints) -> list[Ints]:
-    """The parts of a set of units in order of elimination, none of them empty."""
+    """Cuts a set of units into parts in order of elimination, none of them empty."""
     if len(units) <= SMALLEST_PART:
         return [units] if len(units) else []
     here = site[units]
@@ -117,7 +117,7 @@ def _cut(units: Ints, site: Floats, neighbour: Ints) -> list[Ints]:
 
 
 def fronts_of(own: list[Ints], boundaries: list[Ints], n_dofs: Ints) -> Fronts:
-    """Fronts in dofs.
+    """Translates fronts from units to dofs.
 
     Args:
         own: of each front, its units as places in the order of elimination.
@@ -163,12 +163,12 @@ def _starts(counts: Ints) -> Ints:
 
 
 def _place(row: Ints, first: int, end: int, boundary: Ints) -> Ints:
-    """Positions of dofs in the matrix of a front with own dofs first..end and that boundary."""
+    """Finds dofs in the matrix of a front with own dofs first..end and that boundary."""
     return np.where(row < end, row - first, end - first + np.searchsorted(boundary, row))
 
 
 def _scratch(sizes: Ints, parent: Ints) -> tuple[Ints, int]:
-    """Where each front's block may lie while it waits for its parent, and the size of it all."""
+    """Places each front's block while it waits for its parent; returns starts and total size."""
     start = np.zeros(len(sizes), dtype=np.int64)
     living: list[int] = []
     for front, size in enumerate(sizes):

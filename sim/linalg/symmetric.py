@@ -1,4 +1,4 @@
-"""The tangent as a symmetric matrix: stored as a band or by fronts, whichever is solved faster.
+"""Stores the tangent, a symmetric matrix, as a band or by fronts, whichever is solved faster.
 
 Both are filled entry by entry, factorised in place and solved with through the same functions.
 """
@@ -19,7 +19,7 @@ NARROW_FLOP, BAND_FLOP, FRONT_FLOP, FRONT_CALL = 72e-12, 42e-12, 58e-12, 2e-6
 
 
 class Pattern(NamedTuple):
-    """Which entries there are, and where.
+    """Layout of the entries.
 
     Attributes:
         size: (2,) number of dofs, and half bandwidth; the latter is -1 if stored by fronts.
@@ -31,22 +31,22 @@ class Pattern(NamedTuple):
 
     @property
     def by_fronts(self) -> bool:
-        """Whether it is stored by fronts."""
+        """Tells storage by fronts from a band."""
         return bool(self.size[1] < 0)
 
     @property
     def n_values(self) -> int:
-        """Numbers stored."""
+        """Counts the numbers stored."""
         n, width = self.size
         return int(self.fronts.panel[-1]) if self.by_fronts else int(n * (width + 1))
 
     @property
     def n_dofs(self) -> int:
-        """Size of the matrix."""
+        """Returns the size of the matrix."""
         return int(self.size[0])
 
     def describe(self) -> str:
-        """How it is stored, in words."""
+        """Describes the storage in words."""
         if self.by_fronts:
             kind = f"{len(self.fronts.update)} fronts of a nested dissection"
         else:
@@ -91,7 +91,7 @@ def number_free_dofs(
 
 
 def seconds(pattern: Pattern) -> float:
-    """Predicted time of one core to factorise a matrix of that pattern, s."""
+    """Predicts the time of one core to factorise a matrix of that pattern, s."""
     if not pattern.by_fronts:
         n, width = (float(number) for number in pattern.size)
         return (NARROW_FLOP if width < band.NARROW else BAND_FLOP) * n * width**2
@@ -122,7 +122,7 @@ def _in_fronts(site: Floats, pairs: Ints, held: Ints) -> tuple[Ints, Pattern]:
 
 @compiled
 def matrix(pattern: Pattern) -> Matrix:
-    """Room for a matrix of that pattern, not yet cleared."""
+    """Allocates a matrix of that pattern, not yet cleared."""
     n, width = pattern.size
     n_values = pattern.fronts.panel[-1] if width < 0 else n * (width + 1)
     return Matrix(np.empty(n_values), np.empty(pattern.fronts.scratch[0]), pattern)

@@ -1,4 +1,4 @@
-"""Back to designs that meet every constraint, by the shortest way."""
+"""Projects designs on the feasible set by the shortest way."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RETREAT_STEPS = 10
 def project(
     problem: CountedProblem, x: Floats, reach: float, rounds: int = 12, depth: float = 0.0
 ) -> ConstraintPoint | None:
-    """Design near ``x`` with every margin at least ``depth``, or None if the rounds find none.
+    """Finds a design near ``x`` with every margin at least ``depth``; None if no round does.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
     more than ``reach``.
@@ -51,7 +51,7 @@ def _newton(
 def retreat(
     problem: CountedProblem, x: Floats, depth: float, reach: float
 ) -> ConstraintPoint | None:
-    """Design inside the feasible set, with every margin at ``depth`` or as near to it as it goes.
+    """Finds a design inside the feasible set, every margin at ``depth`` or as near as it goes.
 
     The way is followed in small steps, so that it leads to the part of the set that ``x`` is in.
     """
@@ -65,7 +65,7 @@ def retreat(
 
 
 def feasible_start(problem: CountedProblem, x: Floats, reach: float) -> ConstraintPoint:
-    """As ``project``, allowing many rounds and ever longer steps.
+    """Projects as ``project`` does, in many rounds and ever longer steps.
 
     Raises:
         InfeasibleStartError: naming the worst constraint.

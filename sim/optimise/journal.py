@@ -85,7 +85,7 @@ class Journal:
             self._file = None
 
     def wrap(self, evaluate: Evaluate) -> Evaluate:
-        """``evaluate`` with a memory: reads its results back while the journal holds them."""
+        """Gives ``evaluate`` a memory: reads its results back while the journal holds them."""
 
         def remembered(x: Floats) -> tuple[float, Floats, Floats]:
             start = self._open.tell()
@@ -117,7 +117,7 @@ class Journal:
         return outcome
 
     def _read(self) -> bytes | None:
-        """The next payload, or None at the end; cuts off what cannot be read."""
+        """Reads the next payload, None at the end; cuts off what cannot be read."""
         start = self._open.tell()
         header = self._open.read(_HEADER.size)
         if len(header) == _HEADER.size:

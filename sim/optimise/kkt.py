@@ -1,4 +1,4 @@
-"""First-order optimality: how far a design is from satisfying the Karush-Kuhn-Tucker conditions."""
+"""First-order optimality of a design: residual of the Karush-Kuhn-Tucker conditions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def stationarity(
     upper: Floats,
     scale: float,
 ) -> Stationarity:
-    """Projected-gradient criterion |P(x - gradient / scale) - x|, zero exactly at KKT points.
+    """Computes the projected gradient |P(x - gradient / scale) - x|, zero exactly at KKT points.
 
     P is the projection on the linearised constraints and the bounds. At an optimum its multipliers
     are those of the problem; elsewhere they are estimates.

@@ -1,4 +1,4 @@
-"""One way to call every method."""
+"""Minimises by any of the methods."""
 
 from __future__ import annotations
 

@@ -5,6 +5,10 @@ If a replacement proves too optimistic at the optimum, it is stiffened and solve
 constraints are cheap, so for them this happens before the loss is simulated.
 """
 
+# nlopt's LD_MMA does not take its place: without bounds on the variables its first three designs
+# of fig2@quick end at a loss of 0.353 in place of 0.247. Within +-3 mm it is as good: 60 designs
+# of figure 2 end at 0.5835 in place of 0.5856, with half the time outside the simulation.
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What every method works on: a counted, recorded view of the problem, and its result."""
+"""Counts and records the evaluations of a minimisation, and holds its result."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class ConstraintPoint:
 
     @property
     def violation(self) -> float:
-        """Largest amount by which a constraint is missed."""
+        """Returns the largest amount by which a constraint is missed."""
         return max(0.0, -float(self.values.min(initial=np.inf)))
 
 
@@ -148,14 +148,14 @@ class CountedProblem:
 
     @property
     def finished(self) -> str | None:
-        """Why no further evaluation may follow, or None."""
+        """Returns the reason to stop, or None while evaluations may follow."""
         if self.best is not None and self.best.violation == 0 and self.best.loss <= self.target:
             return "target reached"
         return "evaluations used up" if len(self.evaluations) >= self.budget else None
 
     @property
     def left(self) -> int:
-        """Number of evaluations that may follow."""
+        """Counts the evaluations that may follow."""
         return 0 if self.finished else self.budget - len(self.evaluations)
 
     def place(self, x: Floats) -> ConstraintPoint:
@@ -221,7 +221,7 @@ class CountedProblem:
             self.callback(self.evaluations[-1])
 
     def stationarity(self, point: EvaluatedPoint) -> Stationarity:
-        """Optimality of a simulated design."""
+        """Measures the optimality of a simulated design."""
         return stationarity(
             point.gradient,
             point.values,
@@ -233,7 +233,7 @@ class CountedProblem:
         )
 
     def result(self, reason: str) -> Result:
-        """The best design that is confirmed; the first evaluation must have succeeded."""
+        """Returns the best design that is confirmed; the first evaluation must have succeeded."""
         best = self._confirmed()
         return Result(
             x=best.x,
@@ -248,7 +248,7 @@ class CountedProblem:
         )
 
     def _confirmed(self) -> EvaluatedPoint:
-        """The best design; with ``confirm``, the best whose loss is found again."""
+        """Returns the best design; with ``confirm``, the best whose loss is found again."""
         if self.best is None:
             raise RuntimeError("no evaluation succeeded")
         if self.confirm is None:

@@ -51,7 +51,7 @@ def dense_step(
 def shortest_step(
     target: Floats, matrix: sp.csr_array, least: Floats, lower: Floats, upper: Floats
 ) -> Quadratic | None:
-    """The d closest to ``target`` subject to matrix d >= least and lower <= d <= upper."""
+    """Finds the d closest to ``target`` subject to matrix d >= least and lower <= d <= upper."""
     solver = _tuned(piqp.SparseSolver())
     solver.setup(
         sp.csc_matrix(sp.identity(len(target))),
@@ -80,6 +80,6 @@ def _solution(solver: piqp.DenseSolver | piqp.SparseSolver, count: int) -> Quadr
 
 
 def reachable(values: Floats, jacobian: sp.csr_array, reach: float) -> np.ndarray:
-    """Rows of a linearised constraint that some step of at most ``reach`` could violate."""
+    """Finds the linearised constraints that some step of at most ``reach`` could violate."""
     steepest = np.asarray(abs(jacobian).sum(axis=1)).ravel()
     return np.flatnonzero((steepest > 0) & (values < reach * steepest))

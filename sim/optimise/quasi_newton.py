@@ -28,7 +28,8 @@ class QuasiNewton:
         self._learned = False
 
     def reduction(self, gradient: Floats, step: Floats) -> float:
-        """Decrease of the loss that the model predicts for a step."""
+        """Predicts the decrease of the loss along a step."""
+        # -(g.d + d.B d / 2)
         return -float(gradient @ step + step @ self.matrix @ step / 2)
 
     def update(self, step: Floats, change: Floats) -> None:
@@ -45,4 +46,5 @@ class QuasiNewton:
             blend = (1 - DAMPING) * model / (model - along)
             change = blend * change + (1 - blend) * image
             along = DAMPING * model
+        # B += y y' / y.d - B d (B d)' / d.B d
         self.matrix += np.outer(change, change) / along - np.outer(image, image) / model

@@ -179,7 +179,7 @@ class Descent:
         self.problem.record(trial.place, outcome, accepted, used, self.residual)
 
     def _propose(self) -> SqpTrial | None:
-        """Best step of the model within the radius, made feasible; None if there is none."""
+        """Proposes the model's best step within the radius, made feasible; None if none is."""
         point, radius = self.point, self.radius
         spendable = (1 - self._kept()) * point.values
         rows = reachable(spendable, point.jacobian, radius)
@@ -201,7 +201,7 @@ class Descent:
         return SqpTrial(place, predicted, rows, found.multipliers) if predicted > 0 else None
 
     def _kept(self) -> float:
-        """Share of every margin that the next step must leave.
+        """Returns the share of every margin that the next step must leave.
 
         Constraints that become active early steer the descent into poor optima.
         """
@@ -225,7 +225,7 @@ class Descent:
         return self._move(outcome, ratio)
 
     def _jumped(self, step: Floats, outcome: EvaluatedPoint, predicted: float) -> bool:
-        """Whether the loss is that of another branch of solutions, which tells nothing of this one.
+        """Detects a loss of another branch of solutions, which tells nothing of this one.
 
         Along one branch the trapezoidal rule recovers the change of the loss from its slopes.
         """

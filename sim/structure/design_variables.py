@@ -1,4 +1,4 @@
-"""Design vector to vertices: which vertices are free, and which move together by symmetry."""
+"""Maps design vectors to vertices: the free ones, and those that move together by symmetry."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ class DesignSpace:
 
     @property
     def n_variables(self) -> int:
-        """Number of design variables."""
+        """Counts the design variables."""
         return self.basis.shape[1]
 
     @cached_property
     def free_vertices(self) -> Ints:
-        """Ids of the vertices that the design moves."""
+        """Lists the ids of the vertices that the design moves."""
         return np.flatnonzero(np.isin(self.lattice.group, self.groups))
 
     def vertices(self, design: Numbers) -> Array:
-        """Vertex positions (n_vertices, 2) of a design vector (n_variables,), mm."""
+        """Returns the vertices (n_vertices, 2) of a design vector (n_variables,), mm."""
         basis = self.basis.tocoo()
         moved = jnp.asarray(basis.data) * jnp.asarray(design)[basis.col]
         free_shifts = jnp.zeros(basis.shape[0]).at[basis.row].add(moved).reshape(-1, 2)
@@ -62,7 +62,7 @@ class DesignSpace:
         return jnp.asarray(self.lattice.vertices) + shifts[self.lattice.group]
 
     def project(self, shifts: Floats) -> Floats:
-        """Design vector closest to the given group shifts (n_groups, 2), mm."""
+        """Finds the design vector closest to the given group shifts (n_groups, 2), mm."""
         square = self.basis.power(2).sum(axis=0)  # of orthogonal columns
         return np.asarray(self.basis.T @ shifts[self.groups].ravel() / square)
 
@@ -90,7 +90,7 @@ def design_space(
 
 
 def _symmetric_basis(lattice: Lattice, groups: Ints, symmetry: Symmetry) -> sp.csr_array:
-    """Orthogonal basis of the shifts of ``groups`` that the symmetry's operations leave alone."""
+    """Builds an orthogonal basis of the shifts of ``groups`` that the symmetry allows."""
     identity = sp.csr_array(sp.eye_array(2 * len(groups)))
     projector = identity
     for operation in _OPERATIONS[symmetry]:
@@ -106,7 +106,7 @@ def _symmetric_basis(lattice: Lattice, groups: Ints, symmetry: Symmetry) -> sp.c
 
 
 def _orbits(projector: sp.csr_array) -> sp.csr_array:
-    """Columns that span a projector's range, one for each orbit of signed permutations.
+    """Picks columns that span a projector's range, one for each orbit of signed permutations.
 
     Their largest entry is 1; an orbit that a symmetry holds in place has none.
     """
@@ -121,7 +121,7 @@ def _orbits(projector: sp.csr_array) -> sp.csr_array:
 
 
 def _group_image(lattice: Lattice, groups: Ints, operation: Floats) -> Ints:
-    """Position in ``groups`` of the image of each group under an operation about the middle."""
+    """Finds the image of each group under an operation about the middle, by place in ``groups``."""
     middle = (lattice.site.min(axis=0) + lattice.site.max(axis=0)) / 2
     centre = np.zeros((lattice.n_groups, 2))
     count = np.bincount(lattice.group, minlength=lattice.n_groups)

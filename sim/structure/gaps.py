@@ -1,4 +1,4 @@
-"""True gaps and overlaps between units by computational geometry (shapely), in any state.
+"""Measures true gaps and overlaps between units by computational geometry (shapely), in any state.
 
 Independent of the optimiser's constraint functions: this is what decides whether a structure can be
 built and whether its units pass through one another while it moves.
@@ -48,28 +48,28 @@ class Clearance:
 
 
 def polygons(lattice: Lattice, vertices: Floats) -> NDArray[np.object_]:
-    """Shapely polygons (n_units,) of the units whose vertices lie at ``vertices``."""
+    """Builds the shapely polygons (n_units,) of the units whose vertices lie at ``vertices``."""
     return shapely.polygons(shapely.linearrings(vertices, indices=lattice.unit))
 
 
 def smallest_gap(lattice: Lattice, vertices: Floats) -> Gap:
-    """Smallest distance between any two units, bonded or not."""
+    """Finds the smallest distance between any two units, bonded or not."""
     return _smallest_gap(polygons(lattice, vertices))
 
 
 def overlapping_pairs(lattice: Lattice, vertices: Floats) -> Ints:
-    """Pairs (n_pairs, 2) of units that overlap by more than OVERLAP_AREA, in ascending order."""
+    """Finds the pairs (n_pairs, 2) of units that overlap by more than OVERLAP_AREA, ascending."""
     return _overlapping_pairs(polygons(lattice, vertices))
 
 
 def close_pairs(lattice: Lattice, vertices: Floats, distance: float) -> Ints:
-    """Pairs (n_pairs, 2) of units nearer than ``distance`` (mm) to one another, ascending."""
+    """Finds the pairs (n_pairs, 2) of units nearer than ``distance`` (mm), ascending."""
     units = polygons(lattice, vertices)
     return _ascending(shapely.STRtree(units).query(units, "dwithin", distance))
 
 
 def displaced(lattice: Lattice, vertices: Floats, motion: Floats) -> Floats:
-    """Vertices (..., n_vertices, 2) after rigid motions (..., n_units, 3).
+    """Moves the vertices (..., n_vertices, 2) by rigid motions (..., n_units, 3).
 
     A motion is the displacement (mm) of the polygon's centroid and the turn (rad) about it.
     """
@@ -82,7 +82,7 @@ def displaced(lattice: Lattice, vertices: Floats, motion: Floats) -> Floats:
 
 
 def clearance(lattice: Lattice, vertices: Floats, motion: Floats) -> Clearance:
-    """Gaps and overlaps in each state of a history ``motion`` (n_states, n_units, 3)."""
+    """Measures gaps and overlaps in each state of a history ``motion`` (n_states, n_units, 3)."""
     gaps, overlaps = [], []
     for state in displaced(lattice, vertices, motion):
         units = polygons(lattice, state)
@@ -114,6 +114,6 @@ def _overlapping_pairs(units: NDArray[np.object_]) -> Ints:
 
 
 def _ascending(pairs: Ints) -> Ints:
-    """Each unordered pair of a symmetric (2, n) relation once, sorted."""
+    """Lists each unordered pair of a symmetric (2, n) relation once, sorted."""
     once = pairs[:, pairs[0] < pairs[1]].T
     return once[np.lexsort(once.T[::-1])]

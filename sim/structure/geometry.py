@@ -1,4 +1,4 @@
-"""Shape of the units as functions of the vertices, in JAX: centroid, inertia, arms, angles."""
+"""Derives the shape of the units from the vertices, in JAX: centroid, inertia, arms, angles."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Shape(NamedTuple):
 
 
 def shape(lattice: Lattice, vertices: Numbers) -> Shape:
-    """Shape of the network whose vertices lie at ``vertices`` (n_vertices, 2), in mm."""
+    """Computes the shape of the network with its ``vertices`` (n_vertices, 2) there, in mm."""
     return _shape(Rings(*(getattr(lattice, name) for name in Rings._fields)), jnp.asarray(vertices))
 
 
 class Rings(NamedTuple):
-    """What of a lattice its shape depends on besides the vertices: see `Lattice`."""
+    """Arrays of a `Lattice` that its shape depends on besides the vertices."""
 
     unit: Ints
     site: Floats
@@ -50,20 +50,20 @@ class Rings(NamedTuple):
 
     @property
     def n_units(self) -> int:
-        """Number of units."""
+        """Counts the units."""
         return len(self.site)
 
 
 @jax.jit
 def _shape(lattice: Rings, vertices: Array) -> Shape:
-    """Compiled as one: that is sooner done than each of its operations by itself."""
+    """Compiles all at once: that is sooner done than each operation by itself."""
     centroid, area, polar_moment = inertia(lattice, vertices)
     arm = vertices - centroid[lattice.unit]
     return Shape(centroid, area, polar_moment, arm, void_angles(lattice, vertices))
 
 
 def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, Array]:
-    """Centroid, area and polar moment about the centroid of each polygon (shoelace sums).
+    """Computes centroid, area and polar moment about the centroid of each polygon (shoelace sums).
 
     Vertices are taken relative to the lattice point: the sums cancel badly far from the origin.
     """
@@ -74,6 +74,7 @@ def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, 
     here = jnp.asarray(vertices) - lattice.site[lattice.unit]
     there = here[lattice.next_vertex]
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
+    # A = sum(c) / 2, s = sum((a + b) c) / 6 A, J = sum(c (a.a + a.b + b.b)) / 12 - A s.s, c = a x b
     area = total(cross) / 2
     offset = total((here + there) * cross[:, None]) / (6 * area[:, None])
     squares = jnp.sum(here * here + here * there + there * there, axis=1)
@@ -82,7 +83,7 @@ def inertia(lattice: Lattice | Rings, vertices: Numbers) -> tuple[Array, Array, 
 
 
 def void_angles(lattice: Lattice | Rings, vertices: Numbers) -> Array:
-    """Signed, unwrapped angles (n_ligaments, 2) of the voids on both sides of each ligament, rad.
+    """Measures the signed, unwrapped void angles (n_ligaments, 2) beside each ligament, rad.
 
     The first lies between the clockwise edge of the second end and the counter-clockwise edge of
     the first end, the second on the other side (DifFlexMM's convention). Under a motion of rigid
@@ -101,7 +102,7 @@ def void_angles(lattice: Lattice | Rings, vertices: Numbers) -> Array:
 
 
 def angle_between(start: Numbers, end: Numbers) -> Array:
-    """Signed angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
+    """Measures the angle from ``start`` to ``end`` (..., 2), counter-clockwise, on (-pi, pi]."""
     cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
     return jnp.arctan2(cross, jnp.sum(start * end, axis=-1))
 

@@ -1,4 +1,4 @@
-"""Networks of polygonal units joined at their vertices by ligaments."""
+"""Builds networks of polygonal units joined at their vertices by ligaments."""
 
 from __future__ import annotations
 
@@ -44,57 +44,57 @@ class Lattice:
 
     @property
     def n_units(self) -> int:
-        """Number of units."""
+        """Counts the units."""
         return len(self.site)
 
     @property
     def n_vertices(self) -> int:
-        """Number of vertices of all units."""
+        """Counts the vertices of all units."""
         return len(self.vertices)
 
     @property
     def n_ligaments(self) -> int:
-        """Number of ligaments."""
+        """Counts the ligaments."""
         return len(self.ligaments)
 
     @cached_property
     def n_groups(self) -> int:
-        """Number of design groups."""
+        """Counts the design groups."""
         return int(self.group.max()) + 1
 
     @cached_property
     def first_vertex(self) -> Ints:
-        """(n_units + 1,) start of each polygon in the vertex array, with the end appended."""
+        """Gives the start of each polygon in the vertex array, the end appended (n_units + 1,)."""
         counts = np.bincount(self.unit, minlength=self.n_units)
         return np.concatenate([[0], np.cumsum(counts)])
 
     @cached_property
     def next_vertex(self) -> Ints:
-        """(n_vertices,) the counter-clockwise neighbour of each vertex in its polygon."""
+        """Gives the counter-clockwise neighbour (n_vertices,) of each vertex in its polygon."""
         start, end = self.first_vertex[self.unit], self.first_vertex[self.unit + 1]
         following = np.arange(self.n_vertices) + 1
         return np.where(following == end, start, following)
 
     @cached_property
     def previous_vertex(self) -> Ints:
-        """(n_vertices,) the clockwise neighbour of each vertex in its polygon."""
+        """Gives the clockwise neighbour (n_vertices,) of each vertex in its polygon."""
         previous = np.empty_like(self.next_vertex)
         previous[self.next_vertex] = np.arange(self.n_vertices)
         return previous
 
     @cached_property
     def ligament_units(self) -> Ints:
-        """(n_ligaments, 2) units joined by each ligament."""
+        """Gives the units (n_ligaments, 2) joined by each ligament."""
         return self.unit[self.ligaments]
 
     @cached_property
     def ligament_vectors(self) -> Floats:
-        """(n_ligaments, 2) reference vector of each ligament."""
+        """Gives the reference vector (n_ligaments, 2) of each ligament."""
         ends = self.vertices[self.ligaments]
         return ends[:, 1] - ends[:, 0]
 
     def positions(self, ids: Ints) -> Ints:
-        """Where in the arrays over units those with the given ids are.
+        """Finds the positions of units with the given ids in the arrays over units.
 
         Raises:
             KeyError: the network has no such unit.
@@ -106,7 +106,7 @@ class Lattice:
         return found
 
     def without(self, ids: Ints) -> Lattice:
-        """The network without some units and the ligaments that end at them.
+        """Removes some units and the ligaments that end at them.
 
         A vertex whose ligament is gone is a design group by itself.
         """
@@ -136,7 +136,7 @@ class Lattice:
 def quads(
     columns: int, rows: int, spacing: float, ligament_length: float, bias_angle: float
 ) -> Lattice:
-    """Rotating squares: quadrilateral units on a square grid, joined at their four corners.
+    """Builds rotating squares: units on a square grid, joined at their four corners.
 
     Unit ``i + columns * j`` has its lattice point at ``(i, j) * spacing`` and its vertices in the
     order right, top, left, bottom. Units with even ``i + j`` are turned by ``-bias_angle`` (rad),
@@ -176,7 +176,7 @@ def kagome(
     bias: float,
     cell_angle: float = np.pi / 3,
 ) -> Lattice:
-    """Triangles of a kagome lattice: two in each cell, joined there and to the neighbouring cells.
+    """Builds kagome triangles: two in each cell, joined there and to the neighbouring cells.
 
     A cell is spanned by ``spacing`` along x and along the direction ``cell_angle`` (rad). Its
     joints are the middles of its four sides and its centre; ligaments run through them along the
@@ -217,7 +217,7 @@ def kagome(
 
 
 def _parity(i: int, j: int) -> float:
-    """1 where both numbers are even, -1 where both are odd, else 0."""
+    """Returns 1 where both numbers are even, -1 where both are odd, else 0."""
     return {(0, 0): 1.0, (1, 1): -1.0}.get((i % 2, j % 2), 0.0)
 
 
@@ -230,7 +230,7 @@ def listed(
     ligaments: Sequence[tuple[tuple[float, float], tuple[float, float]]],
     spacing: float,
 ) -> Lattice:
-    """Units as lists of corners (mm), either way round, and ligaments as pairs of end points.
+    """Builds units from lists of corners (mm), either way round, and ligaments from end points.
 
     Raises:
         ValueError: a polygon without area, or a ligament that does not end at two units' vertices.
@@ -260,7 +260,7 @@ def _counter_clockwise(ring: Floats) -> Floats:
 
 
 def _moments(ring: Floats) -> tuple[float, Floats]:
-    """Signed area and centroid of a polygon."""
+    """Computes the signed area and the centroid of a polygon."""
     here = ring - ring[0]
     there = np.roll(here, -1, axis=0)
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
@@ -270,7 +270,7 @@ def _moments(ring: Floats) -> tuple[float, Floats]:
 
 
 def _network(polygons: list[Floats], ligaments: Ints, index: Ints, spacing: float) -> Lattice:
-    """A network of counter-clockwise polygons whose sites are their centroids."""
+    """Builds a network of counter-clockwise polygons whose sites are their centroids."""
     vertices = np.concatenate(polygons)
     return Lattice(
         vertices=vertices,

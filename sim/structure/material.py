@@ -1,7 +1,8 @@
-"""Holds the constants of a specimen."""
+"""Constants of a specimen, and the damping of one damping ratio."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sim.core import Numbers
@@ -28,15 +29,25 @@ class Material(NamedTuple):
     damping_rotation: float | Numbers
 
 
+def unrotated_inertia(density: float, spacing: float) -> tuple[float, float]:
+    """Returns mass (tonne) and inertia (tonne mm^2) of the authors' unrotated square.
+
+    Its half diagonal is 0.425 spacings: 0.36125 spacing^2, and its polar moment to their digits.
+    """
+    return 0.36125 * density * spacing**2, 0.02175026 * density * spacing**4
+
+
 def damping_of_ratio(
     ratio: float, density: float, spacing: float, shear: float, bending: float
 ) -> tuple[float, float]:
-    """Damping constants (tonne/s, tonne mm^2/s) as the authors derive them from one damping ratio.
+    """Derives the damping of every unit (tonne/s, tonne mm^2/s) from one damping ratio.
 
-    They take the critical damping of one unrotated unit (diagonal 0.85 spacings) on one hinge.
+    The ratio is that of one unrotated square on one ligament, whatever the design (the authors'
+    formula).
     """
-    area, polar_moment = 0.36125 * spacing**2, 0.02175026 * spacing**4
+    mass, inertia = unrotated_inertia(density, spacing)
+    # c = 2 ratio sqrt(m k), and likewise of the rotation
     return (
-        2 * ratio * (density * area * shear) ** 0.5,
-        2 * ratio * (density * polar_moment * bending) ** 0.5,
+        ratio * 2.0 * math.sqrt(mass * shear),
+        ratio * 2.0 * math.sqrt(inertia * bending),
     )

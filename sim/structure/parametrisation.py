@@ -46,7 +46,7 @@ ConcreteParameters: TypeAlias = Parameters[Floats]
 
 
 def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters[Array]:
-    """Parameters of a network of the given shape; differentiable in shape and material."""
+    """Derives the parameters of a network; differentiable in shape and material."""
     n = lattice.n_ligaments
     stiffness = (material.axial, material.shear, material.bending)
     mass, inertia = material.density * shape.area, material.density * shape.polar_moment

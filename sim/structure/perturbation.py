@@ -1,4 +1,4 @@
-"""Imperfect copies of a structure: vertices and units off their place, ligaments off in stiffness.
+"""Perturbed copies of a structure: vertices and units off their place, constants off their value.
 
 A copy whose units overlap cannot be made, so such a place is drawn again until none is left: the
 shifts of the units concerned and of nothing else (partial resampling, Moser and Tardos 2010).
@@ -6,6 +6,7 @@ shifts of the units concerned and of nothing else (partial resampling, Moser and
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,71 +21,143 @@ from sim.structure.material import Material
 
 MOST_ROUNDS = 500
 LARGEST_FACTOR = 3.0
-"""Standard deviations at which the stiffness noise is cut."""
+"""Standard deviations at which the noise of constants is cut."""
+
+
+@dataclass(frozen=True)
+class Perturbation:
+    """Sizes of the deviations of a copy; None draws nothing.
+
+    Attributes:
+        geometry: largest shift of a vertex along x and y, evenly spread, mm.
+        ligaments: standard deviation of each ligament's stiffnesses, as a share of them.
+        stiffness: the same of each of the three stiffnesses, of all ligaments together.
+        units: the same of every unit's damping.
+        damping: the same of the damping of all units together.
+        assembly: standard deviations of the units' shifts along x and along y, mm, and of their
+            rotations, rad.
+    """
+
+    geometry: float | None = None
+    ligaments: float | None = None
+    stiffness: float | None = None
+    units: float | None = None
+    damping: float | None = None
+    assembly: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
 class PerturbedStructure:
-    """A structure with its vertices off their place.
+    """A structure with its vertices off their place and its constants off their value.
 
     Attributes:
         vertices: (n_vertices, 2) mm.
+        material: its constants, where they differ by ligament or unit as arrays.
         clashes: units that overlapped, or touched at rest, in the first draw.
         redrawn: shifts that were drawn again.
         sound: whether no unit overlaps or touches another at rest.
     """
 
     vertices: Floats
-    clashes: int
-    redrawn: int
-    sound: bool
+    material: Material
+    clashes: int = 0
+    redrawn: int = 0
+    sound: bool = True
 
 
-def shifted(
+def perturbed(
     lattice: Lattice,
     vertices: Floats,
+    material: Material,
+    sizes: Perturbation,
+    contact: ContactModel,
+    seed: Sequence[int],
+) -> PerturbedStructure:
+    """Draws a copy of a structure.
+
+    Args:
+        lattice: of the structure.
+        vertices: (n_vertices, 2) of its design, mm.
+        material: its constants.
+        sizes: of the deviations.
+        contact: law of contact; void angles stay above its cutoff, so that the copy is at rest
+            without a load.
+        seed: equal seeds give equal copies, whatever else is drawn.
+    """
+    random = np.random.default_rng(seed)
+    copy = PerturbedStructure(vertices, material)
+    if sizes.geometry is not None:
+        copy = _shifted(lattice, copy, sizes.geometry, contact, random)
+    copy = replace(copy, material=_varied(lattice, material, sizes, random))
+    if sizes.assembly is not None:
+        joints = np.random.default_rng((*seed, 1))
+        copy = _assembled(lattice, copy, sizes.assembly, contact, joints)
+    return copy
+
+
+def _varied(
+    lattice: Lattice, material: Material, sizes: Perturbation, random: np.random.Generator
+) -> Material:
+    """Draws the stiffnesses of the ligaments and the damping of the units."""
+    own = _factors((3, lattice.n_ligaments), sizes.ligaments, random)
+    common = _factors((3, 1), sizes.stiffness, random)
+    damping = _factors((lattice.n_units,), sizes.units, random)
+    damping = damping * _factors((1,), sizes.damping, random)
+    return material._replace(
+        axial=material.axial * own[0] * common[0],
+        shear=material.shear * own[1] * common[1],
+        bending=material.bending * own[2] * common[2],
+        damping_translation=material.damping_translation * damping,
+        damping_rotation=material.damping_rotation * damping,
+    )
+
+
+def _factors(
+    shape: tuple[int, ...], deviation: float | None, random: np.random.Generator
+) -> Floats:
+    """Draws normal factors about one, none below a tenth; ones where there is no deviation."""
+    if deviation is None:
+        return np.ones(shape)
+    draws = np.clip(random.standard_normal(shape), -LARGEST_FACTOR, LARGEST_FACTOR)
+    return np.maximum(1.0 + deviation * draws, 0.1)
+
+
+def _shifted(
+    lattice: Lattice,
+    copy: PerturbedStructure,
     largest: float,
     contact: ContactModel,
     random: np.random.Generator,
 ) -> PerturbedStructure:
-    """A copy with every vertex moved by up to ``largest`` (mm) along x and y, evenly spread.
+    """Moves every vertex by up to ``largest`` (mm) along x and y, evenly spread.
 
-    The ends of a ligament move together, so it keeps its vector. Void angles stay above the cutoff
-    of contact on them: the copy is at rest without a load.
+    The ends of a ligament move together, so it keeps its vector.
     """
     shifts = random.uniform(-largest, largest, (lattice.n_groups, 2))
     first = redrawn = 0
     for tries in range(MOST_ROUNDS):
-        moved = vertices + shifts[lattice.group]
+        moved = copy.vertices + shifts[lattice.group]
         clashing = clashing_units(lattice, moved, contact)
         first = len(clashing) if tries == 0 else first
         if len(clashing) == 0:
-            return PerturbedStructure(moved, first, redrawn, sound=True)
+            return replace(copy, vertices=moved, clashes=first, redrawn=redrawn)
         groups = np.unique(lattice.group[np.isin(lattice.unit, clashing)])
         shifts[groups] = random.uniform(-largest, largest, (len(groups), 2))
         redrawn += len(groups)
-    return PerturbedStructure(moved, first, redrawn, sound=False)
+    return replace(copy, vertices=moved, clashes=first, redrawn=redrawn, sound=False)
 
 
-def assembled(
+def _assembled(
     lattice: Lattice,
     copy: PerturbedStructure,
     spread: tuple[float, float],
     contact: ContactModel,
     random: np.random.Generator,
 ) -> PerturbedStructure:
-    """The copy once its units are joined, each off its place.
+    """Joins the units of a copy, each off its place by ``spread`` (mm, rad).
 
     The ligaments are at rest there: they are as long and as inclined as the units leave them. Units
     that would overlap or touch are put elsewhere.
-
-    Args:
-        lattice: of the copy.
-        copy: its units as they were cut.
-        spread: standard deviations of the units' shifts along x and along y, mm, and of their
-            rotations, rad.
-        contact: law of contact.
-        random: draws the places.
     """
     deviation = np.array([spread[0], *spread])
     pose = deviation * random.standard_normal((lattice.n_units, 3))
@@ -98,7 +171,7 @@ def assembled(
 
 
 def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
-    """Vertices (n_vertices, 2) of units that are moved by a pose (n_units, 3) each, mm and rad."""
+    """Moves units by a pose (n_units, 3) each, mm and rad; returns their vertices."""
     middle = np.add.reduceat(vertices, lattice.first_vertex[:-1])
     middle /= np.diff(lattice.first_vertex)[:, None]
     arm = vertices - middle[lattice.unit]
@@ -108,25 +181,11 @@ def _placed(lattice: Lattice, vertices: Floats, pose: Floats) -> Floats:
 
 
 def clashing_units(lattice: Lattice, vertices: Floats, contact: ContactModel) -> Ints:
-    """Units (n,) that overlap another, cross themselves or touch another by their void angle."""
+    """Finds the units (n,) that overlap or touch (by a void angle) another, or cross themselves."""
     pairs = overlapping_pairs(lattice, vertices)
     crossed = np.flatnonzero(~shapely.is_valid(polygons(lattice, vertices)))
     cutoff = contact.cutoff if isinstance(contact, VoidAngleContact) else -np.inf
     closed = (np.asarray(void_angles(lattice, vertices)) <= cutoff).any(axis=1)
     return np.unique(
         np.concatenate([pairs.ravel(), crossed, lattice.ligament_units[closed].ravel()])
-    )
-
-
-def stiffened(
-    material: Material, n_ligaments: int, deviation: float, random: np.random.Generator
-) -> Material:
-    """The material with each stiffness of each ligament off by a normal share of ``deviation``."""
-    draws = random.standard_normal((3, n_ligaments))
-    factors = 1.0 + deviation * np.clip(draws, -LARGEST_FACTOR, LARGEST_FACTOR)
-    axial, shear, bending = factors
-    return material._replace(
-        axial=material.axial * axial,
-        shear=material.shear * shear,
-        bending=material.bending * bending,
     )

@@ -1,4 +1,4 @@
-"""Symmetries of a structure about its middle, and the load cases that they make equal."""
+"""Finds symmetries of a structure about its middle, and load cases that they make equal."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 def unit_image(
     lattice: Lattice, vertices: Floats, operation: Floats, tolerance: float
 ) -> Ints | None:
-    """Image (n_units,) of each unit under an operation, or None if the structure changes by it.
+    """Finds the image (n_units,) of each unit under an operation; None if the structure changes.
 
     Args:
         lattice: the network.
@@ -36,12 +36,12 @@ def unit_image(
 
 
 def is_invariant(image: Ints, *sets: Ints) -> bool:
-    """Whether every set of units is mapped onto itself."""
+    """Checks that every set of units is mapped onto itself."""
     return all(np.array_equal(np.sort(image[units]), np.sort(units)) for units in sets)
 
 
 def equal_directions(directions: Floats, kind: Ints) -> Ints:
-    """First case equal to each case when a quarter turn leaves the structure alone.
+    """Finds the first case equal to each case when a quarter turn leaves the structure alone.
 
     Directions (n_cases,) in rad that differ by multiples of 90 deg give turned copies of one
     response, if the drives are otherwise of one ``kind`` (n_cases,).

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from sim.core import Floats, Ints
-from sim.scene import Scene
-from sim.solvers import Harmonic, LinearRamp, held_dofs
+from sim.scene import Clamp, Design, Loads, Objective, Scene, Structure
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
 from sim.structure import Lattice, Material, damping_of_ratio, quads
 
 FOLDER = Path(__file__).parents[1] / "data/reference"
@@ -41,22 +40,17 @@ def scene_a(directions: tuple[float, ...] = (45.0,), **changes: Any) -> Scene:  
     """Figure 2: corners clamped, centre driven for two periods."""
     lattice = paper_lattice()
     distance = np.linalg.norm(lattice.site - lattice.site[112], axis=1)
+    shaken = (Harmonic(4.5, 2.0, angle) for angle in np.deg2rad(directions))
     scene = Scene(
-        lattice=lattice,
-        material=paper_material(),
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=held_dofs(np.array([0, 14, 210, 224]), NO_DOFS),
-        driven=np.array([112]),
-        motions=tuple(Harmonic(4.5, 2.0, angle) for angle in np.deg2rad(directions)),
-        weights=np.full(len(directions), 1 / len(directions)),
-        duration=1.0,
-        frequency=2.0,
-        static=False,
-        cloak=np.flatnonzero((distance <= 67.5) & (distance > 0)),
-        region=np.flatnonzero(distance > 67.5),
+        Structure(lattice, paper_material()),
+        Loads(
+            tuple(PrescribedMotion(np.array([112]), motion) for motion in shaken),
+            (Clamp(np.array([0, 14, 210, 224])),),
+        ),
+        Objective(region=np.flatnonzero(distance > 67.5)),
+        Design(cloak=np.flatnonzero((distance <= 67.5) & (distance > 0))),
     )
-    return replace(scene, **changes)
+    return scene.updated(**changes)
 
 
 def compressed(name: str) -> Scene:
@@ -64,20 +58,15 @@ def compressed(name: str) -> Scene:
     lattice = paper_lattice()
     left = 15 * np.arange(15)
     return Scene(
-        lattice=lattice,
-        material=paper_material(),
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=held_dofs(left, NO_DOFS),
-        driven=left + 14,
-        motions=(LinearRamp(-1.0, 1.0),),
-        weights=np.ones(1),
-        duration=float(reference(name)["static_amp_end_mm"]),
-        frequency=None,
-        static=True,
-        cloak=reference(name)["cloak_blocks"].astype(int),
-        region=np.arange(lattice.n_units),
-        objective="strain_energy",
+        Structure(lattice, paper_material()),
+        Loads(
+            (PrescribedMotion(left + 14, LinearRamp(-1.0, 1.0)),),
+            (Clamp(left),),
+            duration=float(reference(name)["static_amp_end_mm"]),
+            static=True,
+        ),
+        Objective(region=np.arange(lattice.n_units), kind="strain_energy"),
+        Design(cloak=reference(name)["cloak_blocks"].astype(int)),
     )
 
 

@@ -17,12 +17,14 @@ from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Matrix
-from sim.solvers import MotionLaw, PrescribedMotion, Solver, held_dofs, simulate
+from sim.solvers import MotionLaw, PrescribedMotion, Solver, differentiable_motion, held_dofs
 from sim.structure import (
     DesignSpace,
+    DistanceContact,
     Lattice,
     Material,
     Parameters,
+    VoidAngleContact,
     design_space,
     parameters,
     quads,
@@ -152,7 +154,9 @@ class Rig:
     @cached_property
     def topology(self) -> Topology:
         held = held_dofs(self.clamped, self.driven)
-        return topology(self.lattice, held, BARRIER, CUTOFF, distance=self.distance)
+        angles = VoidAngleContact(BARRIER, CUTOFF)
+        contact = angles if self.distance is None else DistanceContact(self.distance)
+        return topology(self.lattice, held, contact)
 
     @property
     def numbers(self) -> Numbers:
@@ -200,7 +204,7 @@ class Rig:
     def loss(self, solver: Solver, numbers: Numbers) -> Array:
         """A smooth function of displacement and velocity without any symmetry."""
         drive = PrescribedMotion(self.driven, numbers.drive)
-        response = simulate(solver, self.parameters(numbers), (drive,))
+        response = differentiable_motion(solver, self.parameters(numbers), (drive,))
         return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
 
 

@@ -10,7 +10,7 @@ from pipeline import problem
 from pipeline.posing import scene_of
 from pipeline.runtime import ROOT
 from sim.core import Floats
-from sim.scene import Scene, concrete_parameters, make_plan, objective
+from sim.scene import Scene, concrete_parameters, make_plan, mimicking
 from sim.solvers import solve_case
 from sim.time_integration import ExplicitSolver
 
@@ -35,7 +35,7 @@ def test_they_agree_with_steps_of_a_sixth() -> None:
     losses = []
     for finer in (1, 6):
         whole, part = motion(holed.objective.reference, finer), motion(holed, finer)
-        measure = objective(holed, whole[None][:, :, holed.objective.reference.region])
+        measure = mimicking(holed, whole[None][:, :, holed.objective.reference.objective.region])
         losses.append((whole, part, float(measure(part[None], values)[0])))
     (*coarse, loss), (*fine, exact) = losses
     for one, other in zip(coarse, fine, strict=True):

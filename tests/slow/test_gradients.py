@@ -18,7 +18,7 @@ from pipeline.posing import law_comparison, scene_of
 from pipeline.runtime import ROOT
 from sim.core import Floats
 from sim.quasistatics import StaticSolver
-from sim.scene import Scene, evaluator, make_plan
+from sim.scene import Evaluator, Scene, make_plan
 
 PROBLEMS = {path.parent.name: path for path in ROOT.glob("experiments/*/problem.yaml")}
 STATIC = sorted(name for name, path in PROBLEMS.items() if problem.load(path).static)
@@ -37,7 +37,7 @@ def posed(path: Path, law: str) -> tuple[Scene, Evaluate]:
     scene = scene_of(law_comparison.geometric(asked) if law == "geometric" else asked, path.parent)
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
-    return scene, evaluator(scene, replace(plan, solver=replace(plan.solver, relative=1e-13)))
+    return scene, Evaluator(scene, replace(plan, solver=replace(plan.solver, relative=1e-13)))
 
 
 @pytest.mark.parametrize("law", ["angle", "geometric"])

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
-from sim.scene import Scene, evaluator, make_plan, objective, sample_times
-from sim.solvers import Harmonic, held_dofs
+from sim.scene import Clamp, Evaluator, Scene, make_plan, mimicking, sample_times
+from sim.solvers import Harmonic, PrescribedMotion
 from sim.structure import quads
 
 
@@ -17,10 +17,9 @@ def small() -> Scene:
     lattice = quads(3, 3, 15.0, 2.25, np.deg2rad(20.0))
     return paper_scenes.fig2(accuracy="tight").updated(
         lattice=lattice,
-        clamped=held_dofs(np.array([0, 2, 6, 8]), np.array([], dtype=np.int64)),
-        driven=np.array([4]),
-        motions=(Harmonic(1.0, 20.0, 0.3),),
-        weights=np.ones(1),
+        supports=(Clamp(np.array([0, 2, 6, 8])),),
+        cases=(PrescribedMotion(np.array([4]), Harmonic(1.0, 20.0, 0.3)),),
+        weights=None,
         duration=0.01,
         frequency=20.0,
         cloak=np.array([1, 3]),
@@ -32,9 +31,9 @@ def small() -> Scene:
 def test_the_baseline_finds_the_same_loss() -> None:
     scene = small()
     start = np.zeros(scene.space.n_variables)
-    loss, _, _ = evaluator(scene, make_plan(scene))(start)
+    loss, _, _ = Evaluator(scene, make_plan(scene))(start)
     method = jax_baseline.RungeKutta(rtol=1e-8, atol=1e-8, max_steps=4096)
-    of_case = jax_baseline.loss(scene, 0, method, sample_times(scene), objective(scene))
+    of_case = jax_baseline.loss(scene, 0, method, sample_times(scene), mimicking(scene))
     values, work = jax_baseline.prepare_loss(of_case, len(start))()
     assert float(values["loss"]) == pytest.approx(loss, rel=1e-4)
     assert work["steps"] > 100

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Answer,
     Check,
     StressCase,
@@ -49,7 +50,7 @@ def _cases(small: bool) -> Iterator[StressCase]:
         for bias, kind in ((20.0, "without contact"), (46.0, "with contact")):
             attempt = partial(_kept, _pushed(bias), n_steps)
             yield StressCase(f"undamped for {n_steps} steps, {kind}", attempt)
-    touching = _pushed(46.0, contact_distance=DISTANCE)
+    touching = _pushed(46.0, contact=LAWS["distances"])
     yield StressCase("undamped, contact on distances", partial(_kept, touching, 2_000))
     for bias in (46.0,) if small else (20.0, 46.0):
         yield StressCase(f"damped, squares turned by {bias:g} deg", partial(_spent, _pushed(bias)))
@@ -59,7 +60,7 @@ def _cases(small: bool) -> Iterator[StressCase]:
         )
 
 
-def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: float) -> StressScene:
+def _pushed(bias: float, clamped: Sequence[int] = (0,), **more: Any) -> StressScene:  # noqa: ANN401
     """Undamped squares, the middle one pushed and turned within PUSHED, then held."""
     times = np.linspace(0.0, PUSHED, 41)
     share = (1.0 - np.cos(np.pi * times / PUSHED)) / 2.0

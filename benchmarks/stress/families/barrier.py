@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     StressCase,
     StressFamily,
@@ -27,7 +27,6 @@ from sim.time_integration import ExplicitSolver, ImplicitSolver
 HARD = Harmonic(8.0, 30.0, 0.6)
 CHAOS = 0.1
 """What half the steps may change where units collide again and again."""
-LAWS = {"angles": None, "distances": DISTANCE}
 
 
 def family() -> StressFamily:
@@ -45,14 +44,14 @@ def _cases(small: bool) -> Iterator[StressCase]:
     side = 5 if small else 9
     yield from _starts((-14.99, -16.0) if small else (-14.99, -15.0, -16.0, -40.0))
     for share in (0.25,) if small else (0.05, 0.1, 0.15, 0.2, 0.25):
-        for law, distance in LAWS.items():
+        for law, contact in LAWS.items():
             for n_loads in (1,) if small else (1, 10):
-                case = pressed(squares(side), share, contact_distance=distance)
+                case = pressed(squares(side), share, contact=contact)
                 loads = np.arange(1, n_loads + 1) / n_loads
                 name = f"pressed by {share:.0%} in {n_loads} loads, contact on {law}"
                 yield StressCase(name, partial(equilibria, case, loads))
-    for law, distance in LAWS.items():
-        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact_distance=distance)
+    for law, contact in LAWS.items():
+        case = shaken(squares(side), HARD, duration=0.05, frequency=30.0, contact=contact)
         yield StressCase(f"8 mm at 30 Hz, contact on {law}", partial(_shaken, case))
     case = shaken(squares(5), HARD, duration=0.02, frequency=30.0)
     for n_steps in (1,) if small else (1, 10, 100):

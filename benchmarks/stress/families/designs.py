@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     RandomDesigns,
     StressCase,
@@ -45,7 +45,7 @@ def _cases(small: bool) -> Iterator[StressCase]:
     lattice = squares(SIDE)
     draws = RandomDesigns(lattice, np.array([SIDE * SIDE // 2]), LARGEST, KEEP)
     plate = pressed(lattice, 0.1)
-    touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+    touching = pressed(lattice, 0.1, contact=LAWS["distances"])
     slow = shaken(lattice, Harmonic(4.5, 2.0, 0.8), duration=0.25, frequency=2.0)
     fast = shaken(lattice, Harmonic(2.0, 60.0, 0.8), duration=0.02, frequency=60.0)
     attempts = (

@@ -23,7 +23,7 @@ from benchmarks.stress import (
     squares,
 )
 from sim.core import Ints
-from sim.scene import evaluator, make_plan
+from sim.scene import Clamp, Evaluator, make_plan
 from sim.solvers import Harmonic, LinearRamp
 from sim.structure import Lattice, quads
 
@@ -97,7 +97,7 @@ def _odd() -> Iterator[StressCase]:
         attempt = partial(motions, moving, ASKED, 0.05)
         yield StressCase(f"all units held, {integrator}", attempt, "refusal")
     sliding = pressed(squares(SIDE), 0.04)
-    along = sliding.scene.updated(clamped=3 * 5 * np.arange(5))
+    along = sliding.scene.updated(supports=(Clamp(5 * np.arange(5), ("ux",)),))
     yield StressCase(
         "clamped along x alone", partial(equilibria, replace(sliding, scene=along), LOADS)
     )
@@ -115,8 +115,8 @@ def _cloak(unit: int, static: bool) -> Sequence[Check]:
     )
     one = np.array([unit])
     scene = case.scene.updated(cloak=one, region=one, frozen=NONE, samples=21)
-    scene = scene.updated(objective="strain_energy", steps=2 if static else None)
-    evaluate = evaluator(scene, make_plan(scene))
+    scene = scene.updated(kind="strain_energy", steps=2 if static else None)
+    evaluate = Evaluator(scene, make_plan(scene))
     direction = np.random.default_rng(unit).normal(size=scene.space.n_variables)
     start = np.zeros(scene.space.n_variables)
     slope = evaluate(start)[1] @ direction

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     StressCase,
     StressFamily,
@@ -49,7 +49,7 @@ def _cases(small: bool) -> Iterator[StressCase]:
             f"{name}, pressed", partial(equilibria, pressed(lattice, 0.1), loads), wanted
         )
         if max(columns, rows) <= TOUCHING:
-            touching = pressed(lattice, 0.1, contact_distance=DISTANCE)
+            touching = pressed(lattice, 0.1, contact=LAWS["distances"])
             attempt = partial(equilibria, touching, loads)
             yield StressCase(f"{name}, contact on distances", attempt, wanted)
         if min(columns, rows) > 2:

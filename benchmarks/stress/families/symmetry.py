@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     RandomDesigns,
     StressCase,
@@ -23,7 +23,7 @@ from benchmarks.stress import (
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.solvers import Solver, TimeSeries
-from sim.structure import Lattice, listed
+from sim.structure import ContactModel, Lattice, listed
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 EXACT = 1e-10
@@ -66,20 +66,20 @@ def _cases(small: bool) -> Iterator[StressCase]:
     draws = RandomDesigns(squares(SIDE), np.zeros(0, dtype=np.int64), 2.0, 0.8)
     for seed in range(1 if small else 6):
         for kind in ("all",) if small else KINDS:
-            for law, distance in (("angles", None), ("distances", DISTANCE)):
+            for law, contact in LAWS.items():
                 for solver in ("static", "implicit", "explicit"):
                     name = f"design {seed}, {kind}, {solver}, contact on {law}"
-                    attempt = partial(_attempt, draws, seed, kind, solver, distance)
+                    attempt = partial(_attempt, draws, seed, kind, solver, contact)
                     yield StressCase(name, attempt)
 
 
 def _attempt(
-    draws: RandomDesigns, seed: int, kind: str, solver: str, distance: float | None
+    draws: RandomDesigns, seed: int, kind: str, solver: str, contact: ContactModel
 ) -> Sequence[Check]:
     lattice = replace(squares(SIDE), vertices=draws(seed))
     telling = _telling(kind, lattice, np.random.default_rng(seed))
-    one = _posed(lattice, _same(lattice), distance)
-    other = _posed(_told(lattice, telling), telling, distance)
+    one = _posed(lattice, _same(lattice), contact)
+    other = _posed(_told(lattice, telling), telling, contact)
     first, second = (solved(case, _solver(case, solver)).displacement for case in (one, other))
     wanted = first.reshape(len(first), -1, 3)[:, telling.order]
     wanted = np.concatenate(
@@ -123,14 +123,14 @@ def _told(lattice: Lattice, telling: EquivalentProblem) -> Lattice:
     return listed(rings, placed[ends].tolist(), lattice.spacing)
 
 
-def _posed(lattice: Lattice, telling: EquivalentProblem, distance: float | None) -> StressScene:
+def _posed(lattice: Lattice, telling: EquivalentProblem, contact: ContactModel) -> StressScene:
     """The left column clamped, the right one pushed, turned and sheared."""
     column = telling.order % SIDE
     push = np.concatenate([telling.turn @ MOVED[:2], [np.linalg.det(telling.turn) * MOVED[2]]])
     share = (1.0 - np.cos(np.pi * TIMES / DURATION)) / 2.0
     motion = TimeSeries(TIMES, share[:, None] * push)
     left, right = (np.flatnonzero(column == end) for end in (0, SIDE - 1))
-    return posed(lattice, left, right, motion, duration=DURATION, contact_distance=distance)
+    return posed(lattice, left, right, motion, duration=DURATION, contact=contact)
 
 
 def _solver(case: StressScene, name: str) -> Solver:

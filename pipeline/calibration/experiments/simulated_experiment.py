@@ -15,15 +15,16 @@ from jax import Array
 from pipeline.calibration.inputs import Constants
 from sim.core import Floats, Ints, Numbers
 from sim.quasistatics import StaticSolver
+from sim.scene import GradientChain
 from sim.solvers import (
     MotionLaw,
     PrescribedMotion,
-    adjoint_cases,
+    concrete,
     differentiable_motion,
     held_values,
     solve_cases,
 )
-from sim.structure import ConcreteParameters, Lattice, Material, Parameters, parameters, shape
+from sim.structure import Lattice, Material, Parameters, parameters, shape
 from sim.time_integration import ImplicitSolver, time_grid
 
 AnySolver = StaticSolver | ImplicitSolver
@@ -125,9 +126,9 @@ class SpecimenSimulation:
             SimulationError: a step failed.
         """
         made = self.parameters(constants.numbers)
-        values = ConcreteParameters(*(np.asarray(part) for part in made))
-        found, _, _ = solve_cases(self._solver(constants), values, (drive or self.drive,))
-        return np.asarray(self._compiled(found[0], made))
+        cases = (drive or self.drive,)
+        motion, _, _ = solve_cases(self._solver(constants), concrete(made), cases)
+        return np.asarray(self._compiled(motion[0], made))
 
     def pulled_back(
         self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
@@ -137,15 +138,12 @@ class SpecimenSimulation:
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
-        solver, numbers = self._solver(constants), jnp.asarray(constants.numbers)
-        made = self.parameters(numbers)
-        values = ConcreteParameters(*(np.asarray(part) for part in made))
-        motion, velocity, records = solve_cases(solver, values, (drive or self.drive,))
-        by_motion, direct = self._seen_back(motion[0], made, bar)
-        still = np.zeros_like(velocity)
-        pulled = adjoint_cases(solver, records, np.asarray(by_motion)[None], still)
-        total = [one + two for one, two in zip(direct, pulled.parameters, strict=True)]
-        return np.asarray(self._parameters_back(numbers, Parameters(*total)))
+        return self._chain(
+            np.asarray(constants.numbers),
+            bar,
+            solver=self._solver(constants),
+            cases=(drive or self.drive,),
+        )[1]
 
     def pulled_to_drive(
         self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
@@ -172,12 +170,11 @@ class SpecimenSimulation:
         return replace(self, solver=replace(solver, times=time_grid.halved(solver.times)))
 
     @cached_property
-    def _seen_back(self) -> Callable[[Numbers, Parameters, Numbers], tuple[Array, Parameters]]:
-        return jax.jit(lambda motion, made, bar: jax.vjp(self.seen, motion, made)[1](bar))
+    def _chain(self) -> GradientChain:
+        def weighted(motion: Array, made: Parameters[Array], bar: Array) -> tuple[Array, None]:
+            return jnp.vdot(bar, self.seen(motion[0], made)), None
 
-    @cached_property
-    def _parameters_back(self) -> Callable[[Numbers, Parameters], Array]:
-        return jax.jit(lambda at, bar: jax.vjp(self.parameters, at)[1](bar)[0])
+        return GradientChain(self.parameters, weighted)
 
     def _solver(self, constants: Constants) -> AnySolver:
         if constants.cutoff is None:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibration.inputs.description import Calibration, Name
-from pipeline.problem.sections import UNROTATED_MOMENT, Contact, MaterialConstants
+from pipeline.problem.sections import Contact, MaterialConstants
 from sim.core import Floats
-from sim.structure import VoidAngleContact
+from sim.structure import VoidAngleContact, unrotated_inertia
 
 UNITS: dict[Name, str] = {
     "axial_stiffness": "N/mm",
@@ -63,7 +63,7 @@ class Constants(NamedTuple):
         """Damping ratio of the rotation of one unit on one ligament, by the authors' inertia."""
         if self.material.damping.ratio is not None:
             return self.material.damping.ratio
-        inertia = UNROTATED_MOMENT * self.material.density * self.spacing**4
+        _, inertia = unrotated_inertia(self.material.density, self.spacing)
         _, rotation = self.material.damping_coefficients(self.spacing)
         return rotation / (2 * math.sqrt(inertia * self.material.bending_stiffness))
 

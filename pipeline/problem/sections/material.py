@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal, Self
 
 from pydantic import model_validator
@@ -20,9 +19,7 @@ from pipeline.problem.fields import (
     Stiffness,
     fault,
 )
-
-UNROTATED_AREA = 0.36125  # over spacing^2: the authors' square of half diagonal 0.425 spacings
-UNROTATED_MOMENT = 0.02175026  # over spacing^4: its polar moment, to the authors' digits
+from sim.structure import damping_of_ratio
 
 
 class DampingLaw(Section):
@@ -64,22 +61,14 @@ class MaterialConstants(Section):
     damping: DampingLaw
 
     def damping_coefficients(self, spacing: float) -> tuple[float, float]:
-        """Translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.
-
-        The ratio is that of a single-ligament oscillator with the mass and inertia of a square
-        that is not rotated, whatever the design (the authors' formula).
-        """
+        """Returns the translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit."""
         law = self.damping
         if law.ratio is None:
             assert law.translation is not None
             assert law.rotation is not None
             return law.translation, law.rotation
-        mass = UNROTATED_AREA * self.density * spacing**2
-        inertia = UNROTATED_MOMENT * self.density * spacing**4
-        return (
-            law.ratio * 2.0 * math.sqrt(mass * self.shear_stiffness),
-            law.ratio * 2.0 * math.sqrt(inertia * self.bending_stiffness),
-        )
+        stiffness = (self.shear_stiffness, self.bending_stiffness)
+        return damping_of_ratio(law.ratio, self.density, spacing, *stiffness)
 
 
 class Contact(Section):

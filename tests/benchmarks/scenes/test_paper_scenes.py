@@ -9,7 +9,7 @@ import pytest
 from benchmarks.methods import jax_baseline
 from benchmarks.scenes import paper_scenes
 from sim.energy import gradient, system_of
-from sim.scene import concrete_parameters, structure
+from sim.scene import concrete_parameters, parameters_of_design
 from sim.solvers import Harmonic
 
 
@@ -31,6 +31,6 @@ def test_the_baseline_has_the_same_forces() -> None:
     motion = 0.05 * np.random.default_rng(0).normal(size=scene.topology.n_dofs)
     ours = np.empty_like(motion)
     gradient(motion, system_of(scene.topology, values), np.empty((225, 4)), ours)
-    made = structure(scene)(jnp.zeros(scene.space.n_variables))
+    made = parameters_of_design(scene)(jnp.zeros(scene.space.n_variables))
     theirs = jax_baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())

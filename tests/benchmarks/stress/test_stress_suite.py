@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.stress import (
-    DISTANCE,
+    LAWS,
     Check,
     StressCase,
     StressFamily,
@@ -90,9 +90,9 @@ def values_of(made: list[Check]) -> dict[str, Check]:
     return {check.name: check for check in made}
 
 
-@pytest.fixture(scope="module", params=[None, DISTANCE], ids=["angles", "distances"])
+@pytest.fixture(scope="module", params=list(LAWS.values()), ids=list(LAWS))
 def plate(request: pytest.FixtureRequest) -> StressScene:
-    return pressed(squares(3), 0.15, contact_distance=request.param)
+    return pressed(squares(3), 0.15, contact=request.param)
 
 
 def test_the_definition_has_the_derivatives_of_its_energy(plate: StressScene) -> None:

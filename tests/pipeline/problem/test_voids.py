@@ -11,7 +11,7 @@ from pipeline.posing import scene_of
 from pipeline.problem import cloak_units, interest_units, void_units
 from pipeline.problem.reading import load
 from pipeline.runtime import UserError
-from sim.scene import evaluator, make_plan
+from sim.scene import Evaluator, make_plan
 from tests.pipeline.static import HEART, MIMIC, RIGID_HEART, SHIELD, SMILE, write
 
 
@@ -49,7 +49,7 @@ def test_losses_at_the_start_are_the_papers(tmp_path: Path) -> None:
         path = write(tmp_path, more)
         path.write_text(path.read_text().replace("steps: 4", f"steps: {steps}"))
         scene = scene_of(load(path), tmp_path)
-        found, _, _ = evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
+        found, _, _ = Evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
         assert found == pytest.approx(loss, abs=5e-3 * loss)
 
 

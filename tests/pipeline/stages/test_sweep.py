@@ -11,7 +11,7 @@ from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of, setting_losses
 from pipeline.problem.sections import Sweep, sweep_cases
 from pipeline.runtime import CaseLog, SweepResult, UserError, case_log
-from sim.scene import evaluator, make_plan
+from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
 
 GRID = """sweep:
@@ -66,7 +66,7 @@ def test_a_case_is_the_problem_with_its_setting(folder: Path, whole: xr.Dataset)
     text = (folder / "problem.yaml").read_text().partition("sweep:")[0]
     path.write_text(text.replace("bending_stiffness: 1.5", "bending_stiffness: 2"))
     scene = scene_of(problem.load(path), folder)
-    loss, _, _ = evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
+    loss, _, _ = Evaluator(scene, make_plan(scene))(np.zeros(scene.space.n_variables))
     assert float(whole["loss_altered"][3]) == pytest.approx(loss, rel=1e-9)
     assert float(whole["loss"][3]) == pytest.approx(loss, rel=1e-9)  # of a design without a change
 

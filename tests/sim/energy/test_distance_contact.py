@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jax import Array
 
-from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from benchmarks.scenes import MATERIAL
 from sim.collision import ContactArrays, collision_free_step
 from sim.collision.step_limit import FAR
 from sim.core import Floats, Numbers
@@ -30,7 +30,15 @@ from sim.energy import (
 )
 from sim.energy.distance_contact import barrier, edge_energy, vertices_energy
 from sim.linalg import clear, matrix, number_free_dofs
-from sim.structure import ConcreteParameters, Lattice, clearance, displaced, parameters, shape
+from sim.structure import (
+    ConcreteParameters,
+    DistanceContact,
+    Lattice,
+    clearance,
+    displaced,
+    parameters,
+    shape,
+)
 from sim.structure.gaps import polygons
 from tests.sim.structures import dense, hand_made
 
@@ -71,7 +79,7 @@ def crowd(seed: int) -> Crowd:
     made = shape(lattice, lattice.vertices)
     values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
     nothing = np.array([], dtype=np.int64)
-    top = topology(lattice, nothing, BARRIER, CUTOFF, distance=REACH)
+    top = topology(lattice, nothing, DistanceContact(REACH))
     for unit in (1, 2, 3):
         motion[unit, :2] = -approach(lattice, motion, unit, sites[unit] / 15.0, rng)
     return Crowd(lattice, system_of(top, values), motion.ravel(), rng.normal(size=12))

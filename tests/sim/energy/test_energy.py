@@ -20,7 +20,7 @@ from sim.energy import (
 )
 from sim.energy.network_arrays import NetworkArrays
 from sim.scene import concrete_parameters
-from sim.structure import ConcreteParameters, Lattice, parameters, shape
+from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, parameters, shape
 from tests.sim.reference_scenes import compressed, reference
 from tests.sim.structures import mixed_polygons, rotating_squares, some_ligaments
 
@@ -30,7 +30,7 @@ LAW = ContactLaw(1.5, BARRIER, CUTOFF)
 def network(lattice: Lattice) -> tuple[NetworkArrays, Floats]:
     """Kernel arrays of a lattice at rest, and its centroids."""
     made = shape(lattice, lattice.vertices)
-    top = topology(lattice, np.array([], dtype=np.int64), BARRIER, CUTOFF)
+    top = topology(lattice, np.array([], dtype=np.int64), VoidAngleContact(BARRIER, CUTOFF))
     values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
     return top.network(values), np.asarray(made.centroid)
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sim.core import SimulationError
-from sim.optimise import Journal, JournalInUseError, SqpOptions, minimise
+from sim.optimise import Journal, JournalInUseError, MmaOptions, SqpOptions, minimise
 from tests.sim.optimise.known_problems import in_disc, rosenbrock
 
 Complete = tuple[bytes, tuple, int]
@@ -98,6 +98,26 @@ def test_a_flipped_bit_anywhere_ends_in_the_same_result(
     path.write_bytes(bytes(damaged))
     assert run(path, Counted())[:2] == outcome[:2]
     assert path.read_bytes() == content
+
+
+def run_by_mma(path: Path, loss: Counted) -> tuple:
+    start = np.array([-1.0, 0.5])
+    with Journal(path, "mma") as journal:
+        options = MmaOptions(evaluations=12)
+        found = minimise("mma", journal.wrap(loss), in_disc, start, options=options)
+    record = [(e.x.tobytes(), e.loss, e.accepted, e.radius, e.failure) for e in found.evaluations]
+    return found.x.tobytes(), repr(record)
+
+
+@pytest.mark.parametrize("dies_at", [0, 1, 5, 11])
+def test_moving_asymptotes_resume_where_they_were(tmp_path: Path, dies_at: int) -> None:
+    whole = run_by_mma(tmp_path / "whole", Counted())
+    with pytest.raises(KeyboardInterrupt):
+        run_by_mma(tmp_path / "killed", Counted(dies_at))
+    loss = Counted()
+    assert run_by_mma(tmp_path / "killed", loss) == whole
+    assert loss.calls == 12 - dies_at
+    assert (tmp_path / "killed").read_bytes() == (tmp_path / "whole").read_bytes()
 
 
 @pytest.mark.parametrize("dies_at", [0, 1, 5])

@@ -11,13 +11,31 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from benchmarks.scenes import CUTOFF, MATERIAL
 from sim.core import Floats
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
-from sim.scene import Scene, concrete_parameters, evaluator, make_plan
-from sim.scene.evaluation import losses
-from sim.solvers import Harmonic, LinearRamp, TimeSeries, held_dofs, solve_case
+from sim.scene import (
+    Clamp,
+    Design,
+    Evaluator,
+    Loads,
+    Objective,
+    Scene,
+    Structure,
+    concrete_parameters,
+    make_plan,
+    simulate,
+)
+from sim.solvers import (
+    Harmonic,
+    LinearRamp,
+    MotionLaw,
+    PrescribedMotion,
+    TimeSeries,
+    held_dofs,
+    solve_case,
+)
 from sim.structure import quads
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.structures import NONE
@@ -26,27 +44,24 @@ ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 NEGLIGIBLE = 1e-12
 
 
-def scene(**changes: Any) -> Scene:  # noqa: ANN401
+SHAKEN = tuple(Harmonic(3.0, 5.0, angle) for angle in ANGLES)
+
+
+def scene(motions: tuple[MotionLaw, ...] = SHAKEN, **changes: Any) -> Scene:  # noqa: ANN401
     """7 x 7 squares, corners clamped, the middle driven; the ring next to it may change."""
     lattice = quads(7, 7, 15.0, 2.25, np.deg2rad(20.0))
     distance = np.abs(lattice.index - 3).max(axis=1)
     made = Scene(
-        lattice=lattice,
-        material=MATERIAL,
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=held_dofs(np.array([0, 6, 42, 48]), NONE),
-        driven=np.array([24]),
-        motions=tuple(Harmonic(3.0, 5.0, angle) for angle in ANGLES),
-        weights=np.full(4, 0.25),
-        duration=0.2,
-        frequency=5.0,
-        static=False,
-        cloak=np.flatnonzero(distance == 1),
-        region=np.flatnonzero(distance == 3),
-        samples=41,
+        Structure(lattice, MATERIAL),
+        Loads(
+            tuple(PrescribedMotion(np.array([24]), motion) for motion in motions),
+            (Clamp(np.array([0, 6, 42, 48])),),
+            duration=0.2,
+        ),
+        Objective(region=np.flatnonzero(distance == 3), samples=41),
+        Design(cloak=np.flatnonzero(distance == 1)),
     )
-    return replace(made, **changes)
+    return made.updated(**changes)
 
 
 def design_of(scene: Scene, size: float = 0.4) -> Floats:
@@ -92,8 +107,8 @@ def test_turned_copies_of_a_case_have_its_loss_and_gradient() -> None:
     np.testing.assert_array_equal(plan.case_of, [0, 1, 0, 1])
     every = replace(plan, case_of=np.arange(4))
     design = design_of(posed)
-    loss, gradient, each = evaluator(posed, plan)(design)
-    all_loss, all_gradient, all_each = evaluator(posed, every)(design)
+    loss, gradient, each = Evaluator(posed, plan)(design)
+    all_loss, all_gradient, all_each = Evaluator(posed, every)(design)
     assert loss == pytest.approx(all_loss, rel=NEGLIGIBLE)
     assert relative(each, all_each) < NEGLIGIBLE
     assert relative(gradient, all_gradient) < NEGLIGIBLE
@@ -135,28 +150,30 @@ def test_skipped_derivatives_change_nothing(integrator: str) -> None:
     )
     plan = make_plan(posed)
     assert len(posed.topology.designed) < posed.lattice.n_ligaments
-    complete = topology(posed.lattice, posed.loads.held, BARRIER, CUTOFF)
+    complete = topology(posed.lattice, posed.loads.held, posed.structure.contact)
     solver = plan.solver
     assert isinstance(solver, ImplicitSolver | ExplicitSolver)
     design = design_of(posed)
-    _, gradient, _ = evaluator(posed, plan)(design)
-    _, full, _ = evaluator(posed, replace(plan, solver=replace(solver, topology=complete)))(design)
+    _, gradient, _ = Evaluator(posed, plan)(design)
+    _, full, _ = Evaluator(posed, replace(plan, solver=replace(solver, topology=complete)))(design)
     assert relative(gradient, full) < NEGLIGIBLE
 
 
 def test_skipped_derivatives_of_equilibria_change_nothing() -> None:
     posed = scene(
         motions=(LinearRamp(3.0, 1.0, 0.6),), weights=np.ones(1), duration=1.0, static=True,
-        frequency=None, samples=5, objective="strain_energy",
+        frequency=None, samples=5, kind="strain_energy",
     )  # fmt: skip
     plan = make_plan(posed)
     assert len(posed.topology.designed) < posed.lattice.n_ligaments
     solver = plan.solver
     assert isinstance(solver, StaticSolver)
-    complete = replace(solver, topology=topology(posed.lattice, posed.loads.held, BARRIER, CUTOFF))
+    complete = replace(
+        solver, topology=topology(posed.lattice, posed.loads.held, posed.structure.contact)
+    )
     design = design_of(posed)
-    _, gradient, _ = evaluator(posed, plan)(design)
-    _, full, _ = evaluator(posed, replace(plan, solver=complete))(design)
+    _, gradient, _ = Evaluator(posed, plan)(design)
+    _, full, _ = Evaluator(posed, replace(plan, solver=complete))(design)
     assert relative(gradient, full) < NEGLIGIBLE
 
 
@@ -165,13 +182,10 @@ def test_the_evaluator_is_the_derivative_of_the_losses() -> None:
         motions=(Harmonic(3.0, 5.0, 0.6), Harmonic(3.0, 5.0, 1.6)), weights=np.array([0.3, 0.7])
     )
     plan, design = make_plan(posed), design_of(posed)
-    loss, gradient, each = evaluator(posed, plan)(design)
-    of_cases = losses(posed, plan)
-    np.testing.assert_allclose(each, of_cases(jnp.asarray(design)), rtol=1e-13)
+    loss, gradient, each = Evaluator(posed, plan)(design)
+    np.testing.assert_allclose(each, simulate(posed, design, plan=plan).losses, rtol=1e-13)
     assert loss == pytest.approx(0.3 * each[0] + 0.7 * each[1], rel=1e-13)
-    by_jax = jax.grad(lambda x: jnp.asarray(posed.loads.case_weights) @ of_cases(x))(
-        jnp.asarray(design)
-    )
+    by_jax = jax.grad(lambda x: simulate(posed, x, plan=plan).loss)(jnp.asarray(design))
     assert relative(gradient, np.asarray(by_jax)) < NEGLIGIBLE
 
 
@@ -202,7 +216,7 @@ def test_a_recorded_drive_gets_an_adapted_grid() -> None:
     assert isinstance(plan.solver, ImplicitSolver)
     assert any("adapted" in line for line in plan.decisions)
     assert np.diff(plan.solver.times).max() / np.diff(plan.solver.times).min() > 2
-    assert evaluator(posed, plan)(np.zeros(posed.space.n_variables))[0] > 0
+    assert Evaluator(posed, plan)(np.zeros(posed.space.n_variables))[0] > 0
 
 
 def test_a_plan_tells_what_it_skips_and_can_be_stored() -> None:

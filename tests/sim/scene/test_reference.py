@@ -18,9 +18,9 @@ from sim.scene import (
     StrainEnergyMimicking,
     concrete_parameters,
     make_plan,
-    structure,
+    parameters_of_design,
 )
-from sim.solvers import simulate, solve_case
+from sim.solvers import differentiable_motion, solve_case
 from sim.structure import shape
 from tests.sim.reference_scenes import (
     SAMPLES,
@@ -76,11 +76,11 @@ def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
     measure = DisplacementMimicking(
         scene.objective.region, scene.lattice.spacing, np.ones(len(SAMPLES))
     )
-    of_design = structure(scene)
+    of_design = parameters_of_design(scene)
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        response = simulate(plan.solver, values, scene.loads.cases)
+        response = differentiable_motion(plan.solver, values, scene.loads.cases)
         return measure(response.displacement, values)[0], response.displacement
 
     design = jnp.zeros(scene.space.n_variables)
@@ -156,11 +156,11 @@ def test_final_equilibrium(name: str) -> None:
     scene, stored = compressed(name), reference(name)
     end = np.array([scene.loads.duration])
     plan = make_plan(scene, times=end)
-    measure, of_design = static_measure(scene, name, 1), structure(scene)
+    measure, of_design = static_measure(scene, name, 1), parameters_of_design(scene)
 
     def loss(design: Array) -> tuple[Array, Array]:
         values = of_design(design)
-        response = simulate(plan.solver, values, scene.loads.cases)
+        response = differentiable_motion(plan.solver, values, scene.loads.cases)
         return measure(response.displacement, values)[0], response.displacement
 
     design = jnp.zeros(scene.space.n_variables)
@@ -176,7 +176,7 @@ def test_path_of_scene_b() -> None:
     amplitudes = stored["static_path_amps_mm"]
     plan = make_plan(scene, times=amplitudes)
     values = concrete_parameters(scene, scene.lattice.vertices)
-    motion = simulate(plan.solver, values, scene.loads.cases).displacement[0]
+    motion = differentiable_motion(plan.solver, values, scene.loads.cases).displacement[0]
     np.testing.assert_allclose(motion, stored["static_path_u"], rtol=0, atol=1e-6)
     measure = static_measure(scene, "B", 1)
     each = [measure(state[None, None], values)[0] for state in motion]

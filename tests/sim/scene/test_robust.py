@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from sim.scene import Scene, combined, evaluator, make_plan
+from sim.scene import Evaluator, Scene, combined, make_plan
 from sim.solvers import Harmonic, Pulse
 from tests.sim.scene.test_plan import ANGLES, design_of, scene
 
@@ -42,7 +42,7 @@ def robust() -> Scene:
 
 def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
     posed = robust()
-    evaluate = evaluator(posed, make_plan(posed))
+    evaluate = Evaluator(posed, make_plan(posed))
     design = design_of(posed, 0.2)
     value, gradient, each = evaluate(design)
     assert each.shape == (8,)
@@ -57,11 +57,11 @@ def test_the_loss_over_copies_is_the_mean_of_theirs() -> None:
     posed = robust()
     assert posed.design.copies is not None
     design = design_of(posed, 0.2)
-    whole = evaluator(posed, make_plan(posed))(design)[0]
+    whole = Evaluator(posed, make_plan(posed))(design)[0]
     alone = []
     for shifts in posed.design.copies:
         one = posed.updated(copies=shifts[None])
-        alone.append(evaluator(one, make_plan(one))(design)[0])
+        alone.append(Evaluator(one, make_plan(one))(design)[0])
     assert whole == pytest.approx(np.mean(alone), rel=1e-12)
     assert alone[0] != pytest.approx(alone[1], rel=1e-3)
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
+from benchmarks.scenes import MATERIAL
 from sim.core import Floats
 from sim.optimise import Evaluate, Journal, SqpOptions, minimise
-from sim.scene import Paths, Scene, evaluator, make_plan
-from sim.solvers import LinearRamp, held_dofs
-from tests.sim.structures import NONE, rotating_squares
+from sim.scene import Clamp, Design, Evaluator, Loads, Objective, Paths, Scene, Structure, make_plan
+from sim.solvers import LinearRamp, PrescribedMotion
+from tests.sim.structures import rotating_squares
 
 OPTIONS = SqpOptions(evaluations=6, retreats=0)
 
@@ -23,28 +23,17 @@ def scene() -> Scene:
     """5 x 5 squares pushed together over four loads; the middle is to be spared of strain."""
     left = 5 * np.arange(5)
     return Scene(
-        lattice=rotating_squares(5),
-        material=MATERIAL,
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=held_dofs(left, NONE),
-        driven=left + 4,
-        motions=(LinearRamp(-7.0, 1.0),),
-        weights=np.ones(1),
-        duration=1.0,
-        frequency=None,
-        static=True,
-        cloak=np.array([6, 7, 8, 11, 13, 16, 17, 18]),
-        region=np.array([12]),
-        objective="strain_energy",
-        steps=4,
+        Structure(rotating_squares(5), MATERIAL),
+        Loads((PrescribedMotion(left + 4, LinearRamp(-7.0, 1.0)),), (Clamp(left),), static=True),
+        Objective(region=np.array([12]), kind="strain_energy", steps=4),
+        Design(cloak=np.array([6, 7, 8, 11, 13, 16, 17, 18])),
     )
 
 
 def run(folder: Path, dies_at: int | None = None) -> bytes:
     """Optimises, resuming from the folder; returns the bytes of all that was computed."""
     paths = Paths(folder / "paths")
-    evaluate = evaluator(scene(), make_plan(scene()), paths)
+    evaluate = Evaluator(scene(), make_plan(scene()), paths)
     with Journal(folder / "journal", "a") as journal:
         found = minimise(
             "sqp",
@@ -95,6 +84,6 @@ def test_paths_do_not_pile_up(tmp_path: Path) -> None:
 
 def test_a_start_changes_no_more_than_the_tolerance_allows(tmp_path: Path) -> None:
     losses = np.frombuffer(run(tmp_path)).reshape(OPTIONS.evaluations, -1)
-    cold = evaluator(scene(), make_plan(scene()))
+    cold = Evaluator(scene(), make_plan(scene()))
     for loss, *design in losses:
         assert cold(np.array(design))[0] == pytest.approx(loss, rel=1e-9)

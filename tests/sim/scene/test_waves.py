@@ -10,8 +10,8 @@ import pytest
 from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
 from sim.core import Floats
 from sim.energy import gradient, system_of, workspace
-from sim.scene import Scene, concrete_parameters, make_plan, objective
-from sim.solvers import Harmonic, TimeSeries, solve_case
+from sim.scene import Loads, Objective, Scene, Structure, concrete_parameters, make_plan, mimicking
+from sim.solvers import Harmonic, PrescribedMotion, TimeSeries, solve_case
 from sim.structure import quads
 from sim.time_integration import BLANES_MOAN, ExplicitSolver
 from sim.vibration import highest_frequency
@@ -26,27 +26,16 @@ def shaken_lattice() -> Scene:
     intact = quads(SIDE, SIDE, 15.0, 2.25, np.deg2rad(20.0))
     kept = np.setdiff1d(np.arange(SIDE**2), HOLE)
     left = SIDE * np.arange(SIDE)
+    shaken = Harmonic(4.5, 30.0, 0.0, rise=0.01, delay=0.015)
     whole = Scene(
-        lattice=intact,
-        material=MATERIAL,
-        barrier=BARRIER,
-        cutoff=CUTOFF,
-        clamped=NONE,
-        driven=left,
-        motions=(Harmonic(4.5, 30.0, 0.0, rise=0.01, delay=0.015),),
-        weights=np.ones(1),
-        duration=0.07,
-        frequency=30.0,
-        static=False,
-        cloak=NONE,
-        region=kept,
-        samples=71,
+        Structure(intact, MATERIAL),
+        Loads((PrescribedMotion(left, shaken),), duration=0.07),
+        Objective(region=kept, samples=71),
     )
     holed = intact.without(HOLE)
     places = holed.positions(kept)
-    return whole.updated(
-        lattice=holed, driven=holed.positions(left), region=places, reference=whole
-    )
+    cases = (PrescribedMotion(holed.positions(left), shaken),)
+    return whole.updated(lattice=holed, cases=cases, region=places, reference=whole)
 
 
 def motion(scene: Scene, finer: int = 1) -> tuple[Floats, Floats]:
@@ -64,7 +53,7 @@ def motion(scene: Scene, finer: int = 1) -> tuple[Floats, Floats]:
 def loss(scene: Scene, whole: Floats, part: Floats) -> float:
     """Of a holed lattice whose intact one moves as ``whole``."""
     assert scene.objective.reference is not None
-    measure = objective(scene, whole[None][:, :, scene.objective.reference.region])
+    measure = mimicking(scene, whole[None][:, :, scene.objective.reference.objective.region])
     values = concrete_parameters(scene, scene.lattice.vertices)
     return float(measure(part[None], values)[0])
 

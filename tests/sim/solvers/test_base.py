@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +12,7 @@ import pytest
 
 from sim.core import SimulationError
 from sim.quasistatics import StaticSolver
-from sim.solvers import Harmonic, PrescribedMotion, Solver, simulate, solve_case
+from sim.solvers import Harmonic, PrescribedMotion, Solver, differentiable_motion, solve_case
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 from tests.sim.structures import Rig, rotating_squares
 
@@ -35,9 +32,9 @@ def drives(*directions: float) -> tuple[PrescribedMotion, ...]:
 
 @EVERY_SOLVER
 def test_cases_are_independent_of_each_other_and_of_threads(solver: Solver) -> None:
-    together = simulate(solver, RIG.parameters(RIG.numbers), drives(0.0, 0.6, 1.2))
+    together = differentiable_motion(solver, RIG.parameters(RIG.numbers), drives(0.0, 0.6, 1.2))
     assert together.displacement.shape == (3, 4, 9, 3)
-    threaded = simulate(
+    threaded = differentiable_motion(
         replace(solver, threads=3),  # type: ignore[type-var]
         RIG.parameters(RIG.numbers),
         drives(0.0, 0.6, 1.2),
@@ -53,7 +50,9 @@ def test_gradients_of_cases_add_up(solver: Solver) -> None:
     def loss(directions: tuple[float, ...]) -> Callable[[jax.Array], jax.Array]:
         def of_design(design: jax.Array) -> jax.Array:
             values = RIG.parameters(RIG.numbers._replace(design=design))
-            return jnp.sum(simulate(solver, values, drives(*directions)).displacement ** 2)
+            return jnp.sum(
+                differentiable_motion(solver, values, drives(*directions)).displacement ** 2
+            )
 
         return of_design
 
@@ -65,7 +64,7 @@ def test_gradients_of_cases_add_up(solver: Solver) -> None:
 
 @EVERY_SOLVER
 def test_held_units_follow_their_drive_exactly(solver: Solver) -> None:
-    response = simulate(solver, RIG.parameters(RIG.numbers), drives(0.6))
+    response = differentiable_motion(solver, RIG.parameters(RIG.numbers), drives(0.6))
     times = np.asarray(solver.output_times)
     along = np.array([np.cos(0.6), np.sin(0.6), 0.0])
     wave = 0.5 * np.sin(100 * np.pi * times)
@@ -78,9 +77,9 @@ def test_held_units_follow_their_drive_exactly(solver: Solver) -> None:
 @EVERY_SOLVER
 def test_results_are_float64_whatever_goes_in(solver: Solver) -> None:
     small = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), RIG.parameters(RIG.numbers))
-    response = simulate(solver, small, drives(0.6))
+    response = differentiable_motion(solver, small, drives(0.6))
     assert response.displacement.dtype == response.velocity.dtype == jnp.float64
-    exact = simulate(solver, RIG.parameters(RIG.numbers), drives(0.6))
+    exact = differentiable_motion(solver, RIG.parameters(RIG.numbers), drives(0.6))
     np.testing.assert_allclose(response.displacement, exact.displacement, rtol=0, atol=1e-4)
 
 
@@ -88,7 +87,7 @@ def test_results_are_float64_whatever_goes_in(solver: Solver) -> None:
 def test_gradient_by_a_float32_design(solver: Solver) -> None:
     def loss(design: jax.Array) -> jax.Array:
         values = RIG.parameters(RIG.numbers._replace(design=design))
-        return jnp.sum(simulate(solver, values, drives(0.6)).displacement ** 2)
+        return jnp.sum(differentiable_motion(solver, values, drives(0.6)).displacement ** 2)
 
     zero = RIG.numbers.design
     exact, single = jax.grad(loss)(zero), jax.grad(loss)(zero.astype(jnp.float32))
@@ -106,27 +105,3 @@ def test_a_structure_without_area_is_refused(solver: Solver) -> None:
 def test_the_same_input_gives_the_same_bits(solver: Solver) -> None:
     one, other = (solve_case(solver, RIG.values, drives(0.6)[0])[0] for _ in range(2))
     np.testing.assert_array_equal(one, other)
-
-
-MODULES = sorted(path.stem for path in Path("sim").glob("*.py") if path.stem != "__init__")
-
-
-def test_any_room_of_sim_switches_to_float64() -> None:
-    """Each is imported first in its turn; the switch itself is put back in between."""
-    script = "\n".join(
-        (
-            "import importlib, sys, jax",
-            "for name in sys.argv[1:]:",
-            "    for loaded in [m for m in sys.modules if m.split('.')[0] == 'sim']:",
-            "        del sys.modules[loaded]",
-            "    jax.config.update('jax_enable_x64', False)",
-            "    importlib.import_module(name)",
-            "    if not jax.config.jax_enable_x64:",
-            "        print(name)",
-        )
-    )
-    rooms = [f"sim.{name}" for name in MODULES if name != "errors"]
-    run = subprocess.run(
-        [sys.executable, "-c", script, *rooms], capture_output=True, text=True, check=False
-    )
-    assert (run.stdout, run.returncode) == ("", 0), run.stderr

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from sim.collision import CandidatePairs
 from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.quasistatics import StaticSolver
@@ -117,7 +118,8 @@ def far_apart(depth: float) -> Rig:
 
 def test_units_meet_that_were_far_apart_at_rest() -> None:
     rig = far_apart(32.5)
-    assert [1, 2] not in rig.topology.meeting.pairs.tolist()  # type: ignore[union-attr]
+    assert isinstance(rig.topology.contact, CandidatePairs)
+    assert [1, 2] not in rig.topology.contact.pairs.tolist()
     states = path(rig, StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4)))
     assert_clear_in_contact(rig, states)
     assert states[-1, 1, 0] < -0.4

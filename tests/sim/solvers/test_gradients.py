@@ -26,8 +26,16 @@ from benchmarks.scenes import CUTOFF
 from sim.core import Floats
 from sim.quasistatics import StaticSolver, equilibrium_path
 from sim.quasistatics.equilibrium_path import follow
-from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Solver, TimeSeries, simulate
-from sim.solvers.base import backward, forward
+from sim.solvers import (
+    Harmonic,
+    LinearRamp,
+    PrescribedMotion,
+    Solver,
+    TimeSeries,
+    adjoint_cases,
+    differentiable_motion,
+    solve_cases,
+)
 from sim.time_integration import (
     BLANES_MOAN,
     LEAPFROG,
@@ -157,7 +165,7 @@ class Ray:
         watching = replace(self.solver, output_times=times)  # type: ignore[type-var]
         values = self.rig.parameters(self.at(step))
         drive = PrescribedMotion(self.rig.driven, self.at(step).drive)
-        motion = np.asarray(simulate(watching, values, (drive,)).displacement[0])
+        motion = np.asarray(differentiable_motion(watching, values, (drive,)).displacement[0])
         return self.rig.topology.smallest_void_angles(np.asarray(values.void), motion) < CUTOFF
 
 
@@ -232,7 +240,7 @@ def test_motions_deep_in_contact(quantity: str) -> None:
     """Voids that close to their barrier, followed by many finer steps."""
     rig = shaken(bias_deg=45.0, amplitude=3.0)
     ray = Ray(rig, SOLVERS["blanes_moan"](rig), quantity)
-    states = np.asarray(simulate(ray.solver, rig.values, (rig.drive,)).displacement[0])
+    states = np.asarray(differentiable_motion(ray.solver, rig.values, (rig.drive,)).displacement[0])
     assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
     assert ray.slope == pytest.approx(ray.difference(1e-7), rel=1e-3)
 
@@ -250,8 +258,8 @@ def test_loops_are_compiled_for_one_kind_of_arguments(solver: str) -> None:
     rig = shaken() if solver in DYNAMIC else squeezed(4.0)
     method = SOLVERS[solver](rig)
     by_jax = Ray(rig, method, "design").slope
-    motion, velocity, records = forward(method, rig.values, (rig.drive,))
-    pulled = backward(method, records, np.ones_like(motion), np.zeros_like(velocity))
+    motion, velocity, records = solve_cases(method, rig.values, (rig.drive,))
+    pulled = adjoint_cases(method, records, np.ones_like(motion), np.zeros_like(velocity))
     assert np.isfinite(by_jax)
     assert np.isfinite(pulled.parameters.law).all()
     loops = (follow, equilibrium_path.adjoint, march, solve_stage, esdirk_adjoint.adjoint)

@@ -6,12 +6,12 @@ import shapely
 
 from sim.structure import (
     Material,
+    Perturbation,
     PerturbedStructure,
-    assembled,
+    VoidAngleContact,
     overlapping_pairs,
+    perturbed,
     quads,
-    shifted,
-    stiffened,
     void_angles,
 )
 from sim.structure.gaps import polygons
@@ -19,10 +19,19 @@ from sim.structure.perturbation import clashing_units
 
 LATTICE = quads(5, 4, 15.0, 2.25, np.deg2rad(20.0))
 CUTOFF = np.deg2rad(-10.0)
+CONTACT = VoidAngleContact(np.deg2rad(-15.0), CUTOFF)
+PLAIN = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.1, 0.2)
+
+
+def drawn(
+    seed: int, vertices: np.ndarray = LATTICE.vertices, **sizes: float | tuple[float, float]
+) -> PerturbedStructure:
+    given = Perturbation(**sizes)  # type: ignore[arg-type]
+    return perturbed(LATTICE, vertices, PLAIN, given, CONTACT, (seed,))
 
 
 def draw(largest: float, seed: int = 0) -> np.ndarray:
-    copy = shifted(LATTICE, LATTICE.vertices, largest, CUTOFF, np.random.default_rng(seed))
+    copy = drawn(seed, geometry=largest)
     assert copy.sound
     return copy.vertices - LATTICE.vertices
 
@@ -43,10 +52,7 @@ def test_equal_seeds_give_equal_copies() -> None:
 
 
 def test_what_clashes_is_drawn_again_and_counted() -> None:
-    found = [
-        shifted(LATTICE, LATTICE.vertices, 4.0, CUTOFF, np.random.default_rng(seed))
-        for seed in range(10)
-    ]
+    found = [drawn(seed, geometry=4.0) for seed in range(10)]
     assert any(copy.clashes for copy in found)
     for copy in found:
         assert copy.sound
@@ -60,16 +66,15 @@ def test_what_clashes_is_drawn_again_and_counted() -> None:
 def test_a_place_without_room_gives_up() -> None:
     squeezed = LATTICE.vertices.copy()
     squeezed[:4] += [12.0, 0.0]  # the first unit lies on its neighbour
-    copy = shifted(LATTICE, squeezed, 1e-3, CUTOFF, np.random.default_rng(0))
+    copy = drawn(0, squeezed, geometry=1e-3)
     assert not copy.sound
-    assert set(clashing_units(LATTICE, squeezed, CUTOFF)) >= {0, 1}
+    assert set(clashing_units(LATTICE, squeezed, CONTACT)) >= {0, 1}
 
 
 def test_units_are_assembled_whole() -> None:
-    cut = PerturbedStructure(LATTICE.vertices, 0, 0, sound=True)
-    made = assembled(LATTICE, cut, (0.2, np.deg2rad(1.0)), CUTOFF, np.random.default_rng(3))
+    made = drawn(3, assembly=(0.2, np.deg2rad(1.0)))
     assert made.sound
-    before, after = (polygons(LATTICE, each.vertices) for each in (cut, made))
+    before, after = (polygons(LATTICE, each) for each in (LATTICE.vertices, made.vertices))
     np.testing.assert_allclose(shapely.area(after), shapely.area(before), rtol=1e-12)
     apart = shapely.distance(shapely.centroid(before), shapely.centroid(after))
     assert 0.15 < apart.mean() < 0.35
@@ -80,12 +85,29 @@ def test_units_are_assembled_whole() -> None:
 
 
 def test_every_ligament_gets_stiffnesses_of_its_own() -> None:
-    plain = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)
-    made = stiffened(plain, 20000, 0.1, np.random.default_rng(0))
-    for name in ("axial", "shear", "bending"):
-        factor = np.asarray(getattr(made, name)) / getattr(plain, name)
+    made = [drawn(seed, ligaments=0.1).material for seed in range(700)]
+    ratios = {
+        name: np.ravel([getattr(each, name) / getattr(PLAIN, name) for each in made])
+        for name in ("axial", "shear", "bending")
+    }
+    for factor in ratios.values():
         assert factor.std() == pytest.approx(0.1, rel=0.03)
         assert factor.mean() == pytest.approx(1.0, abs=0.003)
         assert factor.min() >= 0.7 - 1e-12
-    assert np.corrcoef(np.asarray(made.axial), np.asarray(made.shear))[0, 1] < 0.02
-    assert (made.density, made.contact) == (1.0, 1.5)
+    assert np.corrcoef(ratios["axial"], ratios["shear"])[0, 1] < 0.02
+    assert (made[0].density, made[0].contact) == (1.0, 1.5)
+    np.testing.assert_array_equal(made[0].damping_rotation, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "count"),
+    [
+        ("stiffness", "axial", 1),
+        ("units", "damping_rotation", 20),
+        ("damping", "damping_rotation", 1),
+    ],
+)
+def test_other_constants_vary_together_or_by_unit(kind: str, name: str, count: int) -> None:
+    made = drawn(0, **{kind: 0.1}).material  # type: ignore[arg-type]
+    assert len(np.unique(getattr(made, name))) == count
+    assert (getattr(made, name) != getattr(PLAIN, name)).all()

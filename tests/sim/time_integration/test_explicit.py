@@ -59,7 +59,7 @@ def test_both_integrators_agree() -> None:
     times = np.linspace(0.0, 0.012, 1201)
     asked = times[::100]
     implicit = ImplicitSolver(rig.topology, times, asked, tolerance=1e-6)
-    explicit = replace(solver_for(rig, 600), asked=asked)
+    explicit = replace(solver_for(rig, 600), output_times=asked)
     one, other = (solve_case(s, rig.values, rig.drive) for s in (implicit, explicit))
     np.testing.assert_allclose(one[0], other[0], atol=2e-3 * np.abs(other[0]).max())
     np.testing.assert_allclose(one[1], other[1], atol=3e-2 * np.abs(other[1]).max())
@@ -93,7 +93,9 @@ def test_a_step_beyond_the_stability_limit_is_cut() -> None:
     coarse = solver_for(rig, int(0.6 * limit))
     u, _, record = coarse.forward(rig.values, rig.drive)
     assert limit <= record.steps.n_steps < 2.0 * limit
-    fine = replace(solver_for(rig, 1000), asked=coarse.asked).forward(rig.values, rig.drive)[0]
+    fine = replace(solver_for(rig, 1000), output_times=coarse.output_times).forward(
+        rig.values, rig.drive
+    )[0]
     np.testing.assert_allclose(u, fine, atol=2e-2 * np.abs(fine).max())
 
 
@@ -115,7 +117,9 @@ def test_deep_contact_takes_no_shorter_steps() -> None:
     assert record.steps.n_steps == rough.n_steps
     angles = rig.topology.smallest_void_angles(rig.values.void, u.reshape(len(u), -1, 3))
     assert BARRIER < angles.min() < np.deg2rad(-13.0)
-    fine = replace(solver_for(rig, 1280), asked=rough.asked).forward(rig.values, rig.drive)[0]
+    fine = replace(solver_for(rig, 1280), output_times=rough.output_times).forward(
+        rig.values, rig.drive
+    )[0]
     np.testing.assert_allclose(u, fine, atol=6e-2 * np.abs(fine).max())
 
 

@@ -73,7 +73,7 @@ def test_a_grid_that_is_too_coarse_is_split_where_it_fails() -> None:
     assert len(record.times) > len(coarse.times)
     assert np.isin(coarse.times, record.times).all()
     fine = solver_for(rig, n_steps=960)
-    close = replace(fine, asked=coarse.asked).forward(rig.values, rig.drive)[0]
+    close = replace(fine, output_times=coarse.output_times).forward(rig.values, rig.drive)[0]
     assert np.linalg.norm(u - close) < 0.5 * np.linalg.norm(close)
 
 
@@ -84,7 +84,7 @@ def test_stiff_ligaments_shorten_all_steps_to_come() -> None:
     stiff = rig.values._replace(law=law)
     u, _, record = solver_for(rig).forward(stiff, rig.drive)
     assert len(record.times) > 61
-    fine = replace(solver_for(rig, 960), asked=np.linspace(0.0, 0.012, 61))
+    fine = replace(solver_for(rig, 960), output_times=np.linspace(0.0, 0.012, 61))
     wanted = fine.forward(stiff, rig.drive)[0]
     np.testing.assert_allclose(u, wanted, atol=5e-2 * np.abs(wanted).max())
 
@@ -156,7 +156,7 @@ def test_nan_never_leaves(broken: str) -> None:
 def test_asked_times_do_not_change_the_steps() -> None:
     rig = shaken(1.0)
     solver = solver_for(rig)
-    between = replace(solver, asked=solver.times[3::7])
+    between = replace(solver, output_times=solver.times[3::7])
     one, other = (s.forward(rig.values, rig.drive) for s in (solver, between))
     np.testing.assert_array_equal(one[2].u[:-1], other[2].u[:-1])
     np.testing.assert_allclose(other[0], one[0][3::7], atol=1e-12)
