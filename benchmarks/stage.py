@@ -60,7 +60,7 @@ def work(args: argparse.Namespace) -> None:
     told = {"subject": suite.subject, "reference": suite.reference}
     described = measured.assign_attrs(told | {"machine": json.dumps(machine, sort_keys=True)})
     rules_told = json.dumps({"suite": args.suite, **asdict(rules)}, sort_keys=True)
-    origin = provenance.recorded(rules_told, {}, synthetic=False, role="rules")
+    origin = provenance.of_recording(rules_told, {}, synthetic=False, role="rules")
     datasets.write(described, args.out, suite.kind, origin)
 
 

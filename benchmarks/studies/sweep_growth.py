@@ -59,7 +59,7 @@ def cases(preset: str | None, count: float, task: str = "loss") -> Run:
     del task
     asked, wanted = load(PROBLEM, preset), Sweep.model_validate(SWEEP)
     vertices = _unchanged(asked)
-    every = list(islice(sweep_cases.settings(wanted), int(count)))
+    every = list(islice(sweep_cases.list_settings(wanted), int(count)))
     of_case = partial(
         setting_losses.results, asked, folder=PROBLEM.parent, vertices=vertices, threads=1
     )

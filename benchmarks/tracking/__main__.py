@@ -11,9 +11,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from benchmarks.tracking import frame_rates, plain_opencv
-from pipeline.tracking.frames import frames, import_video
-from pipeline.tracking.geometry import of_design
-from pipeline.tracking.motion import Track, follow
+from pipeline.tracking.frames import import_video, read_frames
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.motion import Track, track_video
 from sim.core import Floats, Mask, Reals
 
 _GROSS = (0.3, 0.3, np.deg2rad(3))
@@ -73,12 +73,12 @@ def honesty(track: Track, real: Truth) -> str:
 def _measure(video: Path, folder: Path, plainly: bool) -> None:
     name = video.stem.removesuffix("_lossless")
     described = import_video.description(folder / f"{name}.yaml")
-    specimen = of_design(import_video.design(described))
+    specimen = outlines_of_design(import_video.design(described))
     scale = described["approx_px_per_mm"]
     real = truth(folder, name, described["grid"][0])
-    images = list(frames(video))
+    images = list(read_frames(video))
     clock: list[float] = []
-    track = follow(iter(images), specimen, scale, lambda: clock.append(time.process_time()))
+    track = track_video(iter(images), specimen, scale, lambda: clock.append(time.process_time()))
     rate = (len(clock) - 1) / (clock[-1] - clock[0])
     line = accuracy(track.displacement, real, 1 / track.calibration.pixel) + honesty(track, real)
     print(f"{video.name:<24}{line}{rate:10.1f}", flush=True)

@@ -13,9 +13,9 @@ import xarray as xr
 from benchmarks.harness import Tell
 from benchmarks.tracking import plain_opencv
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import Frame, frames, import_video
-from pipeline.tracking.geometry import SpecimenOutlines, of_design
-from pipeline.tracking.motion import follow
+from pipeline.tracking.frames import Frame, import_video, read_frames
+from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
+from pipeline.tracking.motion import track_video
 from sim.core import Floats, Image, Ints
 
 THINNINGS = (1, 2, 4)
@@ -43,7 +43,7 @@ class TruthVideo(NamedTuple):
 
 
 def _own(shown: list[Frame], specimen: SpecimenOutlines, scale: float) -> Floats:
-    return np.asarray(follow(iter(shown), specimen, scale).displacement)
+    return np.asarray(track_video(iter(shown), specimen, scale).displacement)
 
 
 def _plainly(shown: list[Frame], specimen: SpecimenOutlines, scale: float) -> Floats:
@@ -97,8 +97,8 @@ def clip(path: Path) -> TruthVideo:
     return TruthVideo(
         path.stem,
         float(described["fps"]),
-        list(frames(import_video.video_of(path))),
-        of_design(import_video.design(described)),
+        list(read_frames(import_video.video_of(path))),
+        outlines_of_design(import_video.design(described)),
         float(described["approx_px_per_mm"]),
         displacement(stored, described["grid"][0]),
     )

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from pipeline.tracking.detect import sight
+from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion
 from sim.core import Floats, Image
 
@@ -30,7 +30,7 @@ _LIKE = 0.6
 def track(images: Iterator[Image], specimen: SpecimenOutlines, px_per_mm: float) -> Floats:
     """Displacements (frames, units, 3), mm and rad; NaN where fewer than two corners are found."""
     first = next(images)
-    found = sight(first, specimen, px_per_mm)[0]
+    found = detect_lattice(first, specimen, px_per_mm)[0]
     flip = np.array([px_per_mm, -px_per_mm])
     followers = [
         _Follower(first, place, _INWARD * specimen.polygon(one) * flip, specimen.pitch * px_per_mm)

@@ -1,4 +1,4 @@
 from . import calibration_dataset as calibration_dataset
 from . import computed_sets as computed_sets
-from .fit_constants import fitted as fitted
-from .fit_constants import unsimulated as unsimulated
+from .fit_constants import fit_calibration as fit_calibration
+from .fit_constants import simulation_fault as simulation_fault

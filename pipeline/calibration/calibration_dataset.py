@@ -1,4 +1,4 @@
-"""The dataset `calibration`, and the lines that a problem file takes from it."""
+"""Writes the dataset `calibration`, and the lines that a problem file takes from it."""
 
 from __future__ import annotations
 
@@ -7,22 +7,28 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from pipeline.calibration.estimates import UNDETERMINED, Estimate, estimate, quality, warnings
-from pipeline.calibration.experiments import Decay, Experiment
-from pipeline.calibration.fit_uncertainty import uncertainty
-from pipeline.calibration.inputs import UNITS, WRITTEN, Constants, Name
+from pipeline.calibration.estimates import (
+    UNDETERMINED,
+    Estimate,
+    estimate_constants,
+    list_warnings,
+    measure_quality,
+)
+from pipeline.calibration.experiments import DecayTest, Experiment
+from pipeline.calibration.fit_uncertainty import estimate_errors
+from pipeline.calibration.inputs import UNITS, WRITTEN, ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats
 
 
-def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
-    """The dataset of a fit, and the values in it.
+def assemble_calibration(fit: Fit) -> tuple[xr.Dataset, Estimate]:
+    """Assembles the dataset of a fit, and the values in it.
 
     Raises:
         SimulationError: an equilibrium on the way is not stable.
     """
-    known = uncertainty(fit)
-    found, told = estimate(fit, known), quality(fit)
+    known = estimate_errors(fit)
+    found, told = estimate_constants(fit, known), measure_quality(fit)
     experiments, names = fit.model.experiments, list(found.names)
     begin = [fit.model.begin.value(name) for name in found.names]
     fitted = np.arange(len(names)) >= found.wanted
@@ -52,17 +58,17 @@ def dataset(fit: Fit) -> tuple[xr.Dataset, Estimate]:
         "set": [each.measured.name for each in experiments],
         "kind": ("set", [each.measured.kind for each in experiments]),
     }
-    advice = warnings(fit, found, told, known.newton)
+    advice = list_warnings(fit, found, told, known.newton)
     made = xr.Dataset(variables, labels)
     return made.assign_attrs(warnings="\n".join(advice)), found
 
 
 def _by_peaks(each: Experiment) -> tuple[float, float]:
-    return (each.peaks.ratio, each.peaks.error) if isinstance(each, Decay) else (np.nan, np.nan)
+    return (each.peaks.ratio, each.peaks.error) if isinstance(each, DecayTest) else (np.nan, np.nan)
 
 
 def _points(fit: Fit) -> dict[str, tuple[str, Floats]]:
-    """All measured values with what the fit makes of them."""
+    """Lists all measured values with their fit."""
     every = [each.measured for each in fit.model.experiments]
     return {
         "set_of_point": ("point", fit.model.set_of_row),
@@ -82,8 +88,8 @@ def _joined(parts: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
-    """The lines `material:` of a problem file, the interval of each fitted value beside it."""
+def material_fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
+    """Writes the lines `material:` of a problem file, with the interval of each fitted value."""
     here = fit.model.constants(fit.unknowns)
     told = {
         name: "  # not determined by the data"
@@ -108,18 +114,18 @@ def fragment(fit: Fit, found: Estimate, title: str, *, synthetic: bool) -> str:
     return "\n".join(lines) + "\n"
 
 
-_STIFFNESS: tuple[Name, ...] = ("axial_stiffness", "shear_stiffness", "bending_stiffness")
+_STIFFNESS: tuple[ConstantName, ...] = ("axial_stiffness", "shear_stiffness", "bending_stiffness")
 
 
-def _damping(here: Constants) -> tuple[Name, ...]:
+def _damping(here: Constants) -> tuple[ConstantName, ...]:
     by_ratio = here.material.damping.ratio is not None
     return ("damping_ratio",) if by_ratio else ("damping_translation", "damping_rotation")
 
 
-def _line(here: Constants, name: Name, told: dict[Name, str]) -> str:
+def _line(here: Constants, name: ConstantName, told: dict[ConstantName, str]) -> str:
     return f"  {name}: {_words(name, here.value(name))}{told.get(name, '')}"
 
 
-def _words(name: Name, value: float) -> str:
+def _words(name: ConstantName, value: float) -> str:
     unit, factor = WRITTEN[name]
     return f"{value * factor:.6g} {unit}".rstrip()

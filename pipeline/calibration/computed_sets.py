@@ -1,4 +1,4 @@
-"""Computed measurements: what sets would be if the constants were known, with noise."""
+"""Computes measurements from known constants, with noise."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from pipeline.calibration.inputs import (
     Constants,
     ForceDisplacement,
     FreeDecay,
-    Set,
-    start,
+    MeasurementSet,
+    start_constants,
 )
 from pipeline.datasets import provenance
 from pipeline.problem.reading import yaml_file
@@ -29,36 +29,38 @@ LABEL = "SYNTHETIC: computed, not measured"
 YAML = "calibration.yaml"
 
 
-def truth(asked: Calibration) -> Constants:
-    """The constants that computed data are made with."""
+def true_constants(asked: Calibration) -> Constants:
+    """Returns the constants that computed data are made with."""
     assert asked.virtual is not None
-    return start(asked)._replace(material=asked.virtual.truth, cutoff=asked.virtual.cutoff_angle)
+    return start_constants(asked)._replace(
+        material=asked.virtual.truth, cutoff=asked.virtual.cutoff_angle
+    )
 
 
-def forces_of(
+def simulate_forces(
     asked: ForceDisplacement, true: Constants, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Displacements in mm and noisy forces in N."""
+    """Simulates a test: displacements in mm and noisy forces in N."""
     assert asked.virtual is not None
     displacement = np.linspace(0.0, asked.virtual.end, asked.virtual.points + 1)[1:]
-    force = force_displacement.simulation(asked, true, displacement).predict(true)
+    force = force_displacement.pose_simulation(asked, true, displacement).predict(true)
     return displacement, force + asked.virtual.noise * random.normal(size=len(force))
 
 
-def decay_of(
+def simulate_decay(
     asked: FreeDecay, true: Constants, random: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Times in s and noisy angles in rad, of the oscillation about one hinge."""
+    """Computes times in s and noisy angles in rad, of the oscillation about one hinge."""
     given = asked.virtual
     assert given is not None
     _, inertia = unrotated_inertia(true.material.density, true.spacing)
     frequency = float(np.sqrt(true.material.bending_stiffness / inertia))
     time = np.arange(int(given.duration * given.rate)) / given.rate
-    course = free_decay.terms(time, true.ratio, frequency) @ [0.0, 0.0, given.amplitude, 0.0]
+    course = free_decay.decay_terms(time, true.ratio, frequency) @ [0.0, 0.0, given.amplitude, 0.0]
     return time, course + given.noise * random.normal(size=len(time))
 
 
-def write(asked: Calibration, path: Path, folder: Path) -> None:
+def write_sets(asked: Calibration, path: Path, folder: Path) -> None:
     """Writes the computed sets, and a calibration that names their files.
 
     Args:
@@ -70,10 +72,10 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
         UserError: the folder cannot be written to.
     """
     assert asked.virtual is not None
-    data = dict(yaml_file.read(path).data)
+    data = dict(yaml_file.read_yaml(path).data)
     sets = [dict(each) for each in data.pop("data")]
     data.pop("virtual")
-    true = truth(asked)
+    true = true_constants(asked)
     for number, (each, raw) in enumerate(zip(asked.data, sets, strict=True)):
         if "problem" in raw:
             raw["problem"] = os.path.relpath(path.parent / raw["problem"], folder)
@@ -82,7 +84,7 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
         else:
             del raw["virtual"]
             random = np.random.default_rng([asked.virtual.seed, number])
-            raw["file"] = _written(each, path, true, random, folder)
+            raw["file"] = _write_set(each, path, true, random, folder)
     with write_atomically(folder / YAML) as aside:
         text = yaml.safe_dump(
             {**data, "synthetic": True, "data": sets}, sort_keys=False, allow_unicode=True
@@ -90,26 +92,26 @@ def write(asked: Calibration, path: Path, folder: Path) -> None:
         aside.write_text(f"# {LABEL}\n{text}", encoding="utf-8")
 
 
-def _written(
-    each: Set, path: Path, true: Constants, random: np.random.Generator, folder: Path
+def _write_set(
+    each: MeasurementSet, path: Path, true: Constants, random: np.random.Generator, folder: Path
 ) -> str:
-    """The name of the file that a set was written to; `path` is the calibration's."""
+    """Writes a set, and returns the name of its file; `path` is the calibration's."""
     name = f"{each.name}.csv"
     if isinstance(each, ForceDisplacement):
         columns = (f"{each.columns.displacement} (mm)", f"{each.columns.force} (N)")
-        _table(folder / name, columns, *forces_of(each, true, random))
+        _write_csv(folder / name, columns, *simulate_forces(each, true, random))
         return name
     if isinstance(each, FreeDecay):
         columns = (f"{each.columns.time} (s)", f"{each.columns.angle} (rad)")
-        _table(folder / name, columns, *decay_of(each, true, random))
+        _write_csv(folder / name, columns, *simulate_decay(each, true, random))
         return name
-    origin = provenance.recorded(each.model_dump_json(), {}, synthetic=True)
-    track = computed_track.track_of(each, path.parent, true, random)
+    origin = provenance.of_recording(each.model_dump_json(), {}, synthetic=True)
+    track = computed_track.simulate_track(each, path.parent, true, random)
     datasets.write(track, folder / f"{each.name}.nc", "track", origin)
     return f"{each.name}.nc"
 
 
-def _table(path: Path, heading: tuple[str, ...], *columns: Floats) -> None:
+def _write_csv(path: Path, heading: tuple[str, ...], *columns: Floats) -> None:
     rows = [",".join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
     with write_atomically(path) as aside:
         text = "\n".join([f"# {LABEL}", ",".join(heading), *rows])

@@ -1,4 +1,4 @@
-"""A computed track: a study's structure under its own drive, seen with noise."""
+"""Simulates a study's structure under its own drive, and adds a tracker's noise."""
 
 from __future__ import annotations
 
@@ -8,44 +8,44 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.calibration.experiments import TrackedSpecimen, specimen, three
+from pipeline.calibration.experiments import TrackedSpecimen, per_dof, pose_specimen
 from pipeline.calibration.inputs import Constants, TrackedMotion
 from pipeline.posing import lattice_of, network_variables, spread, unit_coordinates
 from pipeline.runtime import UserError
-from pipeline.tracking.output import absent, labelled
+from pipeline.tracking.output import absent_flag, label_track
 from sim.core import Floats
 from sim.energy import observe
 from sim.scene import Scene, concrete_parameters, simulate
 from sim.structure import Material, VoidAngleContact
 
 
-def track_of(
+def simulate_track(
     asked: TrackedMotion, folder: Path, true: Constants, random: np.random.Generator
 ) -> xr.Dataset:
-    """The dataset `track` of the initial structure of a study, made of the true constants.
+    """Simulates the `track` of a study's initial structure, made of the true constants.
 
     Raises:
         UserError: the problem is wrong.
     """
     assert asked.virtual is not None
-    made = specimen(asked, folder)
+    made = pose_specimen(asked, folder)
     count = 1 + int(made.scene.loads.duration * asked.virtual.rate * (1 + 1e-9))
     time = np.arange(count) / asked.virtual.rate
-    posed = _posed(made, true)
+    posed = _true_scene(made, true)
     motion = _motion(posed, asked.case, time)
     force = np.full(count, np.nan)
     if asked.virtual.load is not None:
         clean = _force(made, posed, asked, motion, folder)
         force = clean + asked.virtual.load * random.normal(size=count)
-    noise = three(asked.virtual.noise)
-    bias = np.zeros(3) if asked.virtual.bias is None else three(asked.virtual.bias)
+    noise = per_dof(asked.virtual.noise)
+    bias = np.zeros(3) if asked.virtual.bias is None else per_dof(asked.virtual.bias)
     shape = motion.shape
     motion = motion + noise * random.normal(size=shape) + bias * random.normal(size=shape[1:])
     return _dataset(made, time, motion, np.broadcast_to(noise, shape), force)
 
 
-def _posed(made: TrackedSpecimen, true: Constants) -> Scene:
-    """The scene made of the true constants, to be simulated much finer than a fit would."""
+def _true_scene(made: TrackedSpecimen, true: Constants) -> Scene:
+    """Poses the scene made of the true constants, to be simulated much finer than in a fit."""
     scene = made.scene
     axial, shear, bending, translation, rotation = true.numbers
     constants = Material(
@@ -72,7 +72,7 @@ def _motion(posed: Scene, case: int, time: Floats) -> Floats:
 def _force(
     made: TrackedSpecimen, posed: Scene, asked: TrackedMotion, motion: Floats, folder: Path
 ) -> Floats:
-    """Force (n_times,) of the drive along its direction, N.
+    """Computes the force (n_times,) of the drive along its direction, N.
 
     Raises:
         UserError: it has no direction.
@@ -101,7 +101,7 @@ def _dataset(
         spread(part, lattice, intact.n_units, axis=1).astype(np.float32) for part in (motion, sigma)
     )
     there = np.isin(intact.id, lattice.id)
-    quality = np.broadcast_to(np.where(there, 0, absent()), (len(time), intact.n_units))
+    quality = np.broadcast_to(np.where(there, 0, absent_flag()), (len(time), intact.n_units))
     variables = {
         "displacement": (("time", "unit", "dof"), moved),
         "sigma": (("time", "unit", "dof"), told),
@@ -116,4 +116,4 @@ def _dataset(
         "image_size": (("xy",), np.zeros(2, np.int64)),
         "blur": ((), np.nan),
     }
-    return labelled(design, time, variables)
+    return label_track(design, time, variables)

@@ -1,4 +1,4 @@
-"""From a fit to values with intervals, and to what a reader should be warned of."""
+"""Computes values with intervals from a fit, and warns of what weakens them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from pipeline.calibration.fit_uncertainty import Uncertainty, slopes
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats, Ints
 
@@ -19,12 +19,12 @@ WEAK_FROM, NOTHING_FROM = 0.1, 1.0
 TOLD_APART = 30.0
 """Condition number from which constants are hardly told apart."""
 CONVERGED = 0.05
-DERIVED: tuple[Name, ...] = ("damping_translation", "damping_rotation")
+DERIVED: tuple[ConstantName, ...] = ("damping_translation", "damping_rotation")
 """What follows from a damping ratio by the authors' law."""
 
 
 class Estimate(NamedTuple):
-    """Values of the constants, the wanted ones before those that follow from them.
+    """Holds values of the constants, the wanted ones before those that follow from them.
 
     Attributes:
         names: of the constants.
@@ -39,7 +39,7 @@ class Estimate(NamedTuple):
             each counted in its own standard errors.
     """
 
-    names: tuple[Name, ...]
+    names: tuple[ConstantName, ...]
     wanted: int
     value: Floats
     error: Floats
@@ -57,7 +57,7 @@ class Estimate(NamedTuple):
 
 
 class Quality(NamedTuple):
-    """How well the fit explains each set.
+    """Measures how well the fit explains each set.
 
     Attributes:
         points, freedom: (n_sets,) measured values, and what the fit leaves of their freedom.
@@ -73,8 +73,8 @@ class Quality(NamedTuple):
     autocorrelation: Floats
 
 
-def estimate(fit: Fit, known: Uncertainty) -> Estimate:
-    """Values with their 95 % intervals, which are symmetric in the logarithm."""
+def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:
+    """Computes values with their 95 % intervals, which are symmetric in the logarithm."""
     names = fit.model.names
     follows = DERIVED if "damping_ratio" in names else ()
     every = (*names, *follows)
@@ -98,14 +98,14 @@ def estimate(fit: Fit, known: Uncertainty) -> Estimate:
     )
 
 
-def _values(here: Constants, names: Sequence[Name], logs: Floats) -> Floats:
+def _values(here: Constants, names: Sequence[ConstantName], logs: Floats) -> Floats:
     """Constants in working units, each from its own logarithm."""
     barrier = np.array([here.law.barrier if name == "contact_cutoff" else 0.0 for name in names])
     return barrier + np.exp(np.minimum(logs, 300.0))
 
 
 def _quantile(fit: Fit) -> float:
-    """Of the 95 % intervals: Student's, where the noise was estimated from the same data."""
+    """Computes the quantile of the 95 % intervals: Student's, where the noise was estimated."""
     experiments = fit.model.experiments
     if all(each.measured.known for each in experiments):
         return float(student.ppf(0.975, np.inf))
@@ -113,8 +113,8 @@ def _quantile(fit: Fit) -> float:
     return float(student.ppf(0.975, max(len(fit.residual) - len(fit.unknowns) - unbiased, 1)))
 
 
-def quality(fit: Fit) -> Quality:
-    """How well the fit explains each set."""
+def measure_quality(fit: Fit) -> Quality:
+    """Measures how well the fit explains each set."""
     basis = np.linalg.svd(fit.jacobian, full_matrices=False)[0]
     taken, rows = (basis**2).sum(axis=1), fit.model.set_of_row
     sets = range(len(fit.model.experiments))
@@ -129,15 +129,15 @@ def quality(fit: Fit) -> Quality:
 
 
 def _autocorrelation(residual: Floats, fit: Fit, k: int) -> float:
-    """Correlation of residuals that follow one another in a channel of a set."""
+    """Computes the correlation of residuals that follow one another in a channel of a set."""
     channel = fit.model.experiments[k].measured.channel
     following = channel[1:] == channel[:-1] if len(channel) else np.ones(len(residual) - 1, bool)
     product = (residual[1:] * residual[:-1])[following].mean()
     return float(product / max((residual**2).mean(), 1e-300))
 
 
-def warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
-    """What a reader should know before using the values, a sentence each."""
+def list_warnings(fit: Fit, found: Estimate, told: Quality, newton: float) -> list[str]:
+    """Warns of weak constants and of sets that the model misses, a sentence each."""
     words = {
         WEAK: "{name} is weakly determined by these data: its standard error is {error:.0%}",
         UNDETERMINED: "{name} is not determined by these data: leave it out of fit, or measure"

@@ -1,4 +1,4 @@
-"""From the YAML of a calibration and its files to a fit."""
+"""Fits constants to the sets that the YAML of a calibration names."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from pipeline.calibration.experiments import (
     full_field,
     tracked_specimen,
 )
-from pipeline.calibration.fit_uncertainty import inverted
+from pipeline.calibration.fit_uncertainty import invert_information
 from pipeline.calibration.inputs import (
     Calibration,
     Constants,
     ForceDisplacement,
     FreeDecay,
-    Set,
-    start,
+    MeasurementSet,
+    start_constants,
 )
-from pipeline.calibration.least_squares import Fit, Model, fit
+from pipeline.calibration.least_squares import Fit, FitModel, fit_least_squares
 from pipeline.runtime import UserError
 from sim.core import Floats, SimulationError
 
@@ -35,8 +35,8 @@ AGREED = 0.2
 """Constants that change by less, in standard errors, are final."""
 
 
-def fitted(asked: Calibration, path: Path) -> Fit:
-    """The fit that a calibration asks for.
+def fit_calibration(asked: Calibration, path: Path) -> Fit:
+    """Fits the constants of a calibration.
 
     Args:
         asked: the calibration.
@@ -45,29 +45,29 @@ def fitted(asked: Calibration, path: Path) -> Fit:
     Raises:
         UserError: a file cannot be used, or the measured states cannot be simulated.
     """
-    begin = start(asked)
-    experiments = [experiment(each, begin, path) for each in asked.data]
-    model = Model(begin, asked.fit, experiments)
+    begin = start_constants(asked)
+    experiments = [read_experiment(each, begin, path) for each in asked.data]
+    model = FitModel(begin, asked.fit, experiments)
     values = sum(len(each.measured.values) for each in experiments)
     if values <= len(model.start):
         remedy = "measure more, or fit fewer constants"
         what = f"{values} values do not determine {len(model.start)} unknowns"
         raise UserError(what, file=path, key="data", remedy=remedy)
     try:
-        return settled(model)
+        return fit_settled(model)
     except SimulationError as error:
-        raise unsimulated(error, path) from error
+        raise simulation_fault(error, path) from error
 
 
-def unsimulated(error: SimulationError, path: Path) -> UserError:
-    """What it means that measured states cannot be simulated."""
+def simulation_fault(error: SimulationError, path: Path) -> UserError:
+    """Explains that measured states cannot be simulated."""
     remedy = "check lattice, displacements and the values in material that the fit starts from"
     what = f"the measured states cannot be simulated: {error}"
     return UserError(what, file=path, key="data", remedy=remedy)
 
 
-def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
-    """One set as an experiment.
+def read_experiment(asked: MeasurementSet, begin: Constants, path: Path) -> Experiment:
+    """Reads one set as an experiment.
 
     Raises:
         UserError: its file cannot be used.
@@ -82,46 +82,48 @@ def experiment(asked: Set, begin: Constants, path: Path) -> Experiment:
         )
     folder = path.parent
     if isinstance(asked, ForceDisplacement):
-        return force_displacement.experiment(asked, begin, *force_displacement.read(asked, folder))
+        return force_displacement.pose_force_test(
+            asked, begin, *force_displacement.read(asked, folder)
+        )
     if isinstance(asked, FreeDecay):
-        return free_decay.experiment(asked, *free_decay.read(asked, folder))
-    return full_field.experiment(asked, folder, begin, tracked_specimen.read(asked, folder))
+        return free_decay.pose_decay(asked, *free_decay.read(asked, folder))
+    return full_field.pose_track(asked, folder, begin, tracked_specimen.read_track(asked, folder))
 
 
-def settled(model: Model) -> Fit:
-    """The fit with steps in time, and an effect of the drives' noise, that suit what it finds."""
+def fit_settled(model: FitModel) -> Fit:
+    """Fits with steps in time, and an effect of the drives' noise, that suit the result."""
     if not any(isinstance(each, FullFieldExperiment) for each in model.experiments):
-        return fit(model)
-    found = fit(_noisy(model, model.begin))
+        return fit_least_squares(model)
+    found = fit_least_squares(_noisy(model, model.begin))
     for _ in range(_ROUNDS):
         before, known = found, _noisy(found.model, found.model.constants(found.unknowns))
-        found = _resolved(fit(known, before.unknowns))
+        found = _resolved(fit_least_squares(known, before.unknowns))
         if _moved(found, found.unknowns - before.unknowns) < AGREED:
             break
     return found
 
 
 def _resolved(found: Fit) -> Fit:
-    """The fit with steps in time so short that half of them would move no constant."""
+    """Fits with steps in time so short that half of them would move no constant."""
     for _ in range(_HALVINGS):
         finer = found.model._replace(experiments=[_finer(each) for each in found.model.experiments])
         change = finer.residual(found.unknowns) - found.model.residual(found.unknowns)
         level = found.level[found.model.set_of_row]
-        shift = -inverted(found.jacobian) @ (found.jacobian.T @ (change / level))
+        shift = -invert_information(found.jacobian) @ (found.jacobian.T @ (change / level))
         if _moved(found, shift) < AGREED:
             return found
-        found = fit(finer, found.unknowns)
+        found = fit_least_squares(finer, found.unknowns)
     return found
 
 
 def _moved(found: Fit, change: Floats) -> float:
-    """The largest of the constants' changes, in standard errors."""
-    error = np.sqrt(np.diag(inverted(found.jacobian)))
+    """Computes the largest of the constants' changes, in standard errors."""
+    error = np.sqrt(np.diag(invert_information(found.jacobian)))
     return float(np.abs(change / error)[: len(found.model.names)].max())
 
 
-def _noisy(model: Model, at: Constants) -> Model:
-    """The model with what the noise of its drives does at some constants."""
+def _noisy(model: FitModel, at: Constants) -> FitModel:
+    """Adds the effect of the drives' noise at some constants to the model."""
     knowing = [
         each.with_drive_noise(at) if isinstance(each, FullFieldExperiment) else each
         for each in model.experiments

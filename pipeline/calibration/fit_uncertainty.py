@@ -1,4 +1,4 @@
-"""What is known of the errors of a fit, and what the data cannot tell."""
+"""Estimates the errors of a fit, and the constants that its data do not tell."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibration.experiments import ForceTest, FullFieldExperiment
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from pipeline.calibration.least_squares import Fit
 from sim.core import Floats
 
@@ -20,7 +20,7 @@ _LEAST = 0.1
 
 
 class Uncertainty(NamedTuple):
-    """Errors of the wanted constants' logarithms.
+    """Holds errors of the wanted constants' logarithms.
 
     Attributes:
         covariance: (n_names, n_names).
@@ -35,8 +35,8 @@ class Uncertainty(NamedTuple):
     newton: float
 
 
-def uncertainty(fit: Fit) -> Uncertainty:
-    """The errors of a fit.
+def estimate_errors(fit: Fit) -> Uncertainty:
+    """Returns the errors of a fit.
 
     The covariance is H^-1 J'J H^-1 (Huber 1967), with H the second derivatives of half the sum of
     squares. Without drives, H is J'J but for residuals that add up to nothing, and taken as such.
@@ -45,18 +45,18 @@ def uncertainty(fit: Fit) -> Uncertainty:
         SimulationError: an equilibrium on the way is not stable.
     """
     wanted = slice(len(fit.model.names))
-    inverse = inverted(fit.jacobian)
+    inverse = invert_information(fit.jacobian)
     by_adjoint = fit.jacobian.T @ fit.residual
-    by_adjoint[wanted] = gradient(fit)
+    by_adjoint[wanted] = adjoint_gradient(fit)
     step = inverse @ by_adjoint
     bound = np.sqrt(np.diag(inverse))
-    covariance = _wider(inverse, lost_to_drives(fit))[wanted, wanted]
+    covariance = _wider(inverse, information_lost(fit))[wanted, wanted]
     newton = float(np.abs(step / bound)[wanted].max())
     return Uncertainty(covariance, inverse[wanted, wanted], newton)
 
 
 def _wider(inverse: Floats, lost: Floats) -> Floats:
-    """A covariance when a part of the information whose inverse it was is lost."""
+    """Widens a covariance by the loss of a part of the information whose inverse it was."""
     if not lost.any():
         return inverse
     root = np.linalg.cholesky(inverse)
@@ -65,8 +65,8 @@ def _wider(inverse: Floats, lost: Floats) -> Floats:
     return np.asarray(axes @ axes.T)
 
 
-def lost_to_drives(fit: Fit) -> Floats:
-    """What drives that are known by measurement alone take from the second derivatives.
+def information_lost(fit: Fit) -> Floats:
+    """Computes the part of the second derivatives that drives known by measurement alone take.
 
     Which motion of the driven units explains the residuals best is another one at other constants:
     as p(theta, u) is the prediction and P the covariance of the drive's changes u once the free
@@ -104,16 +104,16 @@ def _lost_to_drive(fit: Fit, k: int, each: FullFieldExperiment) -> Floats:
     return (mixed + mixed.T + turned.T @ each.measured.unexplained(turned)) / level**2
 
 
-def inverted(jacobian: Floats) -> Floats:
-    """Inverse of the information J'J; huge, not infinite, where the data tell nothing."""
+def invert_information(jacobian: Floats) -> Floats:
+    """Inverts the information J'J; huge, not infinite, where the data tell nothing."""
     size = np.maximum(np.linalg.norm(jacobian, axis=0), _TINY)
     _, singular, right = np.linalg.svd(jacobian / size, full_matrices=False)
     scaled = right.T / np.maximum(singular, _TINY)
     return np.asarray((scaled @ scaled.T) / np.outer(size, size))
 
 
-def gradient(fit: Fit) -> Floats:
-    """Derivatives (n_names,) of half the sum of squares, by the adjoint where there is one."""
+def adjoint_gradient(fit: Fit) -> Floats:
+    """Computes derivatives (n_names,) of half the sum of squares, by the adjoint where possible."""
     model = fit.model
     constants, slopes = model.constants(fit.unknowns), _slopes(fit)
     total = np.zeros(len(model.names))
@@ -131,15 +131,15 @@ def gradient(fit: Fit) -> Floats:
 
 
 def _slopes(fit: Fit) -> Floats:
-    """(5, n_names) derivatives of the specimen's numbers by the logarithms of the constants."""
+    """Differentiates the specimen's numbers by the logarithms of the constants (5, n_names)."""
     model, logs = fit.model, fit.unknowns[: len(fit.model.names)]
     return slopes(model.begin, model.names, logs, lambda constants: constants.numbers)
 
 
 def slopes(
-    begin: Constants, names: Sequence[Name], logs: Floats, of: Callable[[Constants], Floats]
+    begin: Constants, names: Sequence[ConstantName], logs: Floats, of: Callable[[Constants], Floats]
 ) -> Floats:
-    """Derivatives (m, n_names) of numbers (m,) of a specimen by logarithms of its constants."""
+    """Differentiates numbers (m,) of a specimen by logarithms of its constants (m, n_names)."""
     columns = []
     for step in _SMALL * np.eye(len(logs)):
         ahead, behind = (of(begin.at(names, logs + sign * step)) for sign in (1, -1))

@@ -1,4 +1,4 @@
-"""Weighted least squares in the logarithms of the constants, over all sets at once.
+"""Fits the logarithms of the constants by weighted least squares, over all sets at once.
 
 The columns of the Jacobian are central differences: with a handful of unknowns they cost a few
 solves more than the adjoint's one gradient, but a whole Jacobian gives Gauss-Newton's steps and the
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pipeline.calibration.experiments import Experiment
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from sim.core import Floats, SimulationError
 
 STEP = 1e-4
@@ -28,8 +28,8 @@ AGREED = 0.01
 ROUNDS = 6
 
 
-class Model(NamedTuple):
-    """What is fitted to what.
+class FitModel(NamedTuple):
+    """Combines the wanted constants with all sets.
 
     Attributes:
         begin: constants to start from.
@@ -38,7 +38,7 @@ class Model(NamedTuple):
     """
 
     begin: Constants
-    names: tuple[Name, ...]
+    names: tuple[ConstantName, ...]
     experiments: Sequence[Experiment]
 
     @property
@@ -62,17 +62,17 @@ class Model(NamedTuple):
         )
 
     def constants(self, unknowns: Floats) -> Constants:
-        """The specimen's constants at some unknowns."""
+        """Returns the specimen's constants at some unknowns."""
         return self.begin.at(self.names, unknowns[: len(self.names)])
 
     @property
     def own(self) -> list[slice]:
-        """Where every set's own unknowns are."""
+        """Locates every set's own unknowns."""
         ends = np.cumsum([len(self.names), *(len(each.own_start) for each in self.experiments)])
         return [slice(first, last) for first, last in pairwise(ends)]
 
     def predictions(self, unknowns: Floats) -> list[Floats]:
-        """What every set would measure.
+        """Predicts every set's measurements.
 
         Raises:
             SimulationError: there is no such state.
@@ -82,14 +82,14 @@ class Model(NamedTuple):
         return [each.predict(constants, unknowns[own]) for each, own in pairs]
 
     def residual(self, unknowns: Floats) -> Floats:
-        """(n,) whitened residuals."""
+        """Computes whitened residuals (n,)."""
         pairs = zip(self.experiments, self.predictions(unknowns), strict=True)
         return np.concatenate(
             [each.measured.whitened(found - each.measured.values) for each, found in pairs]
         )
 
     def jacobian(self, unknowns: Floats) -> Floats:
-        """(n, n_unknowns) derivatives of the whitened residuals, by central differences."""
+        """Differentiates the whitened residuals by central differences (n, n_unknowns)."""
         blocks = []
         for each, own in zip(self.experiments, self.own, strict=True):
             seen = [k for k, name in enumerate(self.names) if name in each.sees]
@@ -107,7 +107,7 @@ class Model(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """The solution, each set's rows already divided by the level of its noise.
+    """Holds the solution, each set's rows already divided by the level of its noise.
 
     Attributes:
         model: what was fitted.
@@ -118,7 +118,7 @@ class Fit(NamedTuple):
         bounds: (n_unknowns, 2) within which it was looked for.
     """
 
-    model: Model
+    model: FitModel
     unknowns: Floats
     level: Floats
     residual: Floats
@@ -126,8 +126,8 @@ class Fit(NamedTuple):
     bounds: Floats
 
 
-def fit(model: Model, near: Floats | None = None) -> Fit:
-    """The constants that fit best, looked for from `near` on, or from the start.
+def fit_least_squares(model: FitModel, near: Floats | None = None) -> Fit:
+    """Finds the constants that fit best, from `near` on, or from the start.
 
     Levels of noise that are not known follow from the residuals of their sets, and weigh the sets
     against one another; they are found in turns with the constants.
@@ -142,7 +142,7 @@ def fit(model: Model, near: Floats | None = None) -> Fit:
     bounds = np.stack([begin - reach, begin + reach], axis=1)
     level = _level(model, model.residual(unknowns), np.zeros((len(rows), 1)))
     for _ in range(ROUNDS):
-        unknowns = _solved(model, unknowns, level[rows], bounds)
+        unknowns = _solve(model, unknowns, level[rows], bounds)
         residual, jacobian = model.residual(unknowns), model.jacobian(unknowns)
         found = _level(model, residual, jacobian / level[rows, None])
         settled = np.ptp(np.log(found / level)) < AGREED
@@ -153,8 +153,8 @@ def fit(model: Model, near: Floats | None = None) -> Fit:
     return Fit(model, unknowns, level, residual / within, jacobian / within[:, None], bounds)
 
 
-def _solved(model: Model, start: Floats, level: Floats, bounds: Floats) -> Floats:
-    """The unknowns of the least sum of squares at given levels (n,) of noise."""
+def _solve(model: FitModel, start: Floats, level: Floats, bounds: Floats) -> Floats:
+    """Solves for the least sum of squares at given levels (n,) of noise."""
     first = model.residual(start)
     wall = 10 * float(np.linalg.norm(first / level)) + 1.0
 
@@ -178,8 +178,8 @@ def _solved(model: Model, start: Floats, level: Floats, bounds: Floats) -> Float
     return np.asarray(found.x)
 
 
-def _level(model: Model, residual: Floats, jacobian: Floats) -> Floats:
-    """(n_sets,) root mean squares of the whitened residuals, over what is left of their freedom."""
+def _level(model: FitModel, residual: Floats, jacobian: Floats) -> Floats:
+    """Computes root mean squares (n_sets,) of whitened residuals, over the freedom left."""
     basis = np.linalg.svd(jacobian, full_matrices=False)[0] if jacobian.any() else jacobian
     taken = (basis**2).sum(axis=1)
     level = np.ones(len(model.experiments))

@@ -1,4 +1,4 @@
-"""Time or load that measurement and simulation have in common, found by the drive alone.
+"""Aligns measurement and simulation in time or load by the drive alone.
 
 A motion in time is aligned by the cross-correlation of the measured and the nominal course of the
 driven units, to a fraction of a frame. A quasi-static one has no time: equal displacement of the
@@ -33,7 +33,7 @@ _STILL = 0.1  # of the mean speed: neither way
 
 
 class Lag(NamedTuple):
-    """When the nominal course starts on the clock of the measured one.
+    """Tells the start of the nominal course on the clock of the measured one.
 
     Attributes:
         value: s.
@@ -54,13 +54,13 @@ class Lag(NamedTuple):
 
 @dataclass(frozen=True)
 class SampledMotion:
-    """A motion at rest before its first time: times (n,) in s, values (n, channels) in mm."""
+    """Interpolates a motion that rests before its first time: (n,) in s, (n, channels) in mm."""
 
     time: Floats
     value: Floats
 
     def at(self, time: Floats) -> Floats:
-        """Values (times, channels), a cubic spline through the samples, NaN after the last."""
+        """Evaluates (times, channels) a cubic spline through the samples, NaN after the last."""
         inside = np.clip(time, self.time[0], self.time[-1])
         return np.where((time <= self.time[-1])[:, None], self._spline(inside), np.nan)
 
@@ -70,7 +70,7 @@ class SampledMotion:
 
 
 def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
-    """The lag at which the courses agree best, up to a gain and an offset.
+    """Finds the lag at which the courses agree best, up to a gain and an offset.
 
     Raises:
         UserError: too few frames, or the courses agree at no lag.
@@ -78,7 +78,7 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     seen = np.isfinite(measured.value).all(axis=1)
     held = SampledMotion(measured.time[seen], measured.value[seen])
     if len(held.time) < LEAST_FRAMES:
-        raise too_few(len(held.time))
+        raise too_few_frames(len(held.time))
     tried = _lags(held, nominal)
     found = np.array([_correlation(held, nominal, lag) for lag in tried])
     place, ambiguous = _best(tried, found)
@@ -97,8 +97,8 @@ def find_lag(measured: SampledMotion, nominal: SampledMotion) -> Lag:
     return Lag(lag, sigma, correlation, gain, gain_sigma, ambiguous)
 
 
-def too_few(frames: int) -> UserError:
-    """The error of a track that is too short."""
+def too_few_frames(frames: int) -> UserError:
+    """Explains that a track is too short."""
     return UserError(
         "too few frames show the driven units",
         value=frames,
@@ -107,7 +107,7 @@ def too_few(frames: int) -> UserError:
 
 
 def _lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
-    """Lags (s) at which the courses overlap enough."""
+    """Lists lags (s) at which the courses overlap enough."""
     interval = float(np.median(np.diff(measured.time)))
     span, length = np.ptp(measured.time), np.ptp(nominal.time)
     least = _LEAST_OVERLAP * min(span, length)
@@ -117,7 +117,7 @@ def _lags(measured: SampledMotion, nominal: SampledMotion) -> Floats:
 
 
 def _best(tried: Floats, found: Floats) -> tuple[int, bool]:
-    """The peak of the correlation nearest to no lag among those as good as the best, if many."""
+    """Finds the peak of the correlation nearest to no lag among those as good as the best."""
     inner = np.concatenate([[-np.inf], found, [-np.inf]])
     peak = np.flatnonzero((found >= inner[:-2]) & (found >= inner[2:]))
     good = peak[found[peak] > found.max() - _RIVAL]
@@ -127,7 +127,7 @@ def _best(tried: Floats, found: Floats) -> tuple[int, bool]:
 
 
 def _pair(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[Floats, Floats]:
-    """Both courses at the frames where both are known, less their means."""
+    """Samples both courses at the frames where both are known, less their means."""
     there = nominal.at(measured.time - lag)
     both = np.isfinite(there).all(axis=1)
     first, last = measured.value[both], there[both]
@@ -141,7 +141,7 @@ def _correlation(measured: SampledMotion, nominal: SampledMotion, lag: float) ->
 
 
 def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> float:
-    """The lag at the peak of the correlation, by golden section within a frame either way."""
+    """Refines the peak of the correlation, by golden section within a frame either way."""
     interval = float(np.median(np.diff(measured.time)))
     low, high = lag - interval / _PER_FRAME, lag + interval / _PER_FRAME
     share = (np.sqrt(5) - 1) / 2
@@ -155,7 +155,7 @@ def _refined(measured: SampledMotion, nominal: SampledMotion, lag: float) -> flo
 
 
 def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[float, float, float]:
-    """Uncertainty of the lag, gain, and its uncertainty, by least squares about the lag."""
+    """Fits the lag's uncertainty, the gain and its uncertainty, by least squares about the lag."""
     step = 1e-3 * float(np.median(np.diff(measured.time)))
     first, last = _pair(measured, nominal, lag)
     sooner, later = (nominal.at(measured.time - lag + shift) for shift in (step, -step))
@@ -167,15 +167,15 @@ def _fit(measured: SampledMotion, nominal: SampledMotion, lag: float) -> tuple[f
 
 
 def _inflation(rest: Floats) -> float:
-    """How much less correlated residuals (frames, channels) tell than independent ones."""
+    """Computes by how much correlated residuals (frames, channels) tell less than independent."""
     size = float(np.sum(rest**2))
     alike = float(np.sum(rest[1:] * rest[:-1])) / size if size > 0 else 0.0
     alike = float(np.clip(alike, 0.0, 0.99))
     return (1 + alike) / (1 - alike)
 
 
-def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
-    """The nominal time (frames,) at which the drive is where it was measured; NaN beyond its ends.
+def find_load_time(measured: Floats, nominal: SampledMotion) -> Floats:
+    """Finds the nominal time (frames,) of the measured drive's place; NaN beyond its ends.
 
     Args:
         measured: (frames,) displacement of the driven units along the drive, mm.
@@ -189,7 +189,7 @@ def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
         remedy = "compare under a ramp: give the problem a drive of that kind"
         raise UserError("a quasi-static drive to and fro has no load axis", remedy=remedy)
     if (seen := int(np.isfinite(measured).sum())) < LEAST_FRAMES:
-        raise too_few(seen)
+        raise too_few_frames(seen)
     span = float(np.ptp(course))
     if (reached := float(np.nanmax(measured) - course[0])) < _LEAST_RANGE * span:
         raise UserError(
@@ -204,8 +204,8 @@ def load_time(measured: Floats, nominal: SampledMotion) -> Floats:
     return np.where(inside, np.interp(measured, finer, dense), np.nan)
 
 
-def branches(measured: Floats) -> NDArray[np.int8]:
-    """Whether the load grows or falls (frames,); while it rests, as before."""
+def find_branches(measured: Floats) -> NDArray[np.int8]:
+    """Tells growing from falling load (frames,); while it rests, as before."""
     course = _filled(measured)
     width = max(len(course) // 40, 1)
     kernel = np.ones(2 * width + 1) / (2 * width + 1)
@@ -221,8 +221,8 @@ def _filled(values: Floats) -> Floats:
     return np.interp(np.arange(len(values)), seen, values[seen])
 
 
-def turn(measured: Floats, nominal: Floats) -> float:
-    """Direction of a measured drive (frames, 2) less that of the nominal one, rad."""
+def drive_turn(measured: Floats, nominal: Floats) -> float:
+    """Computes the direction of a measured drive (frames, 2) less that of the nominal one, rad."""
     both = np.isfinite(measured + nominal).all(axis=1)
     first, last = measured[both], nominal[both]
     across = np.sum(last[:, 0] * first[:, 1] - last[:, 1] * first[:, 0])

@@ -1,4 +1,4 @@
-"""What a cloak takes from a measured quantity, with the interval that follows from both of them."""
+"""Computes the reduction of a measured quantity by a cloak, with its interval."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import numpy as np
 from sim.core import Floats
 
 
-def reduction(before: Floats, after: Floats) -> Floats:
-    """Value and ends of the interval (3,) of 1 - after / before.
+def compute_reduction(before: Floats, after: Floats) -> Floats:
+    """Computes value and ends of the interval (3,) of 1 - after / before.
 
     The distances of the ends from the values add up as those of independent errors do, to first
     order.

@@ -1,4 +1,4 @@
-"""What is followed along a recording: turning, shift, departure from the intact, contraction."""
+"""Computes quantities along a recording: rotation, displacement, mimicking, contraction."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.comparison.nominal_side import nominal
+from pipeline.comparison.nominal_side import interpolate_response
 from pipeline.problem import Problem
 from sim.core import Floats, Ints, Mask
 
@@ -18,7 +18,7 @@ FOLLOWED = ("mean_rotation", "mean_displacement", "contraction", "mimicking_erro
 
 
 class Quantity(NamedTuple):
-    """A number that units have together.
+    """Holds a number that units have together.
 
     Attributes:
         of: makes it (..., frames) of motions (..., frames, n, 3) in mm and rad.
@@ -33,14 +33,14 @@ class Quantity(NamedTuple):
     sampled: bool = True
 
     def along(self, motion: Floats, units: Ints) -> Floats:
-        """The number (..., frames) of motions (..., frames, n, 3) of units of these places (n,)."""
+        """Computes the number (..., frames) of motions (..., frames, n, 3) of units (n,)."""
         return self.of(motion if self.less is None else motion - self.less[:, units])
 
 
-def quantities(
+def list_quantities(
     asked: Problem, response: xr.Dataset, time: Floats, inside: Mask
 ) -> dict[str, Quantity]:
-    """What is followed, by its name; without an intact structure there is nothing to mimic.
+    """Lists the quantities by name; without an intact structure there is nothing to mimic.
 
     Args:
         asked: the problem.
@@ -50,46 +50,48 @@ def quantities(
     """
     units = np.flatnonzero(inside)
     low, high = (middle_units(asked, side) for side in ("bottom", "top"))
-    nearer, rows = partial(nearing, lower=len(low)), np.array([*low, *high])
+    nearer, rows = partial(mean_approach, lower=len(low)), np.array([*low, *high])
     found = {
-        "mean_rotation": Quantity(rotation, units),
-        "mean_displacement": Quantity(distance, units),
+        "mean_rotation": Quantity(mean_rotation, units),
+        "mean_displacement": Quantity(mean_displacement, units),
         "contraction": Quantity(nearer, rows, sampled=False),
     }
     if "intact" in response["structure"].values:
         intact = response.sel(structure="intact")
-        of = partial(size, spacing=asked.lattice.spacing)
+        of = partial(normalised_rms, spacing=asked.lattice.spacing)
         motion = intact["displacement"].transpose("time", "unit", "dof").values
         course = of(motion[:, units])
         of = partial(of, unit=course[-1] if asked.static else course.max())
-        found["mimicking_error"] = Quantity(of, units, nominal(intact, time).displacement)
+        found["mimicking_error"] = Quantity(
+            of, units, interpolate_response(intact, time).displacement
+        )
     return found
 
 
-def rotation(motion: Floats) -> Floats:
-    """Mean |theta|, rad."""
-    return mean(np.abs(motion[..., 2]))
+def mean_rotation(motion: Floats) -> Floats:
+    """Computes the mean |theta|, rad."""
+    return known_mean(np.abs(motion[..., 2]))
 
 
-def distance(motion: Floats) -> Floats:
-    """Mean |u|, mm."""
-    return mean(np.linalg.norm(motion[..., :2], axis=-1))
+def mean_displacement(motion: Floats) -> Floats:
+    """Computes the mean |u|, mm."""
+    return known_mean(np.linalg.norm(motion[..., :2], axis=-1))
 
 
-def nearing(motion: Floats, lower: int) -> Floats:
-    """How much nearer the first ``lower`` units come to the others, which are above them, mm."""
+def mean_approach(motion: Floats, lower: int) -> Floats:
+    """Computes the approach of the first ``lower`` units to the others, which are above, mm."""
     rise = motion[..., 1]
-    return mean(rise[..., :lower]) - mean(rise[..., lower:])
+    return known_mean(rise[..., :lower]) - known_mean(rise[..., lower:])
 
 
-def size(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
-    """Root mean square of |U|, U = (ux / spacing, uy / spacing, theta), in multiples of a unit."""
+def normalised_rms(motion: Floats, spacing: float, unit: float = 1.0) -> Floats:
+    """Computes the root mean square of |U|, U = (ux/spacing, uy/spacing, theta), in units."""
     square = np.sum((motion / [spacing, spacing, 1.0]) ** 2, axis=-1)
-    return np.asarray(np.sqrt(mean(square)) / unit)
+    return np.asarray(np.sqrt(known_mean(square)) / unit)
 
 
 def middle_units(problem: Problem, side: str) -> list[int]:
-    """Units of a side in the middle half of the lattice (7 columns of 15)."""
+    """Selects units of a side in the middle half of the lattice (7 columns of 15)."""
     lattice = problem.lattice
     along = {unit: x for unit, x, _ in lattice.sites()}
     low, high = min(along.values()), max(along.values())
@@ -97,9 +99,9 @@ def middle_units(problem: Problem, side: str) -> list[int]:
     return [unit for unit in lattice.side(side) if abs(along[unit] - (low + high) / 2) < reach]
 
 
-def mean(values: Floats) -> Floats:
-    """Mean over the last axis of those that are known; NaN of none."""
+def known_mean(values: Floats, axis: int = -1) -> Floats:
+    """Computes the mean over an axis of those that are known; NaN of none."""
     known = np.isfinite(values)
-    count = known.sum(axis=-1)
-    total = np.where(known, values, 0.0).sum(axis=-1)
+    count = known.sum(axis=axis)
+    total = np.where(known, values, 0.0).sum(axis=axis)
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)

@@ -1,4 +1,4 @@
-"""A comparison as a dataset: both sides at the frames, metrics, and how they were brought there."""
+"""Assembles a comparison: both sides at the frames, metrics, and their alignment."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 
 from pipeline.comparison import curves
-from pipeline.comparison.compared_quantities import FOLLOWED, Quantity
+from pipeline.comparison.compared_quantities import FOLLOWED, Quantity, known_mean
 from pipeline.comparison.curves import Sides
 from pipeline.comparison.measured_side import Measurement
-from pipeline.comparison.metrics import METRICS, Pair, estimates
-from pipeline.comparison.nominal_side import ComparisonAxis, Nominal
+from pipeline.comparison.metrics import COPIES, LEVEL, METRICS, Pair, estimate_metrics
+from pipeline.comparison.nominal_side import ComparisonAxis, NominalSide
 from pipeline.comparison.simulated_side import SimulatedSide
 from pipeline.datasets.tables import NETWORK
-from sim.core import Floats
+from pipeline.problem import Problem
 
 SEED = 0
 
@@ -23,9 +23,23 @@ _MOTION = ("time", "unit", "dof")
 _OF_SIDE = ("side", "dof", "estimate")
 Variables = dict[str, tuple[Any, ...]]
 
+_BY_TIME = (
+    "cross-correlation of the measured and the nominal motion of the driven units, refined below a"
+    " frame by golden section"
+)
+_BY_LOAD = (
+    "equal displacement of the driven units along the drive is equal load, both on the way there"
+    " and back"
+)
+_AMBIGUOUS = "; other lags are as good: the nearest to the video's start was taken"
+_DRIVING = (
+    "each degree of freedom of the driven and clamped units by a smoothing spline that departs from"
+    " the track by its standard uncertainty"
+)
+
 
 class Compared(NamedTuple):
-    """All that a comparison is made of.
+    """Holds all parts of a comparison.
 
     Attributes:
         measurement: the measured side.
@@ -42,7 +56,7 @@ class Compared(NamedTuple):
     measurement: Measurement
     axis: ComparisonAxis
     simulation: SimulatedSide
-    nominal: Nominal
+    nominal: NominalSide
     quantities: dict[str, Quantity]
     design: xr.Dataset
     frequency: float
@@ -57,8 +71,8 @@ class Compared(NamedTuple):
         return Sides(measured, sigma, simulated, self.nominal.displacement, copies, self.level)
 
 
-def dataset(made: Compared) -> xr.Dataset:
-    """The dataset ``comparison``, without its attributes."""
+def assemble_comparison(made: Compared) -> xr.Dataset:
+    """Assembles the dataset ``comparison``, without its attributes."""
     random = np.random.default_rng(SEED)
     design, axis, measurement = made.design, made.axis, made.measurement
     lag = 0.0 if axis.lag is None else axis.lag.value
@@ -112,10 +126,10 @@ def _motions(made: Compared) -> Variables:
         "quality": (("time", "unit"), quality),
         "use": (("unit",), measurement.use),
         "nominal_drive": (("time", "xy"), made.nominal.drive),
-        "band_coverage": (("dof",), curves.coverage(compared, band)),
+        "band_coverage": (("dof",), curves.band_coverage(compared, band)),
         "band_coverage_usual": (
             ("dof",),
-            curves.usual_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
+            curves.expected_coverage(sides.copies[:, :, inside], band[:, :, inside], sides.level),
         ),
         "band_samples": ((), len(sides.copies)),
     }
@@ -128,7 +142,7 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
         Pair(sides.measured[:, inside], motion[:, inside], sides.sigma[:, inside])
         for motion in sides.motions[1:]
     ]
-    found = np.stack([estimates(pair, time, random) for pair in pairs])
+    found = np.stack([estimate_metrics(pair, time, random) for pair in pairs])
     table: Variables = {
         name: (_OF_SIDE, np.moveaxis(found[:, :, place], 1, -1))
         for place, name in enumerate(METRICS)
@@ -139,17 +153,17 @@ def _metrics(made: Compared, random: np.random.Generator) -> Variables:
     return {
         **table,
         **_forces(made, random),
-        "rmse_map": (("side", "unit", "dof"), root_mean_square(apart, axis=1)),
+        "rmse_map": (("side", "unit", "dof"), np.sqrt(known_mean(apart**2, axis=1))),
     }
 
 
 def _forces(made: Compared, random: np.random.Generator) -> Variables:
-    """How far the forces are from those of the load cell; its noise is in their scatter."""
+    """Computes errors of the forces against the load cell; its noise is in their scatter."""
     measured = made.measurement.force[:, None, None]
     still = np.zeros_like(measured)
     sides = (made.simulation.force, made.nominal.force)
     pairs = [Pair(measured, force[:, None, None], still) for force in sides]
-    found = np.stack([estimates(pair, None, random)[..., 0] for pair in pairs])
+    found = np.stack([estimate_metrics(pair, None, random)[..., 0] for pair in pairs])
     names = {"force_rmse": "rmse", "force_nrmse": "nrmse"}
     return {
         name: (("side", "estimate"), found[:, :, METRICS.index(metric)])
@@ -161,14 +175,17 @@ def _curves(made: Compared, random: np.random.Generator) -> Variables:
     sides, along = made.sides, ("source", "time", "estimate")
     nothing = np.full((3, len(sides.measured), 3), np.nan)
     followed = {
-        name: curves.curve(sides, made.quantities[name], random)
+        name: curves.quantity_curve(sides, made.quantities[name], random)
         if name in made.quantities
         else nothing
         for name in FOLLOWED
     }
     return {
         **{name: (along, values) for name, values in followed.items()},
-        "peak_to_peak": (("source", "unit", "dof", "estimate"), curves.peaks(sides, random)),
+        "peak_to_peak": (
+            ("source", "unit", "dof", "estimate"),
+            curves.estimate_peaks(sides, random),
+        ),
     }
 
 
@@ -197,10 +214,40 @@ def _alignment(made: Compared) -> Variables:
     }
 
 
-def root_mean_square(values: Floats, axis: int) -> Floats:
-    """Root of the mean square over an axis of those that are known; NaN of none."""
-    known = np.isfinite(values)
-    count = known.sum(axis=axis)
-    total = np.where(known, values, 0.0) ** 2
-    mean = total.sum(axis=axis) / np.maximum(count, 1)
-    return np.where(count > 0, np.sqrt(mean), np.nan)
+def describe_comparison(asked: Problem, made: Compared) -> dict[str, str]:
+    """Describes in words how the sides were brought together, and how the band was drawn.
+
+    Args:
+        asked: the problem, with the tolerances of the band.
+        made: the comparison.
+    """
+    lag = made.axis.lag
+    ambiguous = lag is not None and lag.ambiguous
+    return {
+        "axis": "load" if lag is None else "time",
+        "alignment": (_BY_LOAD if lag is None else _BY_TIME) + (_AMBIGUOUS if ambiguous else ""),
+        "resampling": _resampling(made),
+        "driving": _DRIVING,
+        "band": _band(asked, made),
+        "bootstrap": f"{COPIES} copies over units and blocks of frames, with the measurement's"
+        f" noise; {100 * LEVEL:g} % intervals; seed {SEED}",
+    }
+
+
+def _resampling(made: Compared) -> str:
+    kept, whole = len(made.measurement.frames), made.measurement.track.sizes["time"]
+    return (
+        f"none of the measurement ({kept} of {whole} frames); the redriven simulation is asked for"
+        " at the frames; the response of the study is a cubic spline through its samples"
+    )
+
+
+def _band(asked: Problem, made: Compared) -> str:
+    shares = asked.tolerances.model_dump(exclude={"assembly"})
+    sizes = ", ".join(f"{name} {size:g}" for name, size in shares.items())
+    off = asked.tolerances.assembly
+    places = f"assembly {off.shift:g} mm and {np.rad2deg(off.turn):.2g} deg"
+    samples = len(made.simulation.copies)
+    return (
+        f"{100 * made.level:g} % of {samples} imperfect copies ({sizes}, {places}), at each instant"
+    )

@@ -1,4 +1,4 @@
-"""Curves and maps of both sides: what is followed along the frames, peak to peak of every unit."""
+"""Computes curves along the frames and maps, peak to peak of every unit, of both sides."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from scipy.special import ndtri
 
 from pipeline.comparison import tolerance_band as bands
 from pipeline.comparison.compared_quantities import Quantity
-from pipeline.comparison.metrics import COPIES, LEVEL, limits
-from pipeline.comparison.redrive import filtered
+from pipeline.comparison.metrics import COPIES, LEVEL, interval_ends
+from pipeline.comparison.redrive import fit_spline
 from sim.core import Floats
 
 _SPREAD = float(ndtri((1 + LEVEL) / 2))
@@ -20,7 +20,7 @@ _SEEN = 0.9  # of the frames, or a unit's peak may have been missed
 
 
 class Sides(NamedTuple):
-    """The sides of a comparison at its frames.
+    """Holds the sides of a comparison at its frames.
 
     Attributes:
         measured, sigma: (frames, units, 3) with their standard uncertainty.
@@ -42,14 +42,14 @@ class Sides(NamedTuple):
         return self.measured, self.simulated, self.nominal
 
     def within(self, copies: Floats) -> Floats:
-        """Lower limit, median, upper limit (3, ...) of what was made of copies; NaN of none."""
+        """Computes lower limit, median and upper limit (3, ...) over copies; NaN of none."""
         if len(copies) == 0:
             return np.full((3, *copies.shape[1:]), np.nan)
-        return bands.limits(copies, self.level)
+        return bands.band_limits(copies, self.level)
 
 
-def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """A quantity along the frames (3 sides, frames, 3 estimates).
+def quantity_curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
+    """Computes a quantity along the frames (3 sides, frames, 3 estimates).
 
     Args:
         sides: of the comparison.
@@ -66,7 +66,7 @@ def curve(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floa
 
 
 def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generator) -> Floats:
-    """Interval (2, frames) by a bootstrap over the units that stand for others, with the noise."""
+    """Computes an interval (2, frames) by a bootstrap over units, with the noise."""
     units, count = quantity.units, len(quantity.units)
     copies = np.empty((COPIES, len(sides.measured)))
     for copy in copies:
@@ -74,11 +74,11 @@ def _measured_limits(sides: Sides, quantity: Quantity, random: np.random.Generat
         drawn = units[random.integers(count, size=count)] if sampled else units
         noise = random.standard_normal((len(copy), count, 3)) * sides.sigma[:, drawn]
         copy[:] = quantity.along(sides.measured[:, drawn] + noise, drawn)
-    return limits(copies)
+    return interval_ends(copies)
 
 
 def peak_to_peak(motion: Floats) -> Floats:
-    """Largest less smallest (..., units, 3) of motions (..., frames, units, 3); NaN of none.
+    """Subtracts extremes (..., units, 3) of motions (..., frames, units, 3); NaN of none.
 
     The extremes are those of parabolas through the extreme frames and their neighbours: a peak
     between two frames is not missed.
@@ -89,7 +89,7 @@ def peak_to_peak(motion: Floats) -> Floats:
 
 
 def _highest(motion: Floats) -> Floats:
-    """The highest value (..., units, 3) along the frames."""
+    """Computes the highest value (..., units, 3) along the frames."""
     values = np.where(np.isfinite(motion), motion, -np.inf)
     at = values.argmax(axis=-3, keepdims=True)
     near = [np.clip(at + step, 0, motion.shape[-3] - 1) for step in (-1, 0, 1)]
@@ -100,8 +100,8 @@ def _highest(motion: Floats) -> Floats:
     return np.asarray(np.where(inner, top + rise, top).squeeze(axis=-3))
 
 
-def peaks(sides: Sides, random: np.random.Generator) -> Floats:
-    """Peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
+def estimate_peaks(sides: Sides, random: np.random.Generator) -> Floats:
+    """Computes peak to peak (3 sides, units, 3 dofs, 3 estimates) of all units.
 
     Noise makes extremes larger, at whichever frames they are. The measured interval is that of the
     noise at the two extreme frames, about the value less what noise adds to it.
@@ -118,7 +118,7 @@ def peaks(sides: Sides, random: np.random.Generator) -> Floats:
 
 
 def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
-    """By how much (units, dofs) noise makes peak to peak larger: that of the smoothed motion."""
+    """Estimates how much (units, dofs) noise adds to peak to peak: that of the smoothed motion."""
     smooth = _smooth(sides)
     still, added = peak_to_peak(smooth), np.zeros(smooth.shape[1:])
     for _ in range(_TRIALS):
@@ -128,33 +128,33 @@ def _added_by_noise(sides: Sides, random: np.random.Generator) -> Floats:
 
 
 def _smooth(sides: Sides) -> Floats:
-    """The measured motion without its noise; NaN for units that are seldom seen."""
+    """Smooths the measured motion; NaN for units that are seldom seen."""
     out = np.full_like(sides.measured, np.nan)
     frames = np.arange(len(out), dtype=np.float64)
     there = np.isfinite(sides.measured + sides.sigma)
     for unit, dof in np.argwhere(there.mean(axis=0) >= _SEEN):
         known = there[:, unit, dof]
         course, sigma = (each[known, unit, dof] for each in (sides.measured, sides.sigma))
-        out[known, unit, dof] = filtered(frames[known], course, sigma)(frames[known])
+        out[known, unit, dof] = fit_spline(frames[known], course, sigma)(frames[known])
     return out
 
 
-def coverage(sides: Sides, band: Floats) -> Floats:
-    """Share (dofs,) of the measurements that lie in the band, widened by their noise.
+def band_coverage(sides: Sides, band: Floats) -> Floats:
+    """Computes the share (dofs,) of measurements in the band, widened by their noise.
 
     Args:
         sides: of the comparison.
         band: (3, frames, units, dofs) of displacements.
     """
-    low, _, high = bands.widened(band, sides.sigma, sides.level)
+    low, _, high = bands.widen_band(band, sides.sigma, sides.level)
     known = np.isfinite(sides.measured) & np.isfinite(low)
     inside = (sides.measured >= low) & (sides.measured <= high) & known
     count = known.sum(axis=(0, 1))
     return np.where(count > 0, inside.sum(axis=(0, 1)) / np.maximum(count, 1), np.nan)
 
 
-def usual_coverage(copies: Floats, band: Floats, level: float) -> Floats:
-    """Share (dofs,) of its motion in the band that a copy has, or more, with a probability.
+def expected_coverage(copies: Floats, band: Floats, level: float) -> Floats:
+    """Computes the share (dofs,) of its motion in the band that a copy has with a probability.
 
     One specimen is one draw: where it is far off in a constant, all its units leave the band
     together.

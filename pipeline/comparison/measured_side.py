@@ -1,4 +1,4 @@
-"""The measured side: which frames and units of a track are compared, in the design's frame."""
+"""Selects frames and units of a track to compare, and turns them into the design's frame."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from pipeline.comparison.alignment import LEAST_FRAMES, too_few
-from pipeline.comparison.registration import Registration, measured_places, register
+from pipeline.comparison.alignment import LEAST_FRAMES, too_few_frames
+from pipeline.comparison.registration import Registration, measure_places, register
 from pipeline.datasets.tables import TABLES
 from pipeline.posing import CLAMPED, DRIVEN
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import of_design
-from pipeline.tracking.output import is_driven, mean_seen
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.tracking.output import driven_units, mean_over_seen
 from sim.core import Floats, Ints, Mask
 
 MOST_FRAMES = 600
@@ -25,7 +25,7 @@ _SAME = 0.5  # mm between a vertex of the track and of the design
 
 
 class Measurement(NamedTuple):
-    """What was measured, in the design's frame.
+    """Holds the measured side, in the design's frame.
 
     Attributes:
         frames: (n_frames,) numbers of those that are compared, in the track.
@@ -52,12 +52,12 @@ class Measurement(NamedTuple):
 
     @property
     def compared(self) -> Mask:
-        """Which units (n_units,) are compared."""
+        """Tells the units (n_units,) that are compared."""
         return np.asarray(self.use == COMPARED)
 
 
-def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
-    """The measured side of a comparison.
+def prepare_measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
+    """Prepares the measured side of a comparison.
 
     Args:
         track: of the recording.
@@ -66,12 +66,12 @@ def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
     Raises:
         UserError: the track is not of this design, shows no driven units, or is too short.
     """
-    check(track, design)
+    check_track(track, design)
     centre = _centres(design)
-    found = register(centre, measured_places(track, centre))
+    found = register(centre, measure_places(track, centre))
     motion = found.upright(track["displacement"].values.astype(float))
     turned = track.assign(displacement=(track["displacement"].dims, motion))
-    frames = chosen_frames(track)
+    frames = select_frames(track)
     shown = turned.isel(time=frames)
     displacement = shown["displacement"].values
     return Measurement(
@@ -83,12 +83,12 @@ def measurement(track: xr.Dataset, design: xr.Dataset) -> Measurement:
         centre=centre,
         registration=found,
         track=turned,
-        drive=mean_seen(displacement[:, is_driven(design), :2]),
+        drive=mean_over_seen(displacement[:, driven_units(design), :2]),
         force=shown["load_force"].values,
     )
 
 
-def check(track: xr.Dataset, design: xr.Dataset) -> None:
+def check_track(track: xr.Dataset, design: xr.Dataset) -> None:
     """Refuses a track that is not of a design, in which no driven unit is seen, or that is short.
 
     Raises:
@@ -101,7 +101,7 @@ def check(track: xr.Dataset, design: xr.Dataset) -> None:
         raise _another("other units are absent, or they have other vertices")
     if (apart := float(np.nanmax(np.abs(tracked - built)))) > _SAME:
         raise _another(f"vertices are up to {apart:.2f} mm from where the design has them")
-    seen = np.isfinite(track["displacement"].values[:, is_driven(design), 0]).any(axis=1)
+    seen = np.isfinite(track["displacement"].values[:, driven_units(design), 0]).any(axis=1)
     if not seen.any():
         raise UserError(
             "no driven unit is seen in any frame: there is nothing to align with",
@@ -109,7 +109,7 @@ def check(track: xr.Dataset, design: xr.Dataset) -> None:
             remedy="film the driven units too, or give a window that shows them",
         )
     if seen.sum() < LEAST_FRAMES:
-        raise too_few(int(seen.sum()))
+        raise too_few_frames(int(seen.sum()))
 
 
 def _another(why: str) -> UserError:
@@ -121,15 +121,15 @@ def _another(why: str) -> UserError:
     )
 
 
-def chosen_frames(track: xr.Dataset) -> Ints:
-    """Frames to compare: no duplicates, and every so many of a long track."""
+def select_frames(track: xr.Dataset) -> Ints:
+    """Selects frames to compare: no duplicates, and every so many of a long track."""
     duplicate = TABLES["track"]["timing"].flags["duplicate"]
     frames = np.flatnonzero(track["timing"].values != duplicate)
     return frames[:: -(-len(frames) // MOST_FRAMES)]
 
 
 def _centres(design: xr.Dataset) -> Floats:
-    specimen = of_design(design)
+    specimen = outlines_of_design(design)
     out = np.full((design.sizes["unit"], 2), np.nan)
     out[np.isin(design["unit"].values, specimen.ids)] = specimen.centre
     return out

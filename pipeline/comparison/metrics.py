@@ -1,4 +1,4 @@
-"""How far a simulation is from a measurement, in numbers with intervals.
+"""Measures the distance of a simulation from a measurement, with intervals.
 
 The intervals are those of a bootstrap over units and over blocks of frames (Kuensch, Ann. Stat. 17
 (1989) 1217). To every copy noise of the measurement's own uncertainty is added, and its mean square
@@ -23,7 +23,7 @@ _STEPS = 6
 
 
 class Pair(NamedTuple):
-    """Both sides of a comparison, NaN in either where there is nothing to compare.
+    """Holds both sides of a comparison, NaN in either where there is nothing to compare.
 
     Attributes:
         measured, simulated: (frames, units, dofs).
@@ -39,19 +39,19 @@ class Pair(NamedTuple):
     added: bool = False
 
     def taken(self, frames: Ints, units: Ints) -> Pair:
-        """The frames and units of these numbers, which may come more than once."""
+        """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
         return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
 
     def noisier(self, random: np.random.Generator) -> Pair:
-        """The same with noise added to the measured side."""
+        """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)
 
 
 class _Moments(NamedTuple):
-    """Means (dofs,) over frames and units of what the metrics are made of."""
+    """Holds means (dofs,) over frames and units of what the metrics are made of."""
 
     residual: Floats
     measured: Floats
@@ -60,8 +60,8 @@ class _Moments(NamedTuple):
     correlation: Floats
 
 
-def metrics(pair: Pair) -> Floats:
-    """The metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
+def compute_metrics(pair: Pair) -> Floats:
+    """Computes metrics (len(METRICS), dofs) of both sides; NaN where nothing can be compared."""
     mean = _moments(pair)
     with np.errstate(invalid="ignore", divide="ignore"):
         rows = [
@@ -95,7 +95,7 @@ def _moments(pair: Pair) -> _Moments:
 
 
 def _shift(pair: Pair) -> Floats:
-    """How far (dofs,) the measured side is behind, s, to first order in it."""
+    """Computes the delay (dofs,) of the measured side, s, to first order in it."""
     if pair.slope is None:
         return np.full(pair.measured.shape[-1], np.nan)
     ahead = (pair.measured - pair.simulated) * pair.slope
@@ -105,8 +105,8 @@ def _shift(pair: Pair) -> Floats:
         return np.asarray(-np.where(known, ahead, 0.0).sum(axis=(0, 1)) / steep.sum(axis=(0, 1)))
 
 
-def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
-    """The pair with the simulated side as late as the measured one, and by how much (dofs,), s.
+def align_in_time(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
+    """Delays the simulated side as much as the measured one, and tells by how much (dofs,), s.
 
     The shift is NaN where the sides are so unlike that none is found.
 
@@ -116,15 +116,15 @@ def shifted(pair: Pair, time: Floats) -> tuple[Pair, Floats]:
     """
     most = float(np.ptp(time)) / _LONGEST
     total = np.zeros(pair.measured.shape[-1])
-    moved = _late(pair, time, total)
+    moved = _delay(pair, time, total)
     for _ in range(_STEPS):
         total = np.clip(total + np.nan_to_num(_shift(moved)), -most, most)
-        moved = _late(pair, time, total)
+        moved = _delay(pair, time, total)
     return moved, np.where(np.abs(total) < most, total, np.nan)
 
 
-def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
-    """The pair with the simulated side later by ``lag`` (dofs,) s; NaN where that is not known."""
+def _delay(pair: Pair, time: Floats, lag: Floats) -> Pair:
+    """Delays the simulated side by ``lag`` (dofs,) s; NaN where that is not known."""
     made = np.full_like(pair.simulated, np.nan)
     for dof, late in enumerate(lag):
         for unit in range(made.shape[1]):
@@ -137,18 +137,18 @@ def _late(pair: Pair, time: Floats, lag: Floats) -> Pair:
     return pair._replace(simulated=made, slope=np.gradient(made, time, axis=0))
 
 
-def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
-    """Value and ends of the interval (3, len(METRICS), dofs) of every metric.
+def estimate_metrics(pair: Pair, time: Floats | None, random: np.random.Generator) -> Floats:
+    """Computes value and ends of the interval (3, len(METRICS), dofs) of every metric.
 
     Args:
         pair: both sides.
         time: (frames,) s; None for a quasi-static pair, which has no shift in time.
         random: draws the copies.
     """
-    found = bootstrap(pair, metrics, random)
+    found = bootstrap(pair, compute_metrics, random)
     if time is None:
         return found
-    late, total = shifted(pair, time)
+    late, total = align_in_time(pair, time)
     shift = bootstrap(late, lambda copy: _shift(copy)[None], random)[:, 0]
     found[:, METRICS.index("time_shift")] = total + shift - shift[0]
     return found
@@ -157,7 +157,7 @@ def estimates(pair: Pair, time: Floats | None, random: np.random.Generator) -> F
 def bootstrap(
     pair: Pair, statistic: Callable[[Pair], Floats], random: np.random.Generator
 ) -> Floats:
-    """A statistic's value and the ends of its interval, stacked (3, ...)."""
+    """Computes a statistic's value and the ends of its interval, stacked (3, ...)."""
     frames, units = pair.measured.shape[:2]
     length = block_length(pair.measured - pair.simulated)
 
@@ -166,11 +166,11 @@ def bootstrap(
         return pair.taken(_blocks(frames, length, random), drawn).noisier(random)
 
     copies = [statistic(copy()) for _ in range(COPIES)]
-    return np.concatenate([statistic(pair)[None], limits(np.array(copies))])
+    return np.concatenate([statistic(pair)[None], interval_ends(np.array(copies))])
 
 
-def limits(copies: Floats) -> Floats:
-    """The ends (2, ...) of the interval that holds most of the copies (n, ...); NaN for none."""
+def interval_ends(copies: Floats) -> Floats:
+    """Computes the ends (2, ...) of the interval of most copies (n, ...); NaN for none."""
     ends = np.full((2, *copies.shape[1:]), np.nan)
     known = np.isfinite(copies).all(axis=0)
     tail = (1 - LEVEL) / 2
@@ -179,7 +179,7 @@ def limits(copies: Floats) -> Floats:
 
 
 def block_length(residual: Floats) -> int:
-    """Frames in a block: until residuals (frames, ...) forget, at most a quarter of them all."""
+    """Computes a block's frames: until residuals (frames, ...) forget, at most a quarter."""
     flat = np.nan_to_num(residual.reshape(len(residual), -1))
     most = max(len(flat) // _LONGEST, 1)
     size = float(np.sum(flat**2))
@@ -190,7 +190,7 @@ def block_length(residual: Floats) -> int:
 
 
 def _blocks(frames: int, length: int, random: np.random.Generator) -> Ints:
-    """Numbers of as many frames, in blocks that start anywhere and go round the end."""
+    """Draws numbers of as many frames, in blocks that start anywhere and go round the end."""
     count = -(-frames // length)
     starts = random.integers(frames, size=count)
     return ((starts[:, None] + np.arange(length)).ravel()[:frames]) % frames

@@ -1,4 +1,4 @@
-"""The nominal side: the study's own response at the times or loads of the measured frames."""
+"""Interpolates the study's own response at the times or loads of the measured frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.core import Floats
 
 
 class ComparisonAxis(NamedTuple):
-    """What both sides have in common.
+    """Holds the time or load that both sides have in common.
 
     Attributes:
         time: (frames,) of the response, s; NaN where it has none.
@@ -30,8 +30,8 @@ class ComparisonAxis(NamedTuple):
     turn: float
 
 
-class Nominal(NamedTuple):
-    """The response at the frames.
+class NominalSide(NamedTuple):
+    """Holds the response at the frames.
 
     Attributes:
         displacement: (frames, units, 3) mm and rad, NaN where there is none.
@@ -44,14 +44,14 @@ class Nominal(NamedTuple):
     force: Floats
 
 
-def along(response: xr.Dataset) -> Floats:
-    """Unit vector (2,) of the drive of a response of one case."""
+def drive_direction(response: xr.Dataset) -> Floats:
+    """Computes the unit vector (2,) of the drive of a response of one case."""
     angle = np.deg2rad(float(response["direction"]))
     return np.array([np.cos(angle), np.sin(angle)])
 
 
-def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
-    """How the measured frames lie on the axis of a response of one structure and case.
+def find_axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> ComparisonAxis:
+    """Places the measured frames on the axis of a response of one structure and case.
 
     Args:
         time: (frames,) on the track's clock, s.
@@ -65,19 +65,19 @@ def axis(time: Floats, drive: Floats, response: xr.Dataset, *, static: bool) -> 
     nominal = SampledMotion(response["time"].values, response["drive_displacement"].values)
     if not static:
         lag = alignment.find_lag(SampledMotion(time, drive), nominal)
-        turn = alignment.turn(drive, nominal.at(time - lag.value))
+        turn = alignment.drive_turn(drive, nominal.at(time - lag.value))
         still = np.full(len(time), alignment.MOTION, dtype=np.int8)
         shown = np.where(time - lag.value <= nominal.time[-1], time - lag.value, np.nan)
         return ComparisonAxis(shown, still, lag, turn)
-    way = along(response)
+    way = drive_direction(response)
     pushed = SampledMotion(nominal.time, (nominal.value @ way)[:, None])
-    shown = alignment.load_time(drive @ way, pushed)
-    turn = alignment.turn(drive, nominal.at(shown))
-    return ComparisonAxis(shown, alignment.branches(drive @ way), None, turn)
+    shown = alignment.find_load_time(drive @ way, pushed)
+    turn = alignment.drive_turn(drive, nominal.at(shown))
+    return ComparisonAxis(shown, alignment.find_branches(drive @ way), None, turn)
 
 
-def nominal(response: xr.Dataset, time: Floats) -> Nominal:
-    """A response of one structure and case at its own times, NaN where these are.
+def interpolate_response(response: xr.Dataset, time: Floats) -> NominalSide:
+    """Interpolates a response of one structure and case at its own times, NaN where these are.
 
     Before its start it rests; between its samples runs a cubic spline.
     """
@@ -95,5 +95,7 @@ def nominal(response: xr.Dataset, time: Floats) -> Nominal:
     displacement = np.full((len(time), *motion.shape[1:]), np.nan)
     displacement[:, present] = course(motion[:, present])
     drive = course(response["drive_displacement"].transpose("time", "xy").values)
-    force = course(response["drive_force"].transpose("time", "xy").values @ along(response))
-    return Nominal(displacement, drive, force)
+    force = course(
+        response["drive_force"].transpose("time", "xy").values @ drive_direction(response)
+    )
+    return NominalSide(displacement, drive, force)

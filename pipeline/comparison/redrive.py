@@ -1,4 +1,4 @@
-"""The simulation driven as the specimen was: by the measured motion of the units that are held.
+"""Simulates a specimen driven as it was: by the measured motion of the units that are held.
 
 Each degree of freedom of each of these units is filtered by a smoothing spline (Dierckx 1975) that
 departs from the track by its standard uncertainty, no more and no less: the sum of the squared
@@ -30,7 +30,7 @@ LEAST_SEEN = 8
 
 
 class HermiteMotion(NamedTuple):
-    """A smooth motion, by values and slopes at equally spaced instants; it rests before and after.
+    """Interpolates a motion by values and slopes at equal intervals; it rests before and after.
 
     Attributes:
         step: between the instants, s; the first is at zero.
@@ -43,7 +43,7 @@ class HermiteMotion(NamedTuple):
     slope: Numbers
 
     def __call__(self, times: Numbers) -> Array:
-        """Motion (n_times, n_units, 3) at the given times, s: cubic between the instants."""
+        """Computes the motion (n_times, n_units, 3) at times in s: cubic between the instants."""
         value, slope = jnp.asarray(self.value), jnp.asarray(self.slope)
         last = len(value) - 1
         place = jnp.clip(jnp.asarray(times) / self.step, 0.0, last)
@@ -55,8 +55,8 @@ class HermiteMotion(NamedTuple):
         return value[before] + s * rise + s * (1 - s) * ((1 - s) * bend + s * other)
 
 
-class Held(NamedTuple):
-    """Filtered motion of the units that supports and drive hold.
+class HeldMotion(NamedTuple):
+    """Holds the filtered motion of the units that supports and drive hold.
 
     Attributes:
         unit: (n,) places in the scene's lattice, ascending.
@@ -76,8 +76,8 @@ class Held(NamedTuple):
     assumed: Mask
 
 
-class Redriven(NamedTuple):
-    """A simulation under the measured motion.
+class RedrivenMotion(NamedTuple):
+    """Holds a simulation under the measured motion.
 
     Attributes:
         displacement: (n_times, n_units, 3) of the units of the scene's lattice; NaN beyond the end
@@ -91,8 +91,8 @@ class Redriven(NamedTuple):
     failure: str | None = None
 
 
-def held_motion(track: xr.Dataset, scene: Scene) -> Held:
-    """The motion of the driven units and of those clamped in all three degrees of freedom.
+def filter_held_motion(track: xr.Dataset, scene: Scene) -> HeldMotion:
+    """Filters the motion of the driven units and of those clamped in all three dofs.
 
     Args:
         track: of the specimen; its displacement in the specimen's frame.
@@ -122,7 +122,7 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     for place, dof in np.ndindex(noise.shape):
         if not assumed[place]:
             kept = there[:, place]
-            spline = filtered(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
+            spline = fit_spline(time[kept], measured[kept, place, dof], sigma[kept, place, dof])
             value[:, place, dof] = spline(instants)
             slope[:, place, dof] = spline(instants, 1)
             rest = measured[kept, place, dof] - spline(time[kept])
@@ -130,7 +130,7 @@ def held_motion(track: xr.Dataset, scene: Scene) -> Held:
     mean = driven & ~assumed
     for course in (value, slope):
         course[:, driven & assumed] = course[:, mean].mean(axis=1, keepdims=True)
-    return Held(
+    return HeldMotion(
         unit, driven, HermiteMotion(step, value, slope), noise, 1 - there.mean(axis=0), assumed
     )
 
@@ -142,12 +142,12 @@ def held_units(scene: Scene) -> tuple[Ints, Mask]:
     return unit, np.isin(unit, scene.loads.driven)
 
 
-def filtered(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
-    """The smoothing spline of a course (n,) with standard uncertainties (n,); n at least 8."""
+def fit_spline(time: Floats, value: Floats, sigma: Floats) -> UnivariateSpline:
+    """Fits the smoothing spline of a course (n,) with standard uncertainties (n,); n >= 8."""
     return UnivariateSpline(time, value, w=1 / sigma, s=len(time), ext="const")
 
 
-def under(scene: Scene, held: Held) -> Scene:
+def drive_as_measured(scene: Scene, held: HeldMotion) -> Scene:
     """The scene with all held units driven as measured; its end is that of the measurement."""
     return scene.updated(
         cases=(PrescribedMotion(held.unit, held.motion),),
@@ -158,8 +158,8 @@ def under(scene: Scene, held: Held) -> Scene:
     )
 
 
-def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
-    """The structure under the measured motion: in time, or as a path of equilibria.
+def simulate_redriven(structure: PosedStructure, held: HeldMotion, times: Floats) -> RedrivenMotion:
+    """Simulates the structure under the measured motion: in time, or as a path of equilibria.
 
     Args:
         structure: as designed, under the planned drives.
@@ -167,7 +167,7 @@ def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
         times: (n_times,) on the track's clock, ascending, s.
     """
     scene, vertices = structure
-    driven = under(scene, held)
+    driven = drive_as_measured(scene, held)
     shape = (len(times), scene.lattice.n_units, 3)
     displacement, force = np.full(shape, np.nan), np.full((len(times), 2), np.nan)
     failure = None
@@ -181,4 +181,4 @@ def redriven(structure: PosedStructure, held: Held, times: Floats) -> Redriven:
         seen = observe(driven.topology, concrete_parameters(driven, vertices), found)
         displacement[: len(found)] = found
         force[: len(found)] = seen.force_on(scene.loads.driven)
-    return Redriven(displacement, force, failure)
+    return RedrivenMotion(displacement, force, failure)

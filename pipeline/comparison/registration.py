@@ -1,4 +1,4 @@
-"""How the measured places of the units at rest lie on the design: a rigid motion and a scale.
+"""Registers the measured places of the units at rest: a rigid motion and a scale.
 
 The rigid part is taken out of what is compared. The scale is told and left in: a specimen that was
 made too large, or a pixel of the wrong size, is a finding.
@@ -18,7 +18,7 @@ _LEAST = 3  # units
 
 
 class Registration(NamedTuple):
-    """A similarity from the design's places to the measured ones, with standard uncertainties.
+    """Maps the design's places to the measured ones, with standard uncertainties.
 
     Attributes:
         rotation: counter-clockwise, rad.
@@ -37,7 +37,7 @@ class Registration(NamedTuple):
     residual: float
 
     def upright(self, motion: Floats) -> Floats:
-        """Motions (..., 3) turned back into the design's frame."""
+        """Turns motions (..., 3) back into the design's frame."""
         cos, sin = np.cos(self.rotation), np.sin(self.rotation)
         turned = motion[..., :2] @ np.array([[cos, -sin], [sin, cos]])
         return np.concatenate([turned, motion[..., 2:]], axis=-1)
@@ -48,7 +48,7 @@ UNKNOWN = Registration(0.0, np.full(2, np.nan), np.nan, np.nan, np.full(2, np.na
 
 
 def register(design: Floats, measured: Floats) -> Registration:
-    """The similarity (least squares) between places (units, 2) in mm; NaN where one is unknown."""
+    """Fits a similarity (least squares) between places (units, 2) in mm; NaN: unknown."""
     known = np.isfinite(design).all(axis=1) & np.isfinite(measured).all(axis=1)
     if known.sum() < _LEAST:
         return UNKNOWN
@@ -71,8 +71,8 @@ def register(design: Floats, measured: Floats) -> Registration:
     )
 
 
-def measured_places(track: xr.Dataset, design: Floats) -> Floats:
-    """Where the camera saw the units at rest (units, 2), mm; NaN where it did not.
+def measure_places(track: xr.Dataset, design: Floats) -> Floats:
+    """Computes the places of the units at rest (units, 2) by the camera, mm; NaN if unseen.
 
     Args:
         track: with its camera.
@@ -82,19 +82,19 @@ def measured_places(track: xr.Dataset, design: Floats) -> Floats:
     camera, missed = _camera(track), track["camera_residual"].values
     if camera is not None:
         there = np.isfinite(design + missed).all(axis=1)
-        measured[there] = camera.beside(design[there], missed[there])
+        measured[there] = camera.unproject(camera.project(design[there]) + missed[there])
     return measured
 
 
 def pixel_size(track: xr.Dataset, middle: Floats) -> float:
-    """Size of a pixel at a place (2,) by the camera's calibration, mm; NaN without a camera."""
+    """Computes the size of a pixel at a place (2,) by the camera, mm; NaN without one."""
     if (camera := _camera(track)) is None:
         return np.nan
     return float(1 / np.sqrt(abs(np.linalg.det(camera.jacobian(middle)))))
 
 
 def _camera(track: xr.Dataset) -> Camera | None:
-    """The camera that a track was made with; points of another system come without."""
+    """Reads the camera that a track was made with; points of another system come without."""
     homography = track["camera_homography"].values
     if np.isnan(homography).any():
         return None

@@ -1,4 +1,4 @@
-"""The simulated side: driven by the measured motion, with imperfect copies for its band."""
+"""Simulates a structure and imperfect copies of it under the measured motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOG = logging.getLogger(__name__)
 
 
 class SimulatedSide(NamedTuple):
-    """What a structure does under the measured motion of what holds it.
+    """Holds the response of a structure to the measured motion of its held units.
 
     Attributes:
         displacement: (frames, units, 3) of all units, mm and rad; NaN for those that are absent.
@@ -34,7 +34,7 @@ class SimulatedSide(NamedTuple):
     failures: tuple[str, ...]
 
 
-def simulation(
+def simulate_specimen(
     asked: Problem,
     structure: PosedStructure,
     track: xr.Dataset,
@@ -55,9 +55,9 @@ def simulation(
     Raises:
         UserError: no driven unit was seen.
     """
-    held = redrive.held_motion(track, structure.scene)
+    held = redrive.filter_held_motion(track, structure.scene)
     clock = times - track["time"].values[0]
-    made = redrive.redriven(structure, held, clock)
+    made = redrive.simulate_redriven(structure, held, clock)
     lattice, size = structure.scene.lattice, track.sizes["unit"]
     displacement = spread(made.displacement, lattice, size, axis=1)
     if made.failure is not None:
@@ -66,7 +66,7 @@ def simulation(
         return SimulatedSide(
             displacement, made.drive_force @ way, nothing, nothing[..., 0, 0], (made.failure,)
         )
-    copies = tolerance_band.sampled(asked, structure, clock, held, threads=threads)
+    copies = tolerance_band.sample_specimens(asked, structure, clock, held, threads=threads)
     return SimulatedSide(
         displacement,
         made.drive_force @ way,

@@ -1,4 +1,4 @@
-"""How far a simulation spreads under the tolerances of specimens and the doubt about constants.
+"""Samples the spread of a simulation under tolerances of specimens and constants.
 
 Specimens are drawn (pipeline/posing/perturbed.py) and simulated under the same drive. The
 band between
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.comparison.redrive import Held, under
+from pipeline.comparison.redrive import HeldMotion, drive_as_measured
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem import Problem
 from pipeline.runtime import cli
@@ -29,8 +29,8 @@ STREAM = 1
 """First word of the seeds of all draws here, so that no other specimen equals one of them."""
 
 
-class Samples(NamedTuple):
-    """Specimens that were simulated.
+class Specimens(NamedTuple):
+    """Holds specimens that were simulated.
 
     Attributes:
         displacement: (n_samples, n_times, n_units, 3) of the units of the structure's lattice.
@@ -43,14 +43,14 @@ class Samples(NamedTuple):
     failures: tuple[str, ...]
 
 
-def sampled(
+def sample_specimens(
     asked: Problem,
     structure: PosedStructure,
     times: Floats,
-    held: Held | None = None,
+    held: HeldMotion | None = None,
     case: int = 0,
     threads: int = 1,
-) -> Samples:
+) -> Specimens:
     """Draws and simulates specimens of a structure.
 
     Args:
@@ -65,7 +65,7 @@ def sampled(
         SimulationError: the structure as designed cannot be simulated.
     """
     planned, vertices = structure
-    scene = planned.alone(case) if held is None else under(planned, held)
+    scene = planned.alone(case) if held is None else drive_as_measured(planned, held)
     seeds = [(STREAM, asked.prediction.seed, number) for number in range(asked.prediction.samples)]
     made = [drawn(scene, vertices, asked.tolerances, seed) for seed in seeds]
     unsound = f"units still overlap at rest after {MOST_ROUNDS} draws"
@@ -83,7 +83,7 @@ def sampled(
                 courses.append(outcome.value)
             bar.update(failed=len(failures))
     shape = (len(courses), len(times))
-    return Samples(
+    return Specimens(
         np.array([motion for motion, _ in courses]).reshape(*shape, scene.lattice.n_units, 3),
         np.array([force for _, force in courses]).reshape(*shape, 2),
         tuple(failures),
@@ -109,8 +109,8 @@ def _measure(scene: Scene, driven: Ints) -> Measure[tuple[Floats, Floats]]:
     return reduce
 
 
-def limits(values: Floats, level: float) -> Floats:
-    """Lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
+def band_limits(values: Floats, level: float) -> Floats:
+    """Computes lower limit, median and upper limit (3, ...) of samples (n_samples, ...).
 
     The limits hold the next sample with the probability ``level``; with too few samples for that
     they are the least and the greatest of them.
@@ -120,8 +120,8 @@ def limits(values: Floats, level: float) -> Floats:
     return np.asarray(np.quantile(values, shares, axis=0, method="weibull"))
 
 
-def widened(band: Floats, sigma: Floats, level: float) -> Floats:
-    """The band (3, ...) of what is measured with standard uncertainties ``sigma`` (...)."""
+def widen_band(band: Floats, sigma: Floats, level: float) -> Floats:
+    """Widens the band (3, ...) by standard uncertainties ``sigma`` (...) of a measurement."""
     low, middle, high = band
     noise = ndtri((1 + level) / 2) * sigma
     return np.stack(

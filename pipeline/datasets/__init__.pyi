@@ -1,12 +1,7 @@
 from . import chunked as chunked
 from . import provenance as provenance
-from .files import SchemaError as SchemaError
 from .files import read as read
 from .files import write as write
 from .provenance import file_hash as file_hash
 from .provenance import git_commit as git_commit
 from .provenance import package_versions as package_versions
-from .tables import SCHEMA_VERSION as SCHEMA_VERSION
-from .tables import TABLES as TABLES
-from .tables import Kind as Kind
-from .tables import Variable as Variable

@@ -11,17 +11,17 @@ from pipeline.datasets.tables import Kind
 from pipeline.runtime import UserError
 
 
-def work(
+def run_or_gather(
     args: argparse.Namespace, run: Callable[[argparse.Namespace], None], kind: Kind, dim: str
 ) -> None:
     """Computes a part with ``run``, or joins all parts along ``dim``."""
     if args.command == "run":
         run(args)
     else:
-        join(args.parts, kind, dim, args.out)
+        join_parts(args.parts, kind, dim, args.out)
 
 
-def join(paths: Sequence[Path], kind: Kind, dim: str, out: Path) -> None:
+def join_parts(paths: Sequence[Path], kind: Kind, dim: str, out: Path) -> None:
     """Writes the parts as one dataset, in the order of ``dim``.
 
     Raises:

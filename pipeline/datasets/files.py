@@ -1,4 +1,4 @@
-"""Datasets on disk: netCDF-4, whole or not at all, and the same bytes for the same data."""
+"""Stores datasets as netCDF-4, whole or not at all: the same bytes for the same data."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import psutil
 import xarray as xr
 
 from pipeline.datasets import seal
-from pipeline.datasets.migration import MIGRATED, migrated
-from pipeline.datasets.tables import SCHEMA_VERSION, TABLES, TITLES, Kind, Variable
-from pipeline.datasets.validation import faults
+from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
+from pipeline.datasets.validation import MIGRATED, find_faults, migrate
 from pipeline.runtime import UserError, write_atomically
 
 _CHUNK = bytes(1 << 20)
@@ -24,11 +23,11 @@ _UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, Attrib
 
 
 class SchemaError(ValueError):
-    """A stage tried to write what the tables do not describe: a mistake in the code."""
+    """Reports that a stage tried to write what the tables do not describe: a mistake in code."""
 
 
 def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping[str, str]) -> None:
-    """Write `dataset` as a file of `kind`, atomically: another file appears whole or not at all.
+    """Writes `dataset` as a file of `kind`, atomically: another file appears whole or not at all.
 
     Units, long names, flag meanings and types come from the table of the kind; the variables need
     not carry them.
@@ -45,20 +44,20 @@ def write(dataset: xr.Dataset, path: str | Path, kind: Kind, provenance: Mapping
     """
     path = Path(path)
     described = _described(dataset, kind, provenance)
-    for fault in faults(described, kind):
+    for fault in find_faults(described, kind):
         told = "" if fault.value is None else f": {fault.value}"
         raise SchemaError(f"{kind} dataset, {fault.name}: {fault.what}{told}")
     with write_atomically(path) as aside:
         try:
             _to_netcdf(described, aside, kind)
-            seal.put(aside)
+            seal.write_seal(aside)
             read(aside, kind)
         except (OSError, RuntimeError) as error:  # netCDF4 seldom says why a write failed
             raise _probe(aside, dataset.nbytes) or error from error
 
 
 def read(path: str | Path, kind: Kind) -> xr.Dataset:
-    """Read a file of `kind` into memory, checked against its table.
+    """Reads a file of `kind` into memory, checked against its table.
 
     Raises:
         UserError: missing, truncated, foreign, of another kind or version, or not as the table
@@ -67,7 +66,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     path = Path(path)
     remedy = "delete it and run the stage that makes it again"
     try:
-        sealed = seal.state(path)
+        sealed = seal.check_seal(path)
         if sealed == "broken":
             raise UserError("damaged: it is not what was written", file=path, remedy=remedy)
         dataset = _loaded(path)
@@ -79,8 +78,8 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
     except _UNREADABLE as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
     _check_origin(dataset, path, kind, remedy)
-    dataset = migrated(dataset, kind)
-    for fault in faults(dataset, kind):
+    dataset = migrate(dataset, kind)
+    for fault in find_faults(dataset, kind):
         raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
     if dataset.attrs.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
         raise UserError(
@@ -93,7 +92,7 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
 
 
 def _loaded(path: Path) -> xr.Dataset:
-    """What a file holds, in memory.
+    """Loads a file into memory.
 
     Raises:
         UserError: it claims to hold more than it can, or than there is room for.
@@ -133,7 +132,7 @@ def _check_origin(dataset: xr.Dataset, path: Path, kind: Kind, remedy: str) -> N
 
 
 def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -> xr.Dataset:
-    """The dataset in the order of its table, with the attributes and types that this states."""
+    """Gives a dataset the order of its table, and the attributes and types that this states."""
     table = TABLES[kind]
     described = {
         str(name): _describe(variable, table[str(name)]) if name in table else variable
@@ -144,12 +143,12 @@ def _described(dataset: xr.Dataset, kind: Kind, provenance: Mapping[str, str]) -
     labels = [name for name in names if name in table and table[name].coordinate]
     attributes = {
         "Conventions": "CF-1.11",
-        "title": TITLES[kind],
+        "title": SCHEMAS[kind].title,
         "kind": kind,
         "schema_version": SCHEMA_VERSION,
         **dataset.attrs,
         **provenance,
-        seal.ATTRIBUTE: seal.WORDS,
+        seal.ATTRIBUTE: seal.DESCRIPTION,
     }
     return xr.Dataset(
         {name: described[name] for name in names if name not in labels},
@@ -184,7 +183,7 @@ def _encoding(table: Variable) -> dict[str, object]:
 
 
 def _probe(path: Path, size: int) -> OSError | None:
-    """The error that plain writing of `size` bytes meets at `path`, if any."""
+    """Tries plain writing of `size` bytes at `path`, and returns its error, if any."""
     try:
         with path.open("wb") as file:
             for _ in range(size // len(_CHUNK) + 1):

@@ -1,4 +1,4 @@
-"""Where a dataset comes from, as attributes: problem, parents, versions, commit and plan.
+"""Records the origin of datasets as attributes: problem, parents, versions, commit and plan.
 
 No dates, hosts or wall times: the same sources make the same bytes.
 """
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
 
 
-def attributes(
+def of_study(
     problem: Problem,
     stage: str,
     *,
@@ -32,7 +32,7 @@ def attributes(
     parents: Mapping[str, Path] | None = None,
     plan: object = None,
 ) -> dict[str, str]:
-    """The provenance of a dataset that `stage` makes.
+    """Records the provenance of a dataset that `stage` makes.
 
     Args:
         problem: the problem; as much of it as the stage depends on is stored in full.
@@ -49,10 +49,10 @@ def attributes(
     }
 
 
-def recorded(
+def of_recording(
     description: str, parents: Mapping[str, Path], *, synthetic: bool, role: str = "recording"
 ) -> dict[str, str]:
-    """The provenance of what is made of a recording, or of the measurements of a calibration.
+    """Records the provenance of what is made of a recording or of a calibration's measurements.
 
     Args:
         description: its YAML as JSON.
@@ -60,11 +60,7 @@ def recorded(
         synthetic: whether it was rendered or computed.
         role: what it describes.
     """
-    return {
-        role: description,
-        "synthetic": "yes" if synthetic else "no",
-        **_made_from(parents),
-    }
+    return {role: description, "synthetic": "yes" if synthetic else "no", **_made_from(parents)}
 
 
 def _made_from(parents: Mapping[str, Path]) -> dict[str, str]:
@@ -99,7 +95,7 @@ def check_parent(made: xr.Dataset, file: Path, role: str, parent: Path) -> None:
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes, or of the names and bytes of a folder's files, in hex."""
+    """Hashes a file's bytes, or the names and bytes of a folder's files: SHA-256, in hex."""
     if path.is_dir():
         inside = sorted(each for each in path.iterdir() if each.is_file())
         listed = "".join(f"{each.name} {file_hash(each)}\n" for each in inside)

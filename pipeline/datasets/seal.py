@@ -1,4 +1,4 @@
-"""The seal of a dataset: a SHA-256 of all of its bytes, behind them, so that no damage is read.
+"""Seals datasets: a SHA-256 of all of a file's bytes, behind them, so that no damage is read.
 
 HDF5 ends where its own header says, and minds nothing that follows: any software reads a sealed
 file. One that was changed by other software has lost its seal.
@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO, Literal
 
 ATTRIBUTE = "seal"
-WORDS = "SHA-256 of the file, in its last 32 bytes"
+DESCRIPTION = "SHA-256 of the file, in its last 32 bytes"
 _MARK = b"metacloak.sha256"
 _LENGTH = len(_MARK) + hashlib.sha256().digest_size
 _PIECE = 1 << 20
@@ -20,15 +20,15 @@ _PIECE = 1 << 20
 State = Literal["whole", "broken", "absent"]
 
 
-def put(path: Path) -> None:
+def write_seal(path: Path) -> None:
     """Seals a file."""
     with path.open("r+b") as file:
         size = file.seek(0, 2)
         file.write(_MARK + _digest(file, size))
 
 
-def state(path: Path) -> State:
-    """Whether the seal of a file is there, and that of what the file holds.
+def check_seal(path: Path) -> State:
+    """Checks the seal of a file against its bytes.
 
     Raises:
         OSError: the file cannot be read.
@@ -47,7 +47,7 @@ def state(path: Path) -> State:
 
 
 def _digest(file: BinaryIO, size: int) -> bytes:
-    """SHA-256 of the first bytes of a file, which is left behind them."""
+    """Hashes the first bytes of a file by SHA-256, and leaves it behind them."""
     found = hashlib.sha256()
     file.seek(0)
     while size > 0:

@@ -1,4 +1,4 @@
-"""Whether a dataset is what its table says: the first thing that is not, in words."""
+"""Checks datasets against their tables, those of older versions as if they were written today."""
 
 from __future__ import annotations
 
@@ -8,22 +8,27 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
+from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
 
 _KINDS = {"float64": "f", "float32": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
+MIGRATED = (1,)
+"""Versions that are read besides the present one."""
+
+_SPELT = {"deg": "degree", "px": "1"}
+_WORDS = ("px, mm", "as in constraint_units")
 
 
 @dataclass(frozen=True)
 class SchemaFault:
-    """What is wrong with which variable (or attribute)."""
+    """Reports a fault of a variable or attribute."""
 
     what: str
     name: str
     value: object = None
 
 
-def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
-    """What keeps `dataset` from being one of `kind`, beside its provenance."""
+def find_faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
+    """Finds faults that keep `dataset` from being one of `kind`, beside its provenance."""
     table = TABLES[kind]
     for name, variable in table.items():
         if name not in dataset.variables:
@@ -32,7 +37,7 @@ def faults(dataset: xr.Dataset, kind: Kind) -> Iterator[SchemaFault]:
             yield from _variable_faults(dataset.variables[name], name, variable)
     for unknown in dataset.variables.keys() - table.keys():
         yield SchemaFault(f"a {kind} dataset has no such variable", str(unknown))
-    for name, meaning in ATTRIBUTES[kind].items():
+    for name, meaning in SCHEMAS[kind].attributes.items():
         if name not in dataset.attrs:
             yield SchemaFault(f"the attribute is missing ({meaning})", name)
 
@@ -53,7 +58,7 @@ def _known_units(told: object, table: Variable) -> bool:
 
 
 def _units(found: xr.Variable, table: Variable) -> object:
-    """Its unit as told; that of the table where it tells none, as before it is written."""
+    """Reads the unit; that of the table where there is none, as before it is written."""
     return found.attrs.get(table.unit_attribute, table.units)
 
 
@@ -73,7 +78,7 @@ def _value_faults(values: np.ndarray, name: str, table: Variable) -> Iterator[Sc
 
 
 def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:
-    """The values that a coordinate should have: all, or those that are there, in their order."""
+    """Lists the values that a coordinate should have: all, or those present, in their order."""
     if not table.subset:
         return table.values
     return tuple(value for value in table.values if value in values)
@@ -81,3 +86,23 @@ def _expected(values: np.ndarray, table: Variable) -> tuple[str, ...]:
 
 def _tuple(names: object) -> str:
     return "(" + ", ".join(map(str, names)) + ")"  # type: ignore[call-overload]
+
+
+def migrate(dataset: xr.Dataset, kind: Kind) -> xr.Dataset:
+    """Gives a dataset the attributes of the present version.
+
+    Version 1 had the same variables in the same units, which it spelled for people only, and no
+    title.
+    """
+    if dataset.attrs["schema_version"] == SCHEMA_VERSION:
+        return dataset
+    for name, table in TABLES[kind].items():
+        if name in dataset.variables:
+            _respell(dataset[name].attrs, table)
+    return dataset.assign_attrs(schema_version=SCHEMA_VERSION, title=SCHEMAS[kind].title)
+
+
+def _respell(attributes: dict[str, object], table: Variable) -> None:
+    units = str(attributes.pop("units", table.units))
+    units = table.units if units in _WORDS else _SPELT.get(units, units)
+    attributes[table.unit_attribute] = units

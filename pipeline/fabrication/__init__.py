@@ -1,1 +1,1 @@
-"""From a design to drawings, meshes and fixtures: what a lab cuts, prints and assembles."""
+"""Makes drawings, meshes, fixtures and papers of a design, for a lab to cut and assemble."""

@@ -11,14 +11,14 @@ from .case_result import Times as Times
 from .case_result import measure as measure
 from .case_result import structures_of as structures_of
 from .case_result import times_of as times_of
-from .dispersion import waves as waves
+from .dispersion import compute_bands as compute_bands
 from .perturbed import drawn as drawn
 from .response_dataset import assemble_response as assemble_response
 from .response_dataset import case_directions as case_directions
 from .response_dataset import loss_units as loss_units
 from .robust_scene import design_scene as design_scene
 from .start_design import shipped_vector as shipped_vector
-from .start_design import start_of as start_of
+from .start_design import start_vector as start_vector
 from .structure_variables import CLAMPED as CLAMPED
 from .structure_variables import DRIVEN as DRIVEN
 from .structure_variables import Variables as Variables
@@ -31,5 +31,5 @@ from .to_scene import lattice_of as lattice_of
 from .to_scene import limits_of as limits_of
 from .to_scene import scene_of as scene_of
 from .verification import AS_RUN as AS_RUN
-from .verification import Numbers as Numbers
+from .verification import CheckResult as CheckResult
 from .verification import assemble_verification as assemble_verification

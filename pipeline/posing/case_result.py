@@ -126,11 +126,7 @@ def measure(
 
 
 def _target(
-    motion: Floats,
-    scene: Scene,
-    number: int,
-    intact: list[CaseResult] | None,
-    at: Ints,
+    motion: Floats, scene: Scene, number: int, intact: list[CaseResult] | None, at: Ints
 ) -> Floats | None:
     """What the region (1, n_at, n_region, 3) should do: as the intact one did, which is its own."""
     if scene.objective.reference is None:

@@ -1,4 +1,4 @@
-"""Waves in the unit cell of a problem's lattice, at rest and compressed, as variables."""
+"""Computes waves in the unit cell of a problem's lattice, at rest and compressed."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from sim.structure import Parameters, parameters, shape
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 
 
-def waves(asked: Problem, wanted: Spectrum) -> Variables:
-    """Bands of the unit cell at rest and compressed.
+def compute_bands(asked: Problem, wanted: Spectrum) -> Variables:
+    """Computes bands of the unit cell at rest and compressed.
 
     Raises:
         UserError: the lattice has no unit cell, or it does not hold a strain.
@@ -45,7 +45,7 @@ def waves(asked: Problem, wanted: Spectrum) -> Variables:
 
 
 def _cell(asked: Problem) -> UnitCell:
-    """Unit cell of the lattice before anything was removed or reshaped."""
+    """Builds the unit cell of the lattice before anything was removed or reshaped."""
     if isinstance(asked.lattice, ListedNetwork):
         what = "a lattice from a file has no unit cell to send waves through"
         raise UserError(what, key="spectrum", remedy="leave the section out")

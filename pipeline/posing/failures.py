@@ -1,4 +1,4 @@
-"""What it means to the user that a structure cannot be designed or simulated."""
+"""Explains to the user that a structure cannot be designed or simulated."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 _KEYS = {"convexity": "convex"}
 
 
-def infeasible(
+def infeasible_start(
     error: InfeasibleStartError, constraints: ConstraintVector, source: Path
 ) -> UserError:
-    """No design near the start can be made."""
+    """Explains that no design near the start can be made."""
     kind, where = constraints.named(error.constraint)
     return UserError(
         f"infeasible at the start, by {error.violation:.3g} mm (angles times 5 mm) at {where},"
@@ -33,7 +33,7 @@ def infeasible(
     )
 
 
-class Simulated(NamedTuple):
+class SimulatedStructure(NamedTuple):
     """What was to be simulated: a structure of a problem file at solver times (n_times,)."""
 
     source: Path
@@ -42,8 +42,10 @@ class Simulated(NamedTuple):
     asked: NDArray[np.float64]
 
 
-def unsolved(error: SimulationError, tried: Simulated, kept: Path | None) -> UserError:
-    """A structure's motion could not be followed to its end.
+def simulation_failure(
+    error: SimulationError, tried: SimulatedStructure, kept: Path | None
+) -> UserError:
+    """Explains that a structure's motion could not be followed to its end.
 
     Args:
         error: the solver's.

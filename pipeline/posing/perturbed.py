@@ -93,11 +93,7 @@ def _sizes(asked: Tolerances | Noise, spacing: float) -> Perturbation:
 
 
 def simulate(
-    scene: Scene,
-    vertices: Floats,
-    asked: Robustness,
-    samples: Sequence[int],
-    threads: int,
+    scene: Scene, vertices: Floats, asked: Robustness, samples: Sequence[int], threads: int
 ) -> xr.Dataset:
     """The dataset ``scatter`` of some of the copies.
 

@@ -1,4 +1,4 @@
-"""The dataset of a study's responses, from what was measured of every structure and case."""
+"""Assembles the dataset of a study's responses from the results of structures and cases."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Table = dict[str, list[CaseResult]]
 def assemble_response(
     asked: Problem, structures: dict[str, PosedStructure], times: Floats, measured: Table
 ) -> xr.Dataset:
-    """The dataset ``response``.
+    """Assembles the dataset ``response``.
 
     Args:
         asked: the problem.
@@ -62,12 +62,12 @@ def assemble_response(
 
 
 def loss_units(asked: Problem) -> str:
-    """Unit of a problem's loss."""
+    """Returns the unit of a problem's loss."""
     return "N mm" if asked.objective.kind == "strain_energy" else "1"
 
 
 def case_directions(asked: Problem) -> list[float]:
-    """Direction of each load case in rad; zero for a measured drive."""
+    """Lists the direction of each load case in rad; zero for a measured drive."""
     return list(getattr(asked.drive, "directions", (0.0,)))
 
 
@@ -124,7 +124,7 @@ def _over_cases(measured: Table) -> Variables:
 
 
 def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
-    """Mean displacement (n_cases, n_times, 2) of the driven units, mm."""
+    """Computes the mean displacement (n_cases, n_times, 2) of the driven units, mm."""
     scene = structures["altered"].scene
     dofs = (3 * scene.loads.driven[:, None] + np.arange(2)).ravel()
     place = np.searchsorted(scene.loads.held, dofs)

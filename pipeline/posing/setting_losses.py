@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from pipeline.posing.structure_variables import flat_vertices
 from pipeline.posing.to_scene import lattice_of, scene_of
 from pipeline.problem import Problem, canonical_json, from_canonical
-from pipeline.problem.reading import findings, reason
-from pipeline.problem.sections import Setting, laid
+from pipeline.problem.reading import find_faults, first_fault
+from pipeline.problem.sections import Setting, apply_setting
 from pipeline.runtime import SweepResult, UserError
 from sim.core import Floats, SimulationError
 from sim.scene import Scene, cases_of, make_plan, mimicking, target_motion
@@ -50,7 +50,7 @@ def results(
         # No design space is asked for: its symmetry costs more than it could save.
         scene = scene_of(problem, folder).updated(symmetry="none")
     except ValidationError as error:
-        raise UnposedError(reason(error)[0]) from error
+        raise UnposedError(first_fault(error)[0]) from error
     except UserError as error:
         raise UnposedError(error.what) from error
     target = None if scene.objective.reference is None else target_motion(scene, threads)
@@ -69,10 +69,10 @@ def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
 
 def _posed(asked: Problem, setting: Setting) -> Problem:
     """The problem with a setting in place of its own values, and without a sweep."""
-    data = laid(json.loads(canonical_json(asked, "sweep")), setting)
+    data = apply_setting(json.loads(canonical_json(asked, "sweep")), setting)
     data.pop("sweep")
     problem = from_canonical(data)
-    for finding in findings(problem):
+    for finding in find_faults(problem):
         raise UnposedError(f"{'.'.join(map(str, finding.keys))}: {finding.what}")
     return problem
 

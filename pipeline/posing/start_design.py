@@ -1,4 +1,4 @@
-"""Where an optimisation starts from: the initial lattice, or a design."""
+"""Reads the start of an optimisation: the initial lattice, or a design."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ _SAME = 1e-9  # mm
 
 
 def shipped_vector(design: xr.Dataset) -> Floats:
-    """The design vector (n_variables,) of a design."""
+    """Reads the design vector (n_variables,) of a design."""
     history = design.sel({"method": design.attrs["shipped_method"]})
     best = int(history["best_evaluation"])
     return np.asarray(history["design_vector"].isel(evaluation=best).values)
 
 
-def start_of(asked: Problem, scene: Scene, path: Path | None, source: Path) -> Floats | None:
-    """The design vector (n_variables,) that a problem's optimisation starts from, if it has one.
+def start_vector(asked: Problem, scene: Scene, path: Path | None, source: Path) -> Floats | None:
+    """Reads the design vector (n_variables,) that an optimisation starts from, if it has one.
 
     Args:
         asked: the problem.

@@ -1,4 +1,4 @@
-"""A structure as variables of a dataset, and back."""
+"""Converts a structure to variables of a dataset, and back."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ALIKE = 1e-6  # mm
 
 
 def unit_coordinates(intact: Lattice) -> Variables:
-    """Labels of the units, removed ones too, and of the specimen frame's axes."""
+    """Labels the units, removed ones too, and the specimen frame's axes."""
     return {
         "unit": (("unit",), intact.id),
         "i": (("unit",), intact.index[:, 0]),
@@ -37,7 +37,7 @@ def unit_coordinates(intact: Lattice) -> Variables:
 
 
 def network_variables(problem: Problem, scene: Scene) -> Variables:
-    """Regions, supports and ligaments of the intact network of a scene."""
+    """Lists regions, supports and ligaments of the intact network of a scene."""
     intact, kept = lattice_of(problem), scene.lattice.id
     region = np.full(intact.n_units, VOID, dtype=np.int8)
     region[kept] = SURROUNDINGS
@@ -60,7 +60,7 @@ def network_variables(problem: Problem, scene: Scene) -> Variables:
 
 
 def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:
-    """Which of the ligaments (n_ligaments,) of the intact network a structure has.
+    """Selects the ligaments (n_ligaments,) of the intact network that a structure has.
 
     Args:
         network: a design or a response.
@@ -72,14 +72,14 @@ def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArra
 
 
 def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:
-    """Vertices (n_vertices, 2) of a padded array (unit, vertex, xy), in the lattice's order."""
+    """Flattens a padded array (unit, vertex, xy) to vertices (n_vertices, 2) of the lattice."""
     local = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
     unit = lattice.id[lattice.unit]
     return np.asarray(vertices.transpose("unit", "vertex", "xy").values[unit, local])
 
 
 def read_design(asked: Problem, path: Path) -> xr.Dataset:
-    """The design in a file, which must be one of the problem's lattice and void.
+    """Reads a design, which must be one of the problem's lattice and void.
 
     Raises:
         UserError: it cannot be read, or is of another.
@@ -95,7 +95,7 @@ def read_design(asked: Problem, path: Path) -> xr.Dataset:
 
 
 def spread(values: Floats, lattice: Lattice, size: int, axis: int = 0) -> Floats:
-    """An array over the units of a network as one over all ``size`` units, NaN where removed."""
+    """Spreads an array over a network's units to all ``size`` units, NaN where removed."""
     inner = np.moveaxis(np.asarray(values), axis, 0)
     out = np.full((size, *inner.shape[1:]), np.nan)
     out[lattice.id] = inner

@@ -17,7 +17,7 @@ from pipeline.posing.case_result import (
     times_of,
 )
 from pipeline.posing.to_scene import scene_of
-from pipeline.posing.verification import AS_RUN, Numbers
+from pipeline.posing.verification import AS_RUN, CheckResult
 from sim.core import Floats, SimulationError
 from sim.energy import observe
 from sim.scene import Response, mimicking, scales, simulate
@@ -39,7 +39,7 @@ Runs = dict[str, Response]
 
 def trials(
     asked: Problem, folder: Path, design: xr.Dataset
-) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
+) -> tuple[dict[str, dict[str, CheckResult]], dict[str, str]]:
     """Numbers by check and structure, and by check whether there are any or why not.
 
     Raises:
@@ -77,7 +77,7 @@ def _time_step(run: Response) -> float:
 
 def _numbers(
     structures: dict[str, PosedStructure], runs: Runs, as_run: Runs, times: Times
-) -> dict[str, Numbers]:
+) -> dict[str, CheckResult]:
     first = next(iter(structures.values())).scene
     aims = next(iter(runs.values())).displacement[:, times.integrated][:, :, first.objective.region]
     return {
@@ -88,7 +88,7 @@ def _numbers(
 
 def _of_structure(
     structure: PosedStructure, run: Response, as_run: Response, aims: Floats, times: Times
-) -> Numbers:
+) -> CheckResult:
 
     scene, vertices = structure
     values, motion = run.parameters, run.displacement
@@ -102,7 +102,7 @@ def _of_structure(
         clearance(scene.lattice, vertices, each[::CLEARANCE_STRIDE])
         for each in motion[:, times.shown]
     ]
-    return Numbers(
+    return CheckResult(
         loss=float(
             scene.loads.case_weights @ np.asarray(measure(motion[:, times.integrated], values))
         ),

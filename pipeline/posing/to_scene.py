@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline import problem as problems
 from pipeline.problem import Problem
+from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import (
     HarmonicDrive,
     LinearRampDrive,
@@ -27,7 +28,8 @@ from sim.scene import Clamp, Design, Loads, Numerics, Objective, Scene, Structur
 from sim.solvers import PrescribedMotion, loads
 from sim.structure import ContactModel, DistanceContact, Lattice, Material, VoidAngleContact
 
-TIME_SERIES_COLUMNS = ("time (s)", "ux (mm)", "uy (mm)", "theta (rad)")
+TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "theta": units.ANGLE}
+"""Columns of a measured drive, whose heading names each with its unit in brackets."""
 
 
 def lattice_of(problem: Problem) -> Lattice:
@@ -201,21 +203,9 @@ def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
 
 
 def _measured(path: Path) -> loads.TimeSeries:
-    """A measured motion: a CSV with the columns TIME_SERIES_COLUMNS, times ascending."""
-    remedy = "write a CSV with the header " + ", ".join(TIME_SERIES_COLUMNS)
-    try:
-        header, *_ = path.read_text(encoding="utf-8").splitlines() or [""]
-        if tuple(name.strip() for name in header.split(",")) != TIME_SERIES_COLUMNS:
-            raise UserError(
-                "the columns of a measured drive are wrong", file=path, value=header, remedy=remedy
-            )
-        table = np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise UserError(
-            f"the measured drive cannot be read: {error}", file=path, remedy=remedy
-        ) from error
-    if table.shape[1:] != (4,) or not np.isfinite(table).all() or (np.diff(table[:, 0]) <= 0).any():
-        raise UserError(
-            "the measured drive needs finite values at ascending times", file=path, remedy=remedy
-        )
+    """Reads a measured motion: a CSV with the columns TIME_SERIES, times ascending."""
+    table = csv_columns.read_quantities(path, TIME_SERIES)
+    if (np.diff(table[:, 0]) <= 0).any():
+        remedy = "sort it by time, each time once"
+        raise UserError("the measured drive needs ascending times", file=path, remedy=remedy)
     return loads.TimeSeries(table[:, 0], table[:, 1:])

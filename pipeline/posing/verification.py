@@ -1,4 +1,4 @@
-"""What is kept of a structure that was simulated in another way, and the dataset of such checks."""
+"""Assembles the dataset of structures that were simulated in other ways."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 AS_RUN = "as run"
 
 
-class Numbers(NamedTuple):
-    """A structure under one check: the extremes of its load cases; fields as in the dataset."""
+class CheckResult(NamedTuple):
+    """Holds the extremes of a structure's load cases under one check; fields as in the dataset."""
 
     loss: float
     departure: float
@@ -27,13 +27,13 @@ class Numbers(NamedTuple):
     time_step: float = np.nan
 
 
-NOTHING = Numbers(np.nan, np.nan, np.nan, np.nan, 0, 0)
+NOTHING = CheckResult(np.nan, np.nan, np.nan, np.nan, 0, 0)
 
-Rows = Mapping[str, Mapping[str, Numbers]]
+Rows = Mapping[str, Mapping[str, CheckResult]]
 
 
 def assemble_verification(found: Rows, status: Mapping[str, str]) -> xr.Dataset:
-    """The dataset ``verification`` of structures by check; those without a result have a reason."""
+    """Assembles the dataset ``verification``; structures without a result have a reason."""
     import xarray as xr
 
     structures = list(found[AS_RUN])
@@ -42,7 +42,7 @@ def assemble_verification(found: Rows, status: Mapping[str, str]) -> xr.Dataset:
     ]
     columns = {
         field: np.array([[getattr(numbers, field) for numbers in row] for row in rows])
-        for field in Numbers._fields
+        for field in CheckResult._fields
     }
     return xr.Dataset(
         {name: (("check", "structure"), values) for name, values in columns.items()}

@@ -4,9 +4,7 @@ from .identity import from_canonical as from_canonical
 from .identity import section_hash as section_hash
 from .model import Problem as Problem
 from .reading import load as load
-from .reading import preset_names as preset_names
 from .sections import selected_units as selected_units
-from .sections import units_within as units_within
 from .stage_outputs import Output as Output
 from .stage_outputs import outputs as outputs
 from .unit_roles import cloak_units as cloak_units

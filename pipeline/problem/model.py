@@ -1,4 +1,4 @@
-"""The typed problem: every section of `problem.yaml`, in working units once validated."""
+"""Defines the typed problem: every section of `problem.yaml`, in working units."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Inclusion(Section):
 
 
 class Horizon(Section):
-    """How long the loss looks, in periods of the drive or in time, and at how many instants.
+    """Time over which the loss is taken, in periods of the drive or in s, and its samples.
 
     Attributes:
         periods: of the drive; or `duration`.
@@ -93,7 +93,7 @@ class Horizon(Section):
 
 
 class ConstraintLimits(Section):
-    """What can be made: lower bounds at every unit, none where a key is left out.
+    """Lower bounds at every unit that can be made, none where a key is left out.
 
     Attributes:
         edge_length: of the units.
@@ -123,7 +123,7 @@ class SolverOptions(Section):
 
 
 class ResponseOptions(Section):
-    """How much of the response the report shows.
+    """Part of the response that the report shows.
 
     Attributes:
         cycles: periods of the drive.
@@ -189,16 +189,16 @@ class Problem(Section):
 
     @property
     def static(self) -> bool:
-        """Whether the load grows so slowly that inertia plays no part."""
+        """Tells a load that grows so slowly that inertia plays no part."""
         return isinstance(self.drive, LinearRampDrive | TanhRampDrive)
 
     def asks_more_than(self, own: Problem) -> bool:
-        """Whether, as a preset of the study `own`, it is to hold against more or other loads."""
+        """Tells a preset of the study `own` that is to hold against more or other loads."""
         return self.objective.robust is not None or self.drive.kind != own.drive.kind
 
     @property
     def frequency(self) -> float | None:
-        """The frequency of the drive in Hz, where it has one."""
+        """Returns the frequency of the drive in Hz, where it has one."""
         return (
             self.drive.frequency
             if isinstance(self.drive, HarmonicDrive | RampHarmonicDrive)
@@ -207,7 +207,7 @@ class Problem(Section):
 
     @property
     def horizon_time(self) -> float:
-        """The time over which the loss is taken, in s."""
+        """Computes the time over which the loss is taken, in s."""
         if self.horizon.duration is not None:
             return self.horizon.duration
         assert self.horizon.periods is not None
@@ -216,7 +216,7 @@ class Problem(Section):
 
     @property
     def tolerances(self) -> Tolerances:
-        """By how much specimens and constants may be off: see `Prediction`."""
+        """Combines `prediction` and `robustness` to tolerances of specimens and constants."""
         tried = self.robustness
         sizes = {"geometry": tried.geometry, "ligaments": tried.stiffness} if tried else {}
         found = {name: min(given) for name, given in sizes.items() if given}

@@ -1,4 +1,4 @@
-"""Which units play which part in a problem: removed, made rigid, redesigned, looked at."""
+"""Selects units by their part in a problem: removed, made rigid, redesigned, looked at."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pipeline.problem.sections import Region, loose_units, selected_units, units
 
 
 def void_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units that the void removes, and of those it cuts loose if they are to go too."""
+    """Lists the ids of units that the void removes, and of those it cuts loose if they go too."""
     if problem.void is None:
         return ()
     inside = units_within(problem.void, problem.lattice)
@@ -17,24 +17,24 @@ def void_units(problem: Problem) -> tuple[int, ...]:
 
 
 def inclusion_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units that are made rigid."""
+    """Lists the ids of the units that are made rigid."""
     inclusion = problem.inclusion
     return () if inclusion is None else units_within(inclusion.region, problem.lattice)
 
 
 def altered_units(problem: Problem) -> set[int]:
-    """Ids of the units that are removed or made rigid: neither cloak nor surroundings."""
+    """Lists the ids of the units that are removed or made rigid: neither cloak nor surroundings."""
     return {*void_units(problem), *inclusion_units(problem)}
 
 
 def source_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the driven units within the cloak: they keep their shape to fit what drives them."""
+    """Lists the ids of driven units within the cloak: they keep their shape to fit the drive."""
     driven = selected_units(problem.drive.units, problem.lattice)
     return tuple(sorted(set(driven) & set(_cloak_inside(problem))))
 
 
 def cloak_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units to design: the cloak's that nothing else claims."""
+    """Lists the ids of the units to design: the cloak's that nothing else claims."""
     taken = {*selected_units(problem.drive.units, problem.lattice), *altered_units(problem)}
     if isinstance(problem.objective.region, Region):
         taken |= set(units_within(problem.objective.region, problem.lattice))
@@ -42,7 +42,7 @@ def cloak_units(problem: Problem) -> tuple[int, ...]:
 
 
 def _cloak_inside(problem: Problem) -> tuple[int, ...]:
-    """Ids of all units within the cloak's outer rim."""
+    """Lists the ids of all units within the cloak's outer rim."""
     if problem.cloak.around is None:
         return units_within(problem.cloak, problem.lattice)
     cores = _cores(problem)
@@ -51,7 +51,7 @@ def _cloak_inside(problem: Problem) -> tuple[int, ...]:
 
 
 def _cores(problem: Problem) -> list[Region]:
-    """What a cloak lies around: the region of interest, if there is one, or what was altered."""
+    """Lists the core of a cloak: the region of interest, if there is one, or what was altered."""
     if isinstance(problem.objective.region, Region):
         return [problem.objective.region]
     inclusion = None if problem.inclusion is None else problem.inclusion.region
@@ -59,7 +59,7 @@ def _cores(problem: Problem) -> list[Region]:
 
 
 def interest_units(problem: Problem) -> tuple[int, ...]:
-    """Ids of the units that the objective looks at.
+    """Lists the ids of the units that the objective looks at.
 
     Driven units are no surroundings to keep at rest, but they belong to those that are mimicked.
     """

@@ -7,10 +7,15 @@ import logging
 from pathlib import Path
 
 from pipeline import datasets
-from pipeline.calibration import calibration_dataset, computed_sets, fitted, unsimulated
+from pipeline.calibration import (
+    calibration_dataset,
+    computed_sets,
+    fit_calibration,
+    simulation_fault,
+)
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets import provenance
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError, write_atomically
 from sim.core import SimulationError
 
@@ -36,29 +41,31 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-    asked = section(path, Calibration)
-    fit = fitted(asked, path)
+    asked = load_section(path, Calibration)
+    fit = fit_calibration(asked, path)
     try:
-        made, found = calibration_dataset.dataset(fit)
+        made, found = calibration_dataset.assemble_calibration(fit)
     except SimulationError as error:
-        raise unsimulated(error, path) from error
+        raise simulation_fault(error, path) from error
     for line in filter(None, made.attrs["warnings"].split("\n")):
         LOG.warning("warning: %s", line)
     parents = {each.name: path.parent / each.file for each in asked.data if each.file is not None}
-    origin = provenance.recorded(
+    origin = provenance.of_recording(
         asked.model_dump_json(), parents, synthetic=asked.synthetic, role="calibration"
     )
     datasets.write(made, args.out, "calibration", origin)
-    words = calibration_dataset.fragment(fit, found, asked.title, synthetic=asked.synthetic)
+    words = calibration_dataset.material_fragment(
+        fit, found, asked.title, synthetic=asked.synthetic
+    )
     with write_atomically(args.out.with_suffix(".yaml")) as aside:
         aside.write_text(words, encoding="utf-8")
     LOG.info("%s", words.rstrip())
 
 
 def _synthesise(path: Path, args: argparse.Namespace) -> None:
-    asked = section(path, Calibration)
+    asked = load_section(path, Calibration)
     if asked.virtual is None:
         remedy = "its data are measured: run python -m pipeline calibrate FILE --out NC"
         raise UserError("nothing is virtual here", file=path, key="virtual", remedy=remedy)
-    computed_sets.write(asked, path, args.out_dir)
+    computed_sets.write_sets(asked, path, args.out_dir)
     LOG.info("%s: %s", computed_sets.LABEL, args.out_dir / computed_sets.YAML)

@@ -12,15 +12,15 @@ import xarray as xr
 from pipeline import datasets, problem
 from pipeline.comparison import (
     Compared,
-    along,
-    axis,
-    dataset,
-    measurement,
-    nominal,
+    assemble_comparison,
+    describe_comparison,
+    drive_direction,
+    find_axis,
+    interpolate_response,
+    list_quantities,
     pixel_size,
-    quantities,
-    simulation,
-    words,
+    prepare_measurement,
+    simulate_specimen,
 )
 from pipeline.datasets import provenance
 from pipeline.posing import read_design, scene_of, structures_of
@@ -29,7 +29,7 @@ from pipeline.runtime import UserError
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built
-from pipeline.virtual_lab import of_structure
+from pipeline.virtual_lab import select_structure
 
 LOG = logging.getLogger(__name__)
 
@@ -41,16 +41,16 @@ def work(args: argparse.Namespace) -> None:
         UserError: the recording and the study do not belong together, or cannot be aligned.
     """
     asked = problem.load(args.problem, args.preset)
-    recording = recordings.load(args.recording)
+    recording = recordings.load_recording(args.recording)
     files = {name: getattr(args, name) for name in ("design", "response", "track")}
     try:
         made = compared(asked, recording, args)
     except UserError as error:
         error.file = error.file or str(args.recording)
         raise
-    told = dataset(made)
+    told = assemble_comparison(made)
     origin = {
-        **provenance.attributes(asked, "compare", parents=files, plan=_plan(made)),
+        **provenance.of_study(asked, "compare", parents=files, plan=_plan(made)),
         "recording": recording.model_dump_json(),
         "synthetic": made.measurement.track.attrs["synthetic"],
     }
@@ -71,18 +71,20 @@ def compared(asked: Problem, recording: Recording, args: argparse.Namespace) -> 
     provenance.check_parent(whole, args.response, "design", args.design)
     response = chosen(whole, recording)
     built = as_built(design, recording.structure)
-    measured = measurement(datasets.read(args.track, "track"), built)
-    shown = axis(measured.time, measured.drive, response, static=asked.static)
+    measured = prepare_measurement(datasets.read(args.track, "track"), built)
+    shown = find_axis(measured.time, measured.drive, response, static=asked.static)
     structure = structures_of(scene_of(asked, args.problem.parent), design)[recording.structure]
-    way = along(response)
+    way = drive_direction(response)
     inside = measured.compared & (built["roi"].values == 1)
     every = whole.isel(case=recording.case)
     return Compared(
         measurement=measured,
         axis=shown,
-        simulation=simulation(asked, structure, measured.track, measured.time, way, args.threads),
-        nominal=nominal(response, shown.time),
-        quantities=quantities(asked, every, shown.time, inside),
+        simulation=simulate_specimen(
+            asked, structure, measured.track, measured.time, way, args.threads
+        ),
+        nominal=interpolate_response(response, shown.time),
+        quantities=list_quantities(asked, every, shown.time, inside),
         design=built,
         frequency=np.nan if asked.frequency is None else asked.frequency,
         level=asked.prediction.level,
@@ -99,7 +101,7 @@ def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
     Raises:
         UserError: the response has none such.
     """
-    one = of_structure(response, recording.structure)
+    one = select_structure(response, recording.structure)
     if recording.case >= (cases := one.sizes["case"]):
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError(
@@ -124,7 +126,7 @@ def _words(asked: Problem, recording: Recording, made: Compared) -> dict[str, st
         "title": recording.title or f"{recording.structure} structure",
         "structure": recording.structure,
         "case": str(recording.case),
-        **words(asked, made),
+        **describe_comparison(asked, made),
     }
 
 

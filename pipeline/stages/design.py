@@ -20,7 +20,7 @@ from pipeline.posing import (
     loss_units,
     network_variables,
     spread,
-    start_of,
+    start_vector,
     unit_coordinates,
 )
 from pipeline.problem import Problem
@@ -61,12 +61,12 @@ def work(args: argparse.Namespace) -> None:
     _check_symmetry(scene, args.problem)
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    start = start_of(asked, scene, args.start, args.problem)
+    start = start_vector(asked, scene, args.start, args.problem)
     result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent, start)
     LOG.info("stopped: %s", result.reason)
     made = design_dataset(asked, scene, result)
     parents = {} if args.start is None else {"start": args.start}
-    origin = provenance.attributes(
+    origin = provenance.of_study(
         asked, "design", method=args.method, parents=parents, plan=plan.record()
     )
     datasets.write(made, args.out, "design_method", origin)
@@ -130,10 +130,10 @@ def optimise(
                 )
         except InfeasibleStartError as error:
             constraints = ConstraintVector(scene.space, limits_of(asked))
-            raise failures.infeasible(error, constraints, source) from error
+            raise failures.infeasible_start(error, constraints, source) from error
         except SimulationError as error:
-            tried = failures.Simulated(source, scene, "initial", plan.solver.output_times)
-            raise failures.unsolved(error, tried, None) from error
+            tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)
+            raise failures.simulation_failure(error, tried, None) from error
         except JournalInUseError as error:
             raise UserError(str(error), file=source) from error
 

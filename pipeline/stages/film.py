@@ -13,21 +13,22 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
 from pipeline.runtime import UserError, cli, found_in, write_atomically
-from pipeline.tracking.frames import WORD, Recording
+from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import of_design
+from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import (
-    encode,
-    ground_truth,
+    assemble_truth,
+    encode_video,
+    load_cell_log,
     noise_planning,
-    of_case,
-    of_structure,
-    prepared,
+    prepare_film,
+    select_case,
+    select_structure,
 )
 
 LOG = logging.getLogger(__name__)
 
-SYNTHETIC = f"{WORD}: rendered from a simulation, not filmed"
+SYNTHETIC = f"{SYNTHETIC_LABEL}: rendered from a simulation, not filmed"
 
 
 def work(args: argparse.Namespace) -> None:
@@ -45,40 +46,36 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _plan(args: argparse.Namespace) -> None:
-    import csv
+    import pandas as pd
 
     asked = recordings.Recording(virtual=VirtualRecording())
     if args.recording is not None:
-        asked = recordings.load(args.recording)
+        asked = recordings.load_recording(args.recording)
     response = datasets.read(args.response, "response")
     structure = args.structure or asked.structure
     case = asked.case if args.case is None else args.case
-    base = noise_planning.Choice(
+    base = noise_planning.PlannedSetup(
         "bare" if asked.specimen == "auto" else asked.specimen,
         asked.virtual or VirtualRecording(),
-        of_design(of_structure(response, structure)).pitch,
+        outlines_of_design(select_structure(response, structure)).pitch,
     )
     values = (args.specimen, args.pixels_per_pitch, args.fps, args.codec, args.marker)
-    chosen = noise_planning.choices(
-        base, noise_planning.Options(*(tuple(each or ()) for each in values))
+    chosen = noise_planning.setup_combinations(
+        base, noise_planning.SetupOptions(*(tuple(each or ()) for each in values))
     )
     rows = []
     with cli.progress(len(chosen), "planning") as bar:
         for choice in chosen:
-            found = noise_planning.expected(response, structure, case, choice, args.frames)
+            found = noise_planning.expected_noise(response, structure, case, choice, args.frames)
             rows.append({**choice.words, **found.words})
             bar.update()
     LOG.info("%s; errors of clips of %d frames", SYNTHETIC, args.frames)
-    for line in noise_planning.table(rows):
+    table = pd.DataFrame(rows)
+    for line in table.to_string(index=False).splitlines():
         LOG.info("%s", line)
     if args.csv is not None:
-        with (
-            write_atomically(args.csv) as aside,
-            aside.open("w", encoding="utf-8", newline="") as file,
-        ):
-            table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            table.writeheader()
-            table.writerows(rows)
+        with write_atomically(args.csv) as aside:
+            table.to_csv(aside, index=False, lineterminator="\n")
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
@@ -90,33 +87,31 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
             remedy=f"name it *{virtual.codec.suffixes[0]}",
         )
     parents = {"response": response, "design": design}
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=True)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=True)
     with found_in(path):
-        film = prepared(_shown(asked, response), asked.structure, asked.specimen, virtual)
+        film = prepare_film(_shown(asked, response), asked.structure, asked.specimen, virtual)
     title = asked.title or path.stem
-    labels = {"title": f"{WORD}: {title}", "comment": SYNTHETIC}
+    labels = {"title": f"{SYNTHETIC_LABEL}: {title}", "comment": SYNTHETIC}
     with cli.progress(len(film.motion.time), f"rendering {path.stem}") as bar:
-        encode(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
-    made = ground_truth.assemble_truth(film.response, film.present, film.motion, film.scene.view)
+        encode_video(out, film.images(bar.update), virtual.rate, virtual.codec, labels)
+    made = assemble_truth(film.response, film.present, film.motion, film.scene.view)
     datasets.write(made, out.with_name(f"{out.stem}_truth.nc"), "truth", origin)
     comments = (
         SYNTHETIC,
         "Written by the stage film; python -m pipeline track takes it.",
     )
     with write_atomically(out.with_suffix(".yaml")) as aside:
-        text = recordings.text(_described(asked, virtual, out, design), comments)
+        text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
 
 
 def _weigh(path: Path, response: Path, out: Path) -> None:
-    from pipeline.virtual_lab import log
-
     asked, virtual = _virtual(path)
     if virtual.load_cell is None:
         remedy = "describe the load cell there"
         raise UserError("no load cell", file=path, key="virtual.load_cell", remedy=remedy)
     with found_in(path):
-        lines = log(_shown(asked, response), virtual, virtual.load_cell)
+        lines = load_cell_log(_shown(asked, response), virtual, virtual.load_cell)
     with write_atomically(out) as aside, aside.open("w", encoding="utf-8") as file:
         file.write(f"# {SYNTHETIC}\ntime,force\n")
         file.writelines(f"{time:.4f},{force:.5f}\n" for time, force in lines)
@@ -124,7 +119,7 @@ def _weigh(path: Path, response: Path, out: Path) -> None:
 
 def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
     """A recording and how it is rendered."""
-    asked = recordings.load(path)
+    asked = recordings.load_recording(path)
     if asked.virtual is None:
         remedy = "track it (python -m pipeline track), or say under `virtual` how to render it"
         raise UserError("a recording that was filmed", file=path, key="video", remedy=remedy)
@@ -136,7 +131,7 @@ def _shown(asked: Recording, response: Path) -> xr.Dataset:
     assert asked.virtual is not None
     if asked.virtual.specimen is not None:
         return datasets.read(response, "specimen")
-    return of_case(datasets.read(response, "response"), asked.structure, asked.case)
+    return select_case(datasets.read(response, "response"), asked.structure, asked.case)
 
 
 def _described(

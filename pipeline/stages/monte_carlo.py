@@ -17,7 +17,7 @@ LOG = logging.getLogger(__name__)
 
 def work(args: argparse.Namespace) -> None:
     """Simulates a part of the copies, or joins all parts."""
-    chunked.work(args, _run, "scatter", "sample")
+    chunked.run_or_gather(args, _run, "scatter", "sample")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -36,5 +36,5 @@ def _run(args: argparse.Namespace) -> None:
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)
     parents = {"design": args.design}
-    origin = provenance.attributes(asked, "monte_carlo", parents=parents)
+    origin = provenance.of_study(asked, "monte_carlo", parents=parents)
     datasets.write(made, args.out, "scatter", origin)

@@ -45,7 +45,7 @@ def work(args: argparse.Namespace) -> None:
     LOG.info("stopped: %s", result.reason)
     made = join({METHOD: design_dataset(posed, scene, result)}, METHOD)
     parents = {"design": args.design, "response": args.response}
-    origin = provenance.attributes(asked, "redesign", parents=parents, plan=plan.record())
+    origin = provenance.of_study(asked, "redesign", parents=parents, plan=plan.record())
     datasets.write(made, args.out, "design", origin)
 
 

@@ -49,7 +49,7 @@ def work(args: argparse.Namespace) -> None:
         remedy = "give plain=results/fig2/design.nc broadband=results/fig2@broadband/design.nc"
         raise UserError(what, key="--designs", remedy=remedy)
     made = gains(args.problem, given)
-    origin = provenance.attributes(problem.load(args.problem), "robust_gains", parents=given)
+    origin = provenance.of_study(problem.load(args.problem), "robust_gains", parents=given)
     datasets.write(made, args.out, "gains", origin)
 
 

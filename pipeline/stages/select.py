@@ -42,7 +42,7 @@ def work(args: argparse.Namespace) -> None:
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)
     parents = {path.stem: path for path in args.designs}
-    origin = provenance.attributes(asked, "select", parents=parents, plan={"shipped": best})
+    origin = provenance.of_study(asked, "select", parents=parents, plan={"shipped": best})
     datasets.write(join(designs, best), args.out, "design", origin)
 
 

@@ -48,9 +48,9 @@ def work(args: argparse.Namespace) -> None:
     except StoppedError as stopped:
         kept = _keep(asked, structures, stopped, args)
         scene = structures[stopped.name].scene
-        tried = failures.Simulated(args.problem, scene, stopped.name, stopped.asked)
-        raise failures.unsolved(stopped.error, tried, kept) from stopped
-    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
+        tried = failures.SimulatedStructure(args.problem, scene, stopped.name, stopped.asked)
+        raise failures.simulation_failure(stopped.error, tried, kept) from stopped
+    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, args.out, "response", origin)
 
 
@@ -83,7 +83,7 @@ def _keep(
     except StoppedError as again:
         return _keep(asked, shorter, again, args)
     out: Path = args.out.with_name(f"{args.out.stem}_partial.nc")
-    origin = provenance.attributes(asked, "simulate", parents={"design": args.design}, plan=plans)
+    origin = provenance.of_study(asked, "simulate", parents={"design": args.design}, plan=plans)
     datasets.write(made, out, "response", origin)
     return out
 

@@ -16,6 +16,7 @@ from pipeline.posing import (
     PosedStructure,
     Variables,
     case_directions,
+    compute_bands,
     lattice_of,
     network_variables,
     read_design,
@@ -23,7 +24,6 @@ from pipeline.posing import (
     spread,
     structures_of,
     unit_coordinates,
-    waves,
 )
 from pipeline.problem import Problem
 from pipeline.problem.sections import Spectrum
@@ -64,7 +64,7 @@ def work(args: argparse.Namespace) -> None:
     except UserError as error:
         error.file = error.file or str(args.problem)
         raise
-    origin = provenance.attributes(asked, "spectrum", parents={"design": args.design})
+    origin = provenance.of_study(asked, "spectrum", parents={"design": args.design})
     datasets.write(made, args.out, "spectrum", origin)
 
 
@@ -95,7 +95,7 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
         "frequency": (_MODE, parts.frequency),
         "mode_shape": ((*_MODE, "unit", "dof"), parts.mode_shape),
         "transmission": (("structure", "state", "case", "excitation"), parts.transmission),
-        **waves(asked, wanted),
+        **compute_bands(asked, wanted),
     }
     coordinates: Variables = {
         **unit_coordinates(intact),

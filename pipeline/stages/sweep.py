@@ -14,7 +14,7 @@ from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
 from pipeline.posing import loss_units, read_design, setting_losses
 from pipeline.problem import Problem
-from pipeline.problem.sections import DirectionGroup, Word, sweep_cases, taken_apart
+from pipeline.problem.sections import DirectionGroup, SettingValue, split_value, sweep_cases
 from pipeline.runtime import CaseLog, SweepResult, UserError, case_log, cli, source_hash
 from sim.core import SimulationError
 
@@ -23,7 +23,7 @@ LOG = logging.getLogger(__name__)
 
 def work(args: argparse.Namespace) -> None:
     """Computes a part of the cases, or joins all parts."""
-    chunked.work(args, _run, "sweep", "case")
+    chunked.run_or_gather(args, _run, "sweep", "case")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -40,7 +40,7 @@ def _run(args: argparse.Namespace) -> None:
     words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.stages.sweep"))
     key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())
     folder = args.out.parent / ".journal" / f"sweep_{key.hexdigest()[:16]}"
-    here = sweep_cases.part(asked.sweep, args.chunk, args.chunks)
+    here = sweep_cases.select_groups(asked.sweep, args.chunk, args.chunks)
     found = case_log.known(folder)
     path = folder / f"part_{args.chunk}.csv"
     with case_log.CaseLog(path, asked.sweep.keys) as book:
@@ -48,7 +48,7 @@ def _run(args: argparse.Namespace) -> None:
         _simulate(args, asked, design["vertices"], here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
     LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
-    origin = provenance.attributes(asked, "sweep", parents=parents)
+    origin = provenance.of_study(asked, "sweep", parents=parents)
     datasets.write(made, args.out, "sweep", origin)
 
 
@@ -88,14 +88,16 @@ def _results(
 
 
 def dataset(
-    asked: Problem, cases: Sequence[tuple[int, dict[str, Word]]], found: dict[int, SweepResult]
+    asked: Problem,
+    cases: Sequence[tuple[int, dict[str, SettingValue]]],
+    found: dict[int, SweepResult],
 ) -> xr.Dataset:
     """The dataset ``sweep`` of some cases."""
     assert asked.sweep is not None
     keys = asked.sweep.keys
     numbers = [number for number, _ in cases]
     words = [[setting[key] for key in keys] for _, setting in cases]
-    values = [[(taken_apart(word) or (np.nan,))[0] for word in row] for row in words]
+    values = [[(split_value(word) or (np.nan,))[0] for word in row] for row in words]
     of_case = {
         name: ("case", [getattr(found[number], name) for number in numbers])
         for name in ("loss", "loss_altered", "min_void_angle", "status")
@@ -112,7 +114,7 @@ def dataset(
             "parameter": list(keys),
             "parameter_units": (
                 "parameter",
-                [sweep_cases.unit_of(asked.sweep, key) for key in keys],
+                [sweep_cases.parameter_unit(asked.sweep, key) for key in keys],
             ),
         },
     )

@@ -18,21 +18,21 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
-    WORD,
+    SYNTHETIC_LABEL,
     Recording,
-    frames,
+    frame_count,
+    has_uneven_intervals,
     import_video,
-    length,
     load_cell,
+    read_frames,
     recording,
     rendered,
-    uneven,
 )
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import as_built, of_design
-from pipeline.tracking.motion import Track, follow
-from pipeline.tracking.output import assemble_track, dic_points, is_driven, track_table
-from pipeline.tracking.reference_frame import Setup, proposal
+from pipeline.tracking.geometry import as_built, outlines_of_design
+from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
+from pipeline.tracking.reference_frame import RecordingSetup, proposal
 
 LOG = logging.getLogger(__name__)
 
@@ -62,18 +62,18 @@ def _points(path: Path, args: argparse.Namespace) -> None:
     design = as_built(datasets.read(source, "design"), asked.structure)
     held = path.parent / asked.points
     with found_in(path):
-        made = dic_points.track(design, dic_points.cloud(held, asked))
+        made = dic_points.track(design, dic_points.read_points(held, asked))
     parents = {"design": source, "points": held}
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=asked.synthetic)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=asked.synthetic)
     datasets.write(made, args.out, "track", origin)
-    track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
 
 
 def _init(video: Path, args: argparse.Namespace) -> None:
     import cv2
 
     design = datasets.read(args.design, "design")
-    first = next(frames(video, rate=1.0), None)
+    first = next(read_frames(video, rate=1.0), None)
     if first is None:
         raise UserError("the video has no frames", file=video, remedy="give another file")
     scale = None if args.pixel_size is None else 1 / args.pixel_size
@@ -90,15 +90,15 @@ def _init(video: Path, args: argparse.Namespace) -> None:
         "window": {"start": "0 s"},
         "synthetic": rendered(video) or None,
     }
-    note = WORD if rendered(video) else ""
+    note = SYNTHETIC_LABEL if rendered(video) else ""
     with write_atomically(drawn) as aside:
         aside.write_bytes(
-            cv2.imencode(".png", proposal.picture(first.image, found, note))[1].tobytes()
+            cv2.imencode(".png", proposal.draw_proposal(first.image, found, note))[1].tobytes()
         )
     with write_atomically(out) as aside:
         comments = ("What the first frame did not tell:", *found.doubts)
-        aside.write_text(recording.text(values, comments), encoding="utf-8")
-    seen = f"{len(found.sighting.unit)} of {found.specimen.count} units, {found.kind}"
+        aside.write_text(recording.recording_yaml(values, comments), encoding="utf-8")
+    seen = f"{len(found.detection.unit)} of {found.specimen.count} units, {found.kind}"
     LOG.info("%s: %s, %.4g mm/px; see %s", out, seen, found.pixel_size, drawn)
     for doubt in found.doubts:
         LOG.info("not told: %s", doubt)
@@ -123,10 +123,10 @@ def _track(path: Path, args: argparse.Namespace) -> None:
     if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
         remedy = f"python -m pipeline track init {path} --design NC proposes a recording of it"
         raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)
-    asked = recordings.load(path)
+    asked = recordings.load_recording(path)
     video, source = _sources(asked, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
-    if asked.load_axis == "driven displacement" and not is_driven(design).any():
+    if asked.load_axis == "driven displacement" and not driven_units(design).any():
         remedy = "write `load_axis: time`, or give the design of a study with driven units"
         raise UserError(
             "the design has no driven units",
@@ -144,9 +144,9 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         force = load_cell.forces(log, track.start + track.time)
     made = assemble_track(design, track, force)
     synthetic = asked.synthetic or rendered(video)
-    origin = provenance.recorded(asked.model_dump_json(), parents, synthetic=synthetic)
+    origin = provenance.of_recording(asked.model_dump_json(), parents, synthetic=synthetic)
     datasets.write(made, args.out, "track", origin)
-    track_table.write(made.assign_attrs(origin), args.out.with_suffix(".csv"))
+    write_track_table(made.assign_attrs(origin), args.out.with_suffix(".csv"))
     if isinstance(track.ended, KeyboardInterrupt):
         LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended
@@ -193,15 +193,15 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         UserError: naming the recording's file where the video does not show the design.
     """
     end = np.inf if asked.window.end is None else asked.window.end
-    shown = frames(video, asked.window.start, end, asked.frame_rate)
+    shown = read_frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
     with found_in(source):
-        setup = Setup(
+        setup = RecordingSetup(
             asked.thickness, asked.camera_distance, asked.specimen, asked.turned, asked.mirrored
         )
-        with cli.progress(length(video), "tracking") as bar:
-            track = follow(shown, of_design(design), scale, bar.update, setup)
-    if uneven(track.time):
+        with cli.progress(frame_count(video), "tracking") as bar:
+            track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
+    if has_uneven_intervals(track.time):
         LOG.warning("warning: the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))
     LOG.info(

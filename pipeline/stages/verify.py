@@ -15,7 +15,7 @@ from pipeline.posing import (
     AS_RUN,
     UNSTABLE,
     CaseResult,
-    Numbers,
+    CheckResult,
     assemble_verification,
     loss_units,
     read_design,
@@ -48,7 +48,7 @@ def work(args: argparse.Namespace) -> None:
         )
     design = read_design(asked, args.design)
     made = checks(asked, args.problem.parent, design, args.threads)
-    origin = provenance.attributes(asked, "verify", parents={"design": args.design})
+    origin = provenance.of_study(asked, "verify", parents={"design": args.design})
     datasets.write(made, args.out, "verification", origin)
 
 
@@ -84,7 +84,7 @@ def checks(asked: Problem, folder: Path, design: xr.Dataset, threads: int = 1) -
 
 def _finer_loads(
     asked: Problem, folder: Path, design: xr.Dataset, threads: int
-) -> tuple[dict[str, dict[str, Numbers]], dict[str, str]]:
+) -> tuple[dict[str, dict[str, CheckResult]], dict[str, str]]:
     """Numbers by check and structure of a path of equilibria, and why a check has none."""
     posed = variants(asked)
     tables: dict[str, Table] = {}
@@ -118,12 +118,12 @@ def _share(asked: Problem, variant: Problem) -> float:
     return float(np.sqrt(asked.horizon.steps / variant.horizon.steps)) if mimics else 1.0
 
 
-def _numbers(cases: list[CaseResult], as_run: list[CaseResult], share: float) -> Numbers:
+def _numbers(cases: list[CaseResult], as_run: list[CaseResult], share: float) -> CheckResult:
     apart = [
         np.linalg.norm((one.displacement - other.displacement)[..., :2], axis=-1).max()
         for one, other in zip(cases, as_run, strict=True)
     ]
-    return Numbers(
+    return CheckResult(
         loss=share * float(np.mean([case.loss for case in cases])),
         departure=float(max(apart)),
         min_void_angle=min(float(case.observables.void_angle.min()) for case in cases),

@@ -25,7 +25,7 @@ from pipeline.problem import Problem
 from pipeline.runtime import UserError, found_in
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
-from pipeline.virtual_lab import specimen
+from pipeline.virtual_lab import make_specimen
 from sim.core import Floats, SimulationError
 from sim.scene import Scene, simulate
 
@@ -36,12 +36,12 @@ def work(args: argparse.Namespace) -> None:
     Raises:
         UserError: the recording has no specimen, or it cannot be made or simulated.
     """
-    recording = recordings.load(args.recording)
+    recording = recordings.load_recording(args.recording)
     asked = problem.load(args.problem, args.preset)
     held = structures_of(scene_of(asked, args.problem.parent), read_design(asked, args.design))
     with found_in(args.recording):
         made = dataset(asked, held, recording)
-    origin = provenance.attributes(asked, "virtual_specimen", parents={"design": args.design})
+    origin = provenance.of_study(asked, "virtual_specimen", parents={"design": args.design})
     told = {"recording": recording.model_dump_json(), "synthetic": "yes"}
     datasets.write(made, args.out, "specimen", origin | told)
 
@@ -63,7 +63,7 @@ def dataset(asked: Problem, held: dict[str, PosedStructure], recording: Recordin
         raise UserError("the recording has no specimen", key="virtual.specimen", remedy=remedy)
     structure = _asked_for(held, recording)
     times = _times(asked, structure.scene, virtual.specimen.unload)
-    made = specimen(structure, recording.case, virtual.specimen, times[-1])
+    made = make_specimen(structure, recording.case, virtual.specimen, times[-1])
     return _described(asked, held["altered"].scene, made, recording.case, times)
 
 

@@ -1,1 +1,1 @@
-"""From the video of a specimen to the motions of its units; knows nothing of the simulation."""
+"""Tracks the units of a specimen through a video; knows nothing of the simulation."""

@@ -1,4 +1,4 @@
-"""Where the camera stands, and what that makes of the specimen's plane and its depth."""
+"""Poses the camera of the virtual lab before the specimen's plane."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.problem.sections import Viewing
+from pipeline.problem.sections import CameraView
 from pipeline.tracking.geometry import Camera
 from sim.core import Floats
 
 
 class Viewpoint(NamedTuple):
-    """A camera in front of the specimen.
+    """Holds a camera in front of the specimen.
 
     Attributes:
         camera: of the plane of the units' faces.
@@ -23,13 +23,13 @@ class Viewpoint(NamedTuple):
     eye: Floats
 
     def behind(self, points: Floats, depth: float) -> Floats:
-        """Places (..., 2) in the faces' plane where points so far behind it are seen, mm."""
+        """Projects points so far behind the faces' plane to places (..., 2) on it, mm."""
         foot, height = self.eye[:2], self.eye[2]
         return foot + (points - foot) * (height / (height + depth))
 
 
-def viewpoint(asked: Viewing, middle: Floats) -> Viewpoint:
-    """The camera that looks at ``middle`` (2,) of the specimen, mm.
+def viewpoint(asked: CameraView, middle: Floats) -> Viewpoint:
+    """Poses the camera that looks at ``middle`` (2,) of the specimen, mm.
 
     A pinhole with radial distortion: the focal length follows from distance and pixel size. It
     leans over by the tilt about x, then y, and is rolled about its axis.

@@ -1,4 +1,4 @@
-"""Exact coverage of pixels by polygons: what a pixel integrates, without samples.
+"""Computes the exact coverage of pixels by polygons: what a pixel integrates, without samples.
 
 Every edge adds to a buffer by how much the coverage changes from one pixel of a row to the next;
 its running sum along the rows is the picture. It is linear, so polygons that lie within others
@@ -17,7 +17,7 @@ from sim.core import Floats, Ints
 
 
 class NestedPolygons(NamedTuple):
-    """Closed polygons, one behind the other.
+    """Holds closed polygons, one behind the other.
 
     Attributes:
         points: (n, 2) vertices, column and row.
@@ -31,8 +31,8 @@ class NestedPolygons(NamedTuple):
     shade: Floats
 
 
-def picture(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
-    """Mean shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5.
+def coverage_image(rings: NestedPolygons, shape: tuple[int, int]) -> Floats:
+    """Averages the shade (rows, columns) over each pixel; pixel (0, 0) reaches from -0.5 to 0.5.
 
     Args:
         rings: in pixels.
@@ -73,7 +73,7 @@ def _edge(a: Floats, b: Floats, shade: float, change: Floats) -> None:
 
 @inlined
 def _mean_excess(value: float, left: float, right: float) -> float:
-    """Mean of max(value - x, 0) for x from left to right."""
+    """Returns the mean of max(value - x, 0) for x from left to right."""
     if value <= left:
         return 0.0
     if value >= right:

@@ -1,4 +1,4 @@
-"""What is on the faces of the units: dots, speckle, or nothing."""
+"""Draws marks on the faces of the units: dots, speckle, or nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _TRIES = 12  # for each speckle that would fit
 _RIM = 0.15  # mm between a speckle and the rim of the face
 
 
-class Marks(NamedTuple):
+class FaceMarks(NamedTuple):
     """Discs on the faces.
 
     Attributes:
@@ -31,8 +31,8 @@ class Marks(NamedTuple):
     diameter: Floats
 
 
-def marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int) -> Marks:
-    """The marks of all units of a kind of specimen: dots, speckle or bare."""
+def draw_marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int) -> FaceMarks:
+    """Draws the marks of all units of a kind of specimen: dots, speckle or bare."""
     of_unit = {"dots": _dots, "speckle": _speckle}.get(kind)
     found = (
         []
@@ -44,7 +44,7 @@ def marks(specimen: SpecimenOutlines, kind: str, look: UnitAppearance, seed: int
         ]
     )
     table = np.array(found, float).reshape(-1, 4)
-    return Marks(table[:, 0].astype(np.int64), table[:, 1:3], table[:, 3])
+    return FaceMarks(table[:, 0].astype(np.int64), table[:, 1:3], table[:, 3])
 
 
 Disc = tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""The specimen as the camera sees it at one instant: nested polygons with their shades.
+"""Projects the specimen at one instant to nested polygons with their shades.
 
 Board; before it the side walls and the ligaments, which are one shade and therefore one region;
 before these the faces; on the faces the marks. Each lies within the one before it, so exact
@@ -16,7 +16,7 @@ from pipeline.problem.sections import UnitAppearance
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.virtual_lab.camera_pose import Viewpoint
 from pipeline.virtual_lab.coverage import NestedPolygons
-from pipeline.virtual_lab.face_marks import Marks
+from pipeline.virtual_lab.face_marks import FaceMarks
 from sim.core import Floats, Ints
 
 _PIECE = 2.0  # longest piece of an edge, mm: the lens bends edges
@@ -24,7 +24,7 @@ _CORNERS = 32  # of a disc
 
 
 class FilmScene(NamedTuple):
-    """What is filmed.
+    """Holds what is filmed.
 
     Attributes:
         specimen: the units.
@@ -36,7 +36,7 @@ class FilmScene(NamedTuple):
 
     specimen: SpecimenOutlines
     ligament: Ints
-    marks: Marks
+    marks: FaceMarks
     look: UnitAppearance
     view: Viewpoint
 
@@ -47,8 +47,8 @@ class _Layer(NamedTuple):
     shade: float
 
 
-def seen(scene: FilmScene, pose: Floats) -> NestedPolygons:
-    """All polygons, in pixels, with the shades they add to the board's.
+def nested_polygons(scene: FilmScene, pose: Floats) -> NestedPolygons:
+    """Projects all polygons to pixels, with the shades they add to the board's.
 
     Args:
         scene: what is filmed.
@@ -71,7 +71,7 @@ def seen(scene: FilmScene, pose: Floats) -> NestedPolygons:
 
 
 def _placed(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
-    """Points (n, m, 2) relative to the centroids of units (n,), where these have gone."""
+    """Moves points (n, m, 2) relative to the centroids of units (n,) with these."""
     cos, sin = np.cos(pose[unit, 2, None]), np.sin(pose[unit, 2, None])
     x, y = points[..., 0], points[..., 1]
     turned = np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
@@ -79,7 +79,7 @@ def _placed(points: Floats, unit: Ints, pose: Floats, centre: Floats) -> Floats:
 
 
 def _sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
-    """The one region of faces, side walls and ligaments, as polygons."""
+    """Unites faces, side walls and ligaments to one region of polygons."""
     parts = [faces]
     if depth := scene.look.thickness:
         parts += _walls(scene, corners, depth)
@@ -90,23 +90,20 @@ def _sides(scene: FilmScene, faces: Floats, corners: Floats) -> Floats:
 
 
 def _walls(scene: FilmScene, corners: Floats, depth: float) -> list[Floats]:
-    """The backs of the units and the walls below their edges, as seen in the faces' plane."""
+    """Projects the backs of the units and the walls below their edges on the faces' plane."""
     back = scene.view.behind(corners, depth)
     backs, walls = [], []
     for front, rear in zip(corners, back, strict=True):
         there = ~np.isnan(front[:, 0])
-        backs.append(shapely.Polygon(rear[there]))
-        walls.append(_walls_below(front[there], rear[there]))
+        face, behind = front[there], rear[there]
+        backs.append(shapely.Polygon(behind))
+        sides = [face, np.roll(face, -1, axis=0), np.roll(behind, -1, axis=0), behind]
+        walls.append(np.stack(sides, axis=1))  # (edges, 4, 2) corners of the wall below every edge
     return [np.array(backs), shapely.convex_hull(shapely.multipoints(np.concatenate(walls)))]
 
 
-def _walls_below(front: Floats, rear: Floats) -> Floats:
-    """Corners (edges, 4, 2) of the wall below every edge."""
-    return np.stack([front, np.roll(front, -1, axis=0), np.roll(rear, -1, axis=0), rear], axis=1)
-
-
 def _layer(shapes: Floats, shade: float) -> _Layer:
-    """Rings of polygons, counter-clockwise, holes the other way."""
+    """Collects rings of polygons, counter-clockwise, holes the other way."""
     cut = shapely.orient_polygons(shapely.segmentize(shapes, _PIECE))
     rings = shapely.get_rings(shapely.get_parts(cut))
     sizes = shapely.get_num_coordinates(rings) - 1
@@ -116,7 +113,7 @@ def _layer(shapes: Floats, shade: float) -> _Layer:
 
 
 def _discs(scene: FilmScene, pose: Floats) -> _Layer:
-    """The marks as polygons of their area."""
+    """Draws the marks as polygons of their area."""
     marks = scene.marks
     angle = 2 * np.pi / _CORNERS * np.arange(_CORNERS)
     swell = np.sqrt(angle[1] / np.sin(angle[1]))

@@ -1,4 +1,4 @@
-"""Where the units of a response are at the instants that a video shows."""
+"""Samples a response at the instants that a video, and its load cell, show."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from pipeline.problem.sections import VirtualRecording
+from pipeline.problem.sections import VirtualLoadCell, VirtualRecording
 from pipeline.runtime import UserError
 from sim.core import Floats, Mask
 
 _FINEST = 0.3  # px between the instants of an exposure
 _MOST = 9
+_NOISE_STREAM = 3
+"""First word of the seed of a load cell's noise: no frame has it."""
 
 
 class FilmedMotion(NamedTuple):
-    """Poses of the units that are present, over the frames.
+    """Holds poses of the units that are present, over the frames.
 
     Attributes:
         time: (frames,) of the video, at mid-exposure, s.
@@ -30,8 +32,8 @@ class FilmedMotion(NamedTuple):
     instants: Floats
 
 
-class Clock(NamedTuple):
-    """Which time of the response a video shows at which of its own.
+class FilmClock(NamedTuple):
+    """Maps times of a video to times of the response.
 
     Attributes:
         frames: number of them.
@@ -52,8 +54,8 @@ class Clock(NamedTuple):
         return np.clip(moved, self.start, self.end)
 
 
-def clock(given: Floats, asked: VirtualRecording) -> Clock:
-    """The clock of a video of a response with samples at the times ``given``, s.
+def film_clock(given: Floats, asked: VirtualRecording) -> FilmClock:
+    """Makes the clock of a video of a response with samples at the times ``given``, s.
 
     Raises:
         UserError: nothing is in the window.
@@ -65,11 +67,11 @@ def clock(given: Floats, asked: VirtualRecording) -> Clock:
         raise UserError(what, key="virtual.start", value=asked.start, remedy=remedy)
     pace = 1.0 if asked.duration is None else (end - asked.start) / asked.duration
     frames = 1 + int(np.floor((asked.still + (end - asked.start) / pace) * asked.rate + 1e-9))
-    return Clock(frames, asked.start, end, asked.still, pace)
+    return FilmClock(frames, asked.start, end, asked.still, pace)
 
 
-def motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMotion:
-    """The motion of a structure under one load case, sampled by the frames.
+def sample_motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMotion:
+    """Samples the motion of a structure under one load case by the frames.
 
     Between the samples of the response, a cubic spline; before the start, its first state.
 
@@ -83,7 +85,7 @@ def motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMot
     """
     states = one["displacement"].transpose("time", "unit", "dof").values
     given = one["time"].values
-    of_video = clock(given, asked)
+    of_video = film_clock(given, asked)
     course = CubicSpline(given, states[:, present])
     time = np.arange(of_video.frames) / asked.rate
 
@@ -97,7 +99,32 @@ def motion(one: xr.Dataset, present: Mask, asked: VirtualRecording) -> FilmedMot
 
 
 def _instants(pose: Floats, asked: VirtualRecording) -> int:
-    """How many instants make an exposure smooth."""
+    """Counts the instants that make an exposure smooth."""
     step = float(np.abs(np.diff(pose[..., :2], axis=0)).max(initial=0.0))
     smear = step * asked.rate * asked.sensor.exposure / asked.camera.pixel_size
     return int(np.clip(np.ceil(smear / _FINEST), 1, _MOST))
+
+
+def load_cell_log(one: xr.Dataset, asked: VirtualRecording, cell: VirtualLoadCell) -> Floats:
+    """Times and forces (lines, 2) of a load cell, on its own clock: s, N.
+
+    A force is positive where the drive pushes along its direction. The log begins at zero of its
+    clock and ends a little after the video.
+
+    Args:
+        one: a response at one structure and one case, or a specimen.
+        asked: the set-up of the video.
+        cell: the load cell.
+
+    Raises:
+        UserError: the video shows nothing of the response.
+    """
+    angle = np.deg2rad(float(one["direction"]))
+    given = one["time"].values
+    force = one["drive_force"].transpose("time", "xy").values @ [np.cos(angle), np.sin(angle)]
+    of_video = film_clock(given, asked)
+    length = cell.offset + of_video.frames / asked.rate
+    time = np.arange(int(np.ceil(length * cell.rate)) + 1) / cell.rate
+    pushed = np.interp(of_video.shown(time - cell.offset), given, force)
+    random = np.random.default_rng([_NOISE_STREAM, asked.seed])
+    return np.column_stack([time, pushed + cell.noise * random.standard_normal(len(time))])

@@ -1,27 +1,32 @@
-"""A recording of a response, rendered: the frames and what they show."""
+"""Films a response: frames from shades to bytes, and the exact truth of what they show."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 import xarray as xr
 
 from pipeline.posing import structure_variables
-from pipeline.problem.sections import VirtualRecording
+from pipeline.problem.sections import Lighting, VirtualRecording
 from pipeline.runtime import UserError
-from pipeline.tracking.geometry import of_design
-from pipeline.virtual_lab import sensor
-from pipeline.virtual_lab.camera_pose import viewpoint
-from pipeline.virtual_lab.face_marks import marks
-from pipeline.virtual_lab.film_scene import FilmScene
-from pipeline.virtual_lab.filmed_motion import FilmedMotion, motion
-from sim.core import Image, Ints, Mask
+from pipeline.tracking.geometry import outlines_of_design
+from pipeline.virtual_lab.camera_pose import Viewpoint, viewpoint
+from pipeline.virtual_lab.coverage import coverage_image
+from pipeline.virtual_lab.face_marks import draw_marks
+from pipeline.virtual_lab.film_scene import FilmScene, nested_polygons
+from pipeline.virtual_lab.filmed_motion import FilmedMotion, sample_motion
+from sim.core import Floats, Image, Ints, Mask
+
+FINER = 3
+"""Pixels are divided so often on either side before the blur: it must not see the grid."""
+_MAINS = 100.0  # Hz
 
 
-class Filming(NamedTuple):
-    """All that is needed to render.
+class VirtualFilm(NamedTuple):
+    """Holds all that is needed to render.
 
     Attributes:
         scene: what is filmed.
@@ -38,15 +43,17 @@ class Filming(NamedTuple):
     asked: VirtualRecording
 
     def images(self, tell: Callable[[], None] | None = None) -> Iterator[Image]:
-        """The frames, in sequence; ``tell`` is called after each."""
+        """Renders the frames, in sequence; ``tell`` is called after each."""
         for index, time in enumerate(self.motion.time):
-            yield sensor.frame(self.scene, self.motion.instants[index], time, index, self.asked)
+            yield sensor_frame(self.scene, self.motion.instants[index], time, index, self.asked)
             if tell is not None:
                 tell()
 
 
-def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording) -> Filming:
-    """Everything for the film of a structure under one load case.
+def prepare_film(
+    one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
+) -> VirtualFilm:
+    """Prepares the film of a structure under one load case.
 
     Args:
         one: a response at one structure and one case, or a specimen.
@@ -57,7 +64,7 @@ def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
     Raises:
         UserError: the specimen is out of the picture, or nothing is in the window of time.
     """
-    units = of_design(one)
+    units = outlines_of_design(one)
     present = np.isin(one["unit"].values, units.ids)
     view = viewpoint(asked.camera, (units.centre.min(axis=0) + units.centre.max(axis=0)) / 2)
     corners = view.camera.project(units.centre)
@@ -72,15 +79,15 @@ def prepared(one: xr.Dataset, structure: str, kind: str, asked: VirtualRecording
     scene = FilmScene(
         units,
         _ligaments(one, structure, units.ids),
-        marks(units, kind, look, asked.seed),
+        draw_marks(units, kind, look, asked.seed),
         look,
         view,
     )
-    return Filming(scene, motion(one, present, asked), one, present, asked)
+    return VirtualFilm(scene, sample_motion(one, present, asked), one, present, asked)
 
 
-def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
-    """One structure of a response.
+def select_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
+    """Selects one structure of a response.
 
     Raises:
         UserError: the response does not hold it.
@@ -93,8 +100,8 @@ def of_structure(response: xr.Dataset, structure: str) -> xr.Dataset:
     return response.sel(structure=structure)
 
 
-def of_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
-    """One structure of a response under one of its load cases.
+def select_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
+    """Selects one structure of a response under one of its load cases.
 
     Raises:
         UserError: the response does not hold it.
@@ -103,11 +110,92 @@ def of_case(response: xr.Dataset, structure: str, case: int) -> xr.Dataset:
     if not 0 <= case < cases:
         remedy = f"give a number from 0 to {cases - 1}"
         raise UserError("the response has no such case", key="case", value=case, remedy=remedy)
-    return of_structure(response, structure).isel(case=case)
+    return select_structure(response, structure).isel(case=case)
 
 
 def _ligaments(response: xr.Dataset, structure: str, ids: Ints) -> Ints:
-    """Unit and vertex (ligaments, 2, 2) at the ends of those that are there."""
+    """Lists unit and vertex (ligaments, 2, 2) at the ends of those that are there."""
     there = structure_variables.present_ligaments(response, structure)
     unit = np.searchsorted(ids, response["ligament_unit"].values[there])
     return np.stack([unit, response["ligament_vertex"].values[there]], axis=-1)
+
+
+def assemble_truth(
+    response: xr.Dataset, present: Mask, motion: FilmedMotion, view: Viewpoint
+) -> xr.Dataset:
+    """Makes the dataset ``truth``: displacements at mid-exposure, as a track would have them.
+
+    Args:
+        response: of one structure under one load case.
+        present: (units,) which are there.
+        motion: what was filmed of them.
+        view: the camera.
+    """
+    displacement = np.full((len(motion.time), len(present), 3), np.nan)
+    displacement[:, present] = motion.pose
+    variables = {
+        "vertices": response["vertices"].transpose("unit", "vertex", "xy"),
+        "displacement": (("time", "unit", "dof"), displacement),
+        "camera_homography": (("row", "column"), view.camera.homography),
+        "camera_centre": (("xy",), view.camera.centre),
+        "camera_radial": (("power",), view.camera.radial),
+        "camera_eye": (("xyz",), view.eye),
+        "image_size": (("xy",), np.array(view.camera.size)),
+    }
+    coordinates = {
+        **{name: response[name] for name in ("unit", "i", "j", "xy")},
+        "time": (("time",), motion.time),
+        "dof": (("dof",), ["ux", "uy", "theta"]),
+    }
+    made = xr.Dataset(variables, coordinates)
+    return made.drop_vars([name for name in made.coords if name not in coordinates])
+
+
+def sensor_frame(
+    scene: FilmScene, instants: Floats, time: float, index: int, asked: VirtualRecording
+) -> Image:
+    """Renders the picture (rows, columns) that the sensor gives, 8 bit.
+
+    Args:
+        scene: what is filmed.
+        instants: (instants, units, 3) poses that the exposure averages.
+        time: of the frame, s.
+        index: of the frame: the noise of each is its own.
+        asked: light, sensor and seed.
+    """
+    shades = np.mean([shade_image(scene, pose, asked.sensor.blur) for pose in instants], axis=0)
+    light = _light(asked.light, shades.shape)
+    flicker = 1 + asked.light.flicker * np.sin(2 * np.pi * _MAINS * time)
+    return _noisy(np.clip(shades, 0, 1) * light * flicker, index, asked)
+
+
+def shade_image(scene: FilmScene, pose: Floats, blur: float) -> Floats:
+    """Renders the shade (rows, columns) of pixels behind the optics, without light and noise."""
+    columns, rows = scene.view.camera.size
+    rings = nested_polygons(scene, pose)
+    fine = rings._replace(points=(rings.points + 0.5) * FINER - 0.5)
+    picture = scene.look.board + coverage_image(fine, (rows * FINER, columns * FINER))
+    if blur > 0:
+        edge = cv2.BORDER_REPLICATE
+        picture = np.asarray(
+            cv2.GaussianBlur(picture, (0, 0), blur * FINER, borderType=edge), float
+        )
+    return picture.reshape(rows, FINER, columns, FINER).mean(axis=(1, 3))
+
+
+def _light(asked: Lighting, shape: tuple[int, ...]) -> Floats:
+    """Brightness (rows, columns) of white."""
+    rows, columns = shape
+    v, u = np.meshgrid(np.linspace(1, -1, rows), np.linspace(-1, 1, columns), indexing="ij")
+    tilted = 1 + asked.slope[0] * u + asked.slope[1] * v
+    return asked.level * tilted * (1 - asked.falloff * (u**2 + v**2) / 2)
+
+
+def _noisy(light: Floats, index: int, asked: VirtualRecording) -> Image:
+    """Adds shot noise (Gaussian, as for many electrons) and read noise, in steps of 8 bit."""
+    sensor = asked.sensor
+    electrons = light * sensor.full_well
+    spread = np.sqrt(np.maximum(electrons, 0) + sensor.read_noise**2)
+    random = np.random.default_rng([asked.seed, index])
+    electrons += spread * random.standard_normal(light.shape, np.float32)
+    return np.clip(np.round(255 / sensor.full_well * electrons), 0, 255).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Specimens of a structure as a lab has them: off their design, and driven as shakers drive."""
+"""Draws specimens as a lab has them: off their design, and driven as shakers drive."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from pipeline.posing import PosedStructure, drawn
-from pipeline.problem.sections import Making, Shaking
+from pipeline.problem.sections import DriveFaults, SpecimenFaults
 from pipeline.runtime import UserError
 from sim.core import Numbers
 from sim.scene import Scene
@@ -22,8 +22,8 @@ SAMPLES = 1001
 """Of the planned motion, to find its largest displacement."""
 
 
-class Shaken(NamedTuple):
-    """A drive that is not quite the planned one (``sim.solvers.loads.MotionLaw``).
+class ImperfectDrive(NamedTuple):
+    """Drives not quite as planned (``sim.solvers.loads.MotionLaw``).
 
     Attributes:
         planned: the motion that was asked for.
@@ -47,7 +47,7 @@ class Shaken(NamedTuple):
     delay: float
 
     def __call__(self, times: Numbers) -> Array:
-        """Motion (n_times, n_units, 3) at the given times, s."""
+        """Returns the motion (n_times, n_units, 3) at the given times, s."""
         since = jnp.maximum(jnp.asarray(times) - self.delay, 0.0)
         planned = self.planned(jnp.minimum(since, 2 * self.turning - since))
         amplitude = jnp.hypot(*self.largest)
@@ -65,7 +65,7 @@ class Shaken(NamedTuple):
 
 
 def _left(vector: Array) -> Array:
-    """Vectors (..., 2) turned by a right angle counter-clockwise."""
+    """Turns vectors (..., 2) by a right angle counter-clockwise."""
     return jnp.stack([-vector[..., 1], vector[..., 0]], axis=-1)
 
 
@@ -74,8 +74,10 @@ def _turned(angle: float) -> Array:
     return jnp.array([[cos, -sin], [sin, cos]])
 
 
-def specimen(structure: PosedStructure, case: int, asked: Making, end: float) -> PosedStructure:
-    """A specimen of a structure under one of its load cases.
+def make_specimen(
+    structure: PosedStructure, case: int, asked: SpecimenFaults, end: float
+) -> PosedStructure:
+    """Draws a specimen of a structure under one of its load cases.
 
     Args:
         structure: as designed.
@@ -91,7 +93,7 @@ def specimen(structure: PosedStructure, case: int, asked: Making, end: float) ->
         remedy = "give another seed, or smaller tolerances"
         raise UserError("units of the specimen overlap", key="virtual.specimen", remedy=remedy)
     made = scene.driven_by(
-        shaken(scene, case, asked.drive, end, asked.unload),
+        imperfect_drive(scene, case, asked.drive, end, asked.unload),
         lattice=replace(scene.lattice, vertices=copy.vertices),
         duration=end,
         frequency=None,
@@ -101,8 +103,10 @@ def specimen(structure: PosedStructure, case: int, asked: Making, end: float) ->
     return PosedStructure(made, copy.vertices)
 
 
-def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) -> Shaken:
-    """The drive of a load case as the specimen has it.
+def imperfect_drive(
+    scene: Scene, case: int, asked: DriveFaults, end: float, unload: bool
+) -> ImperfectDrive:
+    """Makes the drive of a load case as the specimen has it.
 
     Args:
         scene: of the structure.
@@ -114,7 +118,7 @@ def shaken(scene: Scene, case: int, asked: Shaking, end: float, unload: bool) ->
     planned = scene.loads.motions[case]
     path = np.asarray(planned(np.linspace(0, scene.loads.duration, SAMPLES)))[:, :2]
     site = scene.lattice.site[scene.loads.driven]
-    return Shaken(
+    return ImperfectDrive(
         planned,
         site - site.mean(axis=0),
         path[np.hypot(*path.T).argmax()],

@@ -1,9 +1,9 @@
-"""What noise a planned set-up will have: short clips are rendered, tracked, and compared."""
+"""Predicts the noise of a planned set-up: short clips are rendered, tracked, and compared."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -13,11 +13,11 @@ import xarray as xr
 
 from pipeline.problem.sections import Codec, VirtualRecording
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import frames
-from pipeline.tracking.motion import follow
-from pipeline.tracking.reference_frame import Setup
-from pipeline.virtual_lab.filming import Filming, of_case, prepared
-from pipeline.virtual_lab.video_writer import encode
+from pipeline.tracking.frames import read_frames
+from pipeline.tracking.motion import track_video
+from pipeline.tracking.reference_frame import RecordingSetup
+from pipeline.virtual_lab.filming import VirtualFilm, prepare_film, select_case
+from pipeline.virtual_lab.video_writer import encode_video
 from sim.core import Floats, Reals
 
 LEAST = 16
@@ -25,8 +25,8 @@ RESTING = 6  # frames before the motion
 _DEG = 180 / np.pi
 
 
-class Choice(NamedTuple):
-    """One set-up: what is filmed and how."""
+class PlannedSetup(NamedTuple):
+    """Holds one set-up: what is filmed and how."""
 
     specimen: str
     setup: VirtualRecording
@@ -34,7 +34,7 @@ class Choice(NamedTuple):
 
     @property
     def words(self) -> Mapping[str, str]:
-        """The set-up in columns of a table."""
+        """Describes the set-up in columns of a table."""
         camera, codec = self.setup.camera, self.setup.codec
         look = self.setup.look
         markers = {"dots": look.dots.diameter, "speckle": look.speckle.diameter}
@@ -49,8 +49,8 @@ class Choice(NamedTuple):
         }
 
 
-class Expected(NamedTuple):
-    """What a set-up gives: errors and stated uncertainties (3,) in px, px and deg.
+class ExpectedNoise(NamedTuple):
+    """Holds errors and stated uncertainties (3,) of a set-up in px, px and deg.
 
     Attributes:
         rmse: root mean square of the error of x, y and rotation.
@@ -66,7 +66,7 @@ class Expected(NamedTuple):
 
     @property
     def words(self) -> Mapping[str, str]:
-        """The same in columns of a table."""
+        """Describes the noise in columns of a table."""
         named = {"rmse": self.rmse, "sigma": self.sigma}
         told: dict[str, str] = {}
         for name, (x, y, turn) in named.items():
@@ -76,8 +76,8 @@ class Expected(NamedTuple):
         return told | {"lost_percent": f"{100 * self.lost:.3g}"}
 
 
-class Options(NamedTuple):
-    """Values to try in every combination; none leaves the base's own.
+class SetupOptions(NamedTuple):
+    """Holds values to try in every combination; none leaves the base's own.
 
     Attributes:
         specimens: dots, speckle or bare.
@@ -94,8 +94,8 @@ class Options(NamedTuple):
     markers: tuple[float, ...]
 
 
-def choices(base: Choice, tried: Options) -> list[Choice]:
-    """Every combination of the options.
+def setup_combinations(base: PlannedSetup, tried: SetupOptions) -> list[PlannedSetup]:
+    """Combines the options in every way.
 
     Raises:
         UserError: a value that makes no sense.
@@ -115,7 +115,7 @@ def choices(base: Choice, tried: Options) -> list[Choice]:
 
 
 def codec(name: str) -> Codec:
-    """The codec of a name such as ffv1, h264, h264-intra or h264:28 (constant rate factor).
+    """Parses a codec such as ffv1, h264, h264-intra or h264:28 (constant rate factor).
 
     Raises:
         UserError: no such name.
@@ -129,17 +129,20 @@ def codec(name: str) -> Codec:
 
 
 def _chosen(
-    base: Choice, specimen: str, scale: float, rate: float, chosen: Codec, marker: float | None
-) -> Choice:
+    base: PlannedSetup,
+    specimen: str,
+    scale: float,
+    rate: float,
+    chosen: Codec,
+    marker: float | None,
+) -> PlannedSetup:
     camera, look = base.setup.camera, base.setup.look
     pixel = base.pitch / scale
     image = tuple(2 * round(side * camera.pixel_size / pixel / 2) for side in camera.image)
     if marker is not None:
+        kinds = {"dots": look.dots, "speckle": look.speckle}
         look = look.model_copy(
-            update={
-                "dots": look.dots.model_copy(update={"diameter": marker}),
-                "speckle": look.speckle.model_copy(update={"diameter": marker}),
-            }
+            update={k: v.model_copy(update={"diameter": marker}) for k, v in kinds.items()}
         )
     update = {
         "camera": camera.model_copy(update={"pixel_size": pixel, "image": image}),
@@ -147,12 +150,12 @@ def _chosen(
         "codec": chosen,
         "look": look,
     }
-    return Choice(specimen, base.setup.model_copy(update=update), base.pitch)
+    return PlannedSetup(specimen, base.setup.model_copy(update=update), base.pitch)
 
 
-def expected(
-    response: xr.Dataset, structure: str, case: int, choice: Choice, count: int
-) -> Expected:
+def expected_noise(
+    response: xr.Dataset, structure: str, case: int, choice: PlannedSetup, count: int
+) -> ExpectedNoise:
     """Renders a clip of so many frames, tracks it, and compares with its truth.
 
     Raises:
@@ -160,20 +163,20 @@ def expected(
     """
     if count < LEAST:
         raise UserError("too few frames", key="--frames", value=count, remedy=f"give {LEAST}")
-    one = of_case(response, structure, case)
-    film = prepared(one, structure, choice.specimen, _clip(choice.setup, count))
+    one = select_case(response, structure, case)
+    film = prepare_film(one, structure, choice.specimen, _clip(choice.setup, count))
     camera = choice.setup.camera
-    known = Setup(choice.setup.look.thickness, camera.distance)
+    known = RecordingSetup(choice.setup.look.thickness, camera.distance)
     with TemporaryDirectory() as folder:
         path = Path(folder) / f"clip{choice.setup.codec.suffixes[0]}"
-        encode(path, film.images(), choice.setup.rate, choice.setup.codec, {})
+        encode_video(path, film.images(), choice.setup.rate, choice.setup.codec, {})
         units = film.scene.specimen
-        track = follow(frames(path), units, 1 / camera.pixel_size, setup=known)
+        track = track_video(read_frames(path), units, 1 / camera.pixel_size, setup=known)
     return _compared(film, track.displacement, track.sigma)
 
 
 def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
-    """The set-up with a few frames at rest and then the motion's beginning."""
+    """Clips the set-up to a few frames at rest and then the motion's beginning."""
     resting = min(RESTING, count // 2)
     length = (count - resting) / setup.rate
     end = setup.start + length
@@ -182,22 +185,13 @@ def _clip(setup: VirtualRecording, count: int) -> VirtualRecording:
     return setup.model_copy(update={"still": resting / setup.rate, "duration": length})
 
 
-def _compared(film: Filming, found: Reals, sigma: Reals) -> Expected:
+def _compared(film: VirtualFilm, found: Reals, sigma: Reals) -> ExpectedNoise:
     pixel = film.asked.camera.pixel_size
     scale = np.array([1 / pixel, 1 / pixel, _DEG])
     error = (found - film.motion.pose[: len(found)]) * scale
-    return Expected(
+    return ExpectedNoise(
         np.sqrt(np.nanmean(error**2, axis=(0, 1))),
         np.nanmedian(sigma * scale, axis=(0, 1)),
         float(np.isnan(error[..., 0]).mean()),
         pixel,
     )
-
-
-def table(rows: Sequence[Mapping[str, str]]) -> Iterator[str]:
-    """Lines of a table of words, in columns."""
-    names = list(rows[0])
-    width = {name: max(len(name), *(len(row[name]) for row in rows)) for name in names}
-    yield "  ".join(name.rjust(width[name]) for name in names)
-    for row in rows:
-        yield "  ".join(row[name].rjust(width[name]) for name in names)

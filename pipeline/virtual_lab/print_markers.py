@@ -1,4 +1,4 @@
-"""Stage: sheets of marks for the tracking, to print at true size and stick on the units."""
+"""Prints sheets of marks for the tracking, at true size, to stick on the units."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pipeline import datasets
 from pipeline.fabrication.parts import labels
 from pipeline.problem.sections import Markers, Speckle, UnitAppearance
 from pipeline.runtime import UserError, write_atomically
-from pipeline.tracking.geometry import as_built, of_design
+from pipeline.tracking.geometry import as_built, outlines_of_design
 from pipeline.virtual_lab import stickers
-from pipeline.virtual_lab.face_marks import marks
+from pipeline.virtual_lab.face_marks import draw_marks
 
 if TYPE_CHECKING:
     from pipeline.problem.sections import UnitAppearance
@@ -27,8 +27,8 @@ def work(args: argparse.Namespace) -> None:
         UserError: sizes that make no sense, or a unit larger than a page.
     """
     design = datasets.read(args.design, "design")
-    specimen = of_design(as_built(design, args.structure))
-    found = marks(specimen, args.kind, _look(args), 0)
+    specimen = outlines_of_design(as_built(design, args.structure))
+    found = draw_marks(specimen, args.kind, _look(args), 0)
     index = design[["i", "j"]].sel(unit=specimen.ids)
     names = labels(zip(index["i"].values, index["j"].values, strict=True))
     title = f"{args.out.stem}, {args.structure}"

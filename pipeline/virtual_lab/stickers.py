@@ -1,4 +1,4 @@
-"""Faces of the units to print at true size, cut out and stick on: dots or speckle, with ids."""
+"""Draws faces of the units at true size, to cut out and stick on: dots or speckle, with ids."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.fabrication.papers import GREY, INK, POINT, Paper, PdfDocument
 from pipeline.fabrication.plates import Spot, TooLargeError, pack
 from pipeline.runtime import UserError
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.virtual_lab.face_marks import Marks
+from pipeline.virtual_lab.face_marks import FaceMarks
 from sim.core import Floats
 
 Ink = Literal["dark", "light"]
@@ -25,7 +25,7 @@ _PAPER = "#ffffff"
 def write(
     path: Path,
     specimen: SpecimenOutlines,
-    marks: Marks,
+    marks: FaceMarks,
     labels: list[str],
     title: str,
     ink: Ink,
@@ -83,7 +83,7 @@ def _spots(specimen: SpecimenOutlines, sheet: PdfDocument, labels: list[str]) ->
 def _sticker(
     sheet: PdfDocument,
     specimen: SpecimenOutlines,
-    marks: Marks,
+    marks: FaceMarks,
     labels: list[str],
     spot: Spot,
     ink: Ink,
@@ -98,7 +98,7 @@ def _sticker(
     sheet.text(middle, low + spot.y + 0.6, labels[spot.part], 6, colour=GREY, at="middle")
 
 
-def _discs(sheet: PdfDocument, origin: Floats, marks: Marks, unit: int, colour: str) -> None:
+def _discs(sheet: PdfDocument, origin: Floats, marks: FaceMarks, unit: int, colour: str) -> None:
     sheet.canvas.setFillColor(colour)
     draw: Callable[..., None] = sheet.canvas.circle
     for (x, y), diameter in zip(

@@ -17,7 +17,7 @@ from sim.core import Image
 _TICKS = 90000  # per second: a usual clock of containers
 
 
-def encode(
+def encode_video(
     path: Path, images: Iterable[Image], rate: float, codec: Codec, labels: dict[str, str]
 ) -> None:
     """Writes the video, whole or not at all.

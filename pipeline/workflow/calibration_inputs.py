@@ -11,7 +11,7 @@ from pathlib import Path
 from snakemake.iocontainers import Wildcards
 
 from pipeline.calibration.inputs import Calibration, TrackedMotion
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.runtime import WORK, UserError
 
 _FOLDER = "experiments/calibration"
@@ -51,6 +51,6 @@ def description(wildcards: Wildcards) -> str:
 def _described(source: str) -> Calibration | None:
     """Reads the calibration; None where it cannot be read, of which the stage will tell why."""
     try:
-        return section(WORK / source, Calibration)
+        return load_section(WORK / source, Calibration)
     except UserError:
         return None

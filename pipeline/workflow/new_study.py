@@ -11,8 +11,8 @@ from string import Template
 from textwrap import indent
 
 from pipeline import problem
-from pipeline.problem.outlines import ImageError, read_outlines
-from pipeline.runtime import BUILD, UserError, write_folder_atomically
+from pipeline.problem.outlines import read_outlines
+from pipeline.runtime import BUILD, UserError, found_in, write_folder_atomically
 
 LOG = logging.getLogger(__name__)
 
@@ -80,7 +80,5 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
         remedy = "rename it: letters, digits, and . - _ between them"
         raise UserError("not a name for an image", file=args.image, remedy=remedy)
 
-    try:
+    with found_in(args.image):
         read_outlines(args.image)
-    except ImageError as error:
-        raise UserError(error.what, file=args.image, remedy=error.remedy) from error

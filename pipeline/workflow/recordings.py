@@ -11,7 +11,7 @@ from pathlib import Path
 from snakemake.iocontainers import Wildcards
 
 from pipeline.runtime import WORK, UserError
-from pipeline.tracking.frames import Recording, load
+from pipeline.tracking.frames import Recording, load_recording
 
 RECORDINGS = "_recordings"
 """Ends the targets that render and track the recordings of a study."""
@@ -99,7 +99,7 @@ def described(wildcards: Wildcards) -> Recording | None:
 
 def _read(path: Path) -> Recording | None:
     try:
-        return load(path)
+        return load_recording(path)
     except UserError:
         return None
 

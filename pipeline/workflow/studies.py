@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.problem import Problem
-from pipeline.problem.reading import joint_figure, load, overlaid, preset_names, yaml_file
-from pipeline.problem.sections import design_count, numbered
+from pipeline.problem.reading import joint_figure, load, overlay_keys, preset_names, yaml_file
+from pipeline.problem.sections import design_count, design_name
 from pipeline.runtime import WORK, UserError
 from pipeline.workflow.movie_list import MOVIES
 from pipeline.workflow.recordings import RECORDINGS
@@ -67,11 +67,11 @@ def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
     """
     found = {}
     for path in sorted(root.glob("experiments/*/problem.yaml")):
-        content = yaml_file.skimmed(path)
+        content = yaml_file.skim_yaml(path)
         presets = content.pop("presets", None)
         for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
-            whole = overlaid(content, laid if isinstance(laid, dict) else {})
-            names = (numbered(str(preset), k + 1) for k in range(design_count(whole)))
+            whole = overlay_keys(content, laid if isinstance(laid, dict) else {})
+            names = (design_name(str(preset), k + 1) for k in range(design_count(whole)))
             study = Study(path.parent.name, str(preset))
             found[study] = [Study(study.name, name) for name in names]
     return found
@@ -92,7 +92,7 @@ def joints(root: Path = WORK) -> Mapping[str, list[Study]]:
     for path in sorted(root.glob("experiments/*/figure.yaml")):
         name = path.parent.name
         try:
-            members = joint_figure.load(path).studies
+            members = joint_figure.load_joint_figure(path).studies
         except UserError:
             members = ()
         presets = [set(preset_names(path.parents[1] / m / "problem.yaml")) for m in members]

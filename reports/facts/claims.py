@@ -15,7 +15,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.problem.fields import Section, exactly_one
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
 from reports.facts.fact_records import ABSENT, Fact
 
@@ -97,7 +97,7 @@ class JudgedClaim:
 @cache
 def listed() -> Claims:
     """The claims of the file."""
-    return section(Path(__file__).with_name("claims.yaml"), Claims)
+    return load_section(Path(__file__).with_name("claims.yaml"), Claims)
 
 
 def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:

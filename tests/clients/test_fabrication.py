@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from pipeline.fabrication.readback import read_drawings, read_meshes
+from pipeline.fabrication.readback import read_3mf, read_drawing, read_stl
 from tests.clients.conftest import program
 from tests.pipeline.fabrication import built
 
@@ -55,7 +55,7 @@ def filament(gcode: Path) -> float:
 @pytest.mark.parametrize("name", ["print/units/A1.stl", "print/assembled.stl", "fixture/JIG1.stl"])
 def test_the_slicer_finds_meshes_manifold(package: Path, name: str) -> None:
     info = told("prusa-slicer", "--info", package / name)
-    solid = read_meshes.read_stl(package / name)
+    solid = read_stl(package / name)
     assert "manifold = yes" in info
     size = [float(found) for found in re.findall(r"size_[xyz] = ([\d.]+)", info)]
     np.testing.assert_allclose(size, solid.extent[1] - solid.extent[0], atol=1e-3)
@@ -73,7 +73,7 @@ def test_the_mesh_checker_finds_no_open_edge(package: Path) -> None:
 def test_a_unit_is_sliced_to_its_volume(package: Path, tmp_path: Path) -> None:
     path, gcode = package / "print/units/B1.stl", tmp_path / "unit.gcode"
     told("prusa-slicer", "-g", path, *SOLID, "--bed-shape", BED, "-o", gcode)
-    assert filament(gcode) == pytest.approx(read_meshes.read_stl(path).mesh.volume, rel=0.05)
+    assert filament(gcode) == pytest.approx(read_stl(path).mesh.volume, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_a_plate_is_sliced_to_its_volume(package: Path, tmp_path: Path, name: st
     gcode = tmp_path / "plate.gcode"
     place = ("--merge", "--dont-arrange", "--bed-shape", BED)
     told("prusa-slicer", "-g", package / name, *place, *SOLID, "-o", gcode)
-    volume = sum(solid.mesh.volume for solid in read_meshes.read_3mf(package / name))
+    volume = sum(solid.mesh.volume for solid in read_3mf(package / name))
     assert filament(gcode) == pytest.approx(volume, rel=0.05)
 
 
@@ -102,7 +102,7 @@ def test_cad_prints_every_drawing_with_ink(package: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize("kind", ["nominal", "kerf0.15"])
 def test_the_vector_editor_measures_true_size(package: Path, kind: str) -> None:
     path = package / f"laser/units_sheet1_{kind}.svg"
-    drawing = read_drawings.read(path)
+    drawing = read_drawing(path)
     boxes = [row.split(",") for row in told("inkscape", path, "--query-all").splitlines()]
     assert drawing.size is not None
     sizes = {name: np.array([float(x) for x in rest]) / PER_MM for name, *rest in boxes if name}

@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from pipeline.posing import failures
-from pipeline.problem.reading import load, overlaid
+from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import ROOT, UserError
 from pipeline.tracking.reference_frame import recognition
 from pipeline.workflow import run
@@ -98,5 +98,5 @@ def test_what_a_design_is_to_hold_against_is_valid(block: Block, tmp_path: Path)
     given = yaml.safe_load(block.text)
     preset = next(iter(given.get("presets", {})), None)
     whole = yaml.safe_load((ROOT / block.place).read_text())
-    problem.write_text(yaml.safe_dump(overlaid(whole, given)))
+    problem.write_text(yaml.safe_dump(overlay_keys(whole, given)))
     assert load(problem, preset) != load(ROOT / block.place)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import yaml
 
-from pipeline.problem.reading import load, overlaid
+from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import ROOT
 from pipeline.tracking.frames import recording
 from pipeline.tracking.output import dic_points
@@ -91,7 +91,7 @@ def checked(block: Block, problem: Path) -> None:
         UserError: as for any problem file.
     """
     changed = problem.with_name("changed.yaml")
-    asked = overlaid(yaml.safe_load(problem.read_text()), yaml.safe_load(block.text))
+    asked = overlay_keys(yaml.safe_load(problem.read_text()), yaml.safe_load(block.text))
     changed.write_text(yaml.safe_dump(asked, sort_keys=False))
     try:
         load(changed)
@@ -110,4 +110,4 @@ def check_recording(block: Block, folder: Path) -> None:
     if "points" in yaml.safe_load(block.text):
         dic_points.load(path)
     else:
-        recording.load(path)
+        recording.load_recording(path)

@@ -13,7 +13,7 @@ import yaml
 from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.posing import network_variables, scene_of
-from pipeline.problem.reading import overlaid
+from pipeline.problem.reading import overlay_keys
 from pipeline.runtime import ROOT
 from pipeline.tracking.frames import import_video
 from tests.e2e.checkout import Checkout
@@ -42,7 +42,7 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Checkout:
     results.mkdir(parents=True)
     whole = yaml.safe_load((ROOT / "experiments/fig2/problem.yaml").read_text())
     del whole["presets"]
-    text = yaml.safe_dump(overlaid(whole, AS_FILMED), sort_keys=False)
+    text = yaml.safe_dump(overlay_keys(whole, AS_FILMED), sort_keys=False)
     (folder / "problem.yaml").write_text(text)
     _built(folder / "problem.yaml", results)
     (recordings / "altered.yaml").write_text("structure: altered\nvirtual: {}\n")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pipeline.problem.reading import overlaid
+from pipeline.problem.reading import overlay_keys
 from pipeline.runtime import ROOT
 from tests.e2e.stages import Built, build
 
@@ -55,7 +55,7 @@ def built(small: Small, tmp_path_factory: pytest.TempPathFactory) -> Built:
     whole = yaml.safe_load((ROOT / f"experiments/{small.study}/problem.yaml").read_text())
     draft = whole.pop("presets")["quick"]
     problem = folder / "problem.yaml"
-    problem.write_text(yaml.safe_dump(overlaid(overlaid(whole, draft), small.changes)))
+    problem.write_text(yaml.safe_dump(overlay_keys(overlay_keys(whole, draft), small.changes)))
     return build(problem, None, folder)
 
 

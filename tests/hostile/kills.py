@@ -14,7 +14,7 @@ from random import Random
 
 import yaml
 
-from pipeline.problem.reading import overlaid
+from pipeline.problem.reading import overlay_keys
 from tests.e2e.checkout import Checkout
 
 RECORDING = {
@@ -54,7 +54,7 @@ class Kill:
 def filmed(checkout: Checkout) -> Checkout:
     """The checkout with a study as small as can be, and a recording of it."""
     asked = yaml.safe_load(checkout.problem.read_text(encoding="utf-8"))
-    asked = overlaid(asked, SMALLEST)
+    asked = overlay_keys(asked, SMALLEST)
     checkout.problem.write_text(yaml.safe_dump(asked, sort_keys=False), encoding="utf-8")
     folder = checkout.problem.parent / "recordings"
     folder.mkdir(exist_ok=True)

@@ -15,19 +15,18 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration.inputs import Calibration, csv_readings
+from pipeline.calibration.inputs import Calibration
 from pipeline.datasets.tables import TABLES, Kind
-from pipeline.fabrication.papers import manifest
+from pipeline.fabrication.papers import MANIFEST, read_manifest
 from pipeline.posing import scene_of
-from pipeline.posing.to_scene import TIME_SERIES_COLUMNS
 from pipeline.problem import canonical_json
-from pipeline.problem.fields import units
-from pipeline.problem.reading import joint_figure, load, section
+from pipeline.problem.fields import csv_columns, units
+from pipeline.problem.reading import joint_figure, load, load_section
 from pipeline.problem.sections import Codec
 from pipeline.runtime import ROOT, CaseLog, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
 from pipeline.tracking.output import dic_points
-from pipeline.virtual_lab import encode
+from pipeline.virtual_lab import encode_video
 from tests.hostile import damage, edits
 from tests.hostile.damage import Damage
 from tests.pipeline import static
@@ -130,7 +129,7 @@ def _driven(text: str) -> str:
 
 def _motion(folder: Path) -> Path:
     rows = "\n".join(f"{k / 10},{-k / 30},0,0" for k in range(11))
-    return _text("motion.csv", ",".join(TIME_SERIES_COLUMNS) + f"\n{rows}\n", folder)
+    return _text("motion.csv", f"time (s),ux (mm),uy (mm),theta (rad)\n{rows}\n", folder)
 
 
 def _lattice(suffix: str, folder: Path) -> Path:
@@ -158,17 +157,17 @@ def _frames(folder: Path) -> Path:
 def _film(name: str, codec: Codec, folder: Path) -> Path:
     path = folder / name
     noise = np.random.default_rng(0).integers(0, 255, (8, 96, 128), dtype=np.uint8)
-    encode(path, iter(noise), 30.0, codec, {"title": "noise"})
+    encode_video(path, iter(noise), 30.0, codec, {"title": "noise"})
     return path
 
 
 def _shown(path: Path) -> Told:
-    held, found = [], video.frames(path, rate=30.0)
+    held, found = [], video.read_frames(path, rate=30.0)
     for frame in found:
         held.append((frame.index, frame.time, frame.image.shape, zlib.crc32(frame.image.tobytes())))
         assert frame.image.min() >= 0
         assert frame.image.max() <= 255
-    return [video.length(path) > 0, held]
+    return [video.frame_count(path) > 0, held]
 
 
 def _dataset(kind: Kind, folder: Path) -> Path:
@@ -204,7 +203,7 @@ def _manifest(folder: Path) -> Path:
     told = (
         '{"units": ["A1"], "letters_for_ids": true, "shims": {}, "thin_walls_mm": {}, "files": {}}'
     )
-    return _text(manifest.NAME, told, folder)
+    return _text(MANIFEST, told, folder)
 
 
 def _yaml(name: str, make: Callable[[Path], Path], read: Callable[[Path], Told]) -> Subject:
@@ -231,12 +230,15 @@ def _forces(path: Path) -> Told:
 
 
 def _cloud(path: Path) -> Told:
-    return [part.tolist() for part in dic_points.cloud(path, dic_points.Points(points=path.name))]
+    return [
+        part.tolist()
+        for part in dic_points.read_points(path, dic_points.DicExport(points=path.name))
+    ]
 
 
 def _readings(path: Path) -> Told:
     wanted = {"displacement": units.LENGTH, "force": units.FORCE}
-    return list(csv_readings.read(path, wanted).tolist())
+    return list(csv_columns.read_quantities(path, wanted).tolist())
 
 
 def _from_study(name: str) -> Callable[[Path], Path]:
@@ -256,12 +258,12 @@ SUBJECTS: tuple[Subject, ...] = (
     _yaml(
         "recording",
         _from_study("fig2/recordings/cloaked.yaml"),
-        lambda p: [recording.load(p).model_dump_json()],
+        lambda p: [recording.load_recording(p).model_dump_json()],
     ),
     _yaml(
         "calibration",
         _from_study("calibration/hinges.yaml"),
-        lambda p: [section(p, Calibration).model_dump_json()],
+        lambda p: [load_section(p, Calibration).model_dump_json()],
     ),
     _yaml(
         "points",
@@ -269,7 +271,11 @@ SUBJECTS: tuple[Subject, ...] = (
         lambda p: [dic_points.load(p).model_dump_json()],
     ),
     _yaml("description of a video", partial(_copied, CLIP.with_suffix(".yaml")), _described),
-    _yaml("figure of several studies", _figure, lambda p: [joint_figure.load(p).model_dump_json()]),
+    _yaml(
+        "figure of several studies",
+        _figure,
+        lambda p: [joint_figure.load_joint_figure(p).model_dump_json()],
+    ),
     *_dataset_subjects(),
     Subject(
         "lattice in netCDF",
@@ -300,6 +306,6 @@ SUBJECTS: tuple[Subject, ...] = (
         "manifest of a package",
         "other",
         _manifest,
-        lambda p: [sorted(map(str, manifest.read(p.parent).items()))],
+        lambda p: [sorted(map(str, read_manifest(p.parent).items()))],
     ),
 )

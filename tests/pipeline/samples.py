@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.datasets.tables import ATTRIBUTES, TABLES, Kind, Variable
+from pipeline.datasets.tables import SCHEMAS, TABLES, Kind, Variable
 
 SIZES = {
     "unit": 49,
@@ -59,16 +59,16 @@ _ATTRIBUTES: dict[str, dict[str, str]] = {
     "track": {"recording": "{}", "synthetic": "no"},
     "truth": {"recording": "{}", "synthetic": "yes"},
     "comparison": {
-        **dict.fromkeys(ATTRIBUTES["comparison"], "as told"),
+        **dict.fromkeys(SCHEMAS["comparison"].attributes, "as told"),
         "recording": "{}",
         "synthetic": "yes",
         "structure": "cloaked",
         "case": "0",
     },
     "calibration": {"calibration": "{}", "synthetic": "no", "warnings": ""},
-    "benchmark": dict.fromkeys(ATTRIBUTES["benchmark"], "as told"),
-    "contest": dict.fromkeys(ATTRIBUTES["contest"], "as told"),
-    "tracking": dict.fromkeys(ATTRIBUTES["tracking"], "as told"),
+    "benchmark": dict.fromkeys(SCHEMAS["benchmark"].attributes, "as told"),
+    "contest": dict.fromkeys(SCHEMAS["contest"].attributes, "as told"),
+    "tracking": dict.fromkeys(SCHEMAS["tracking"].attributes, "as told"),
 }
 
 

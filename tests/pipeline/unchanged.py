@@ -57,5 +57,5 @@ def write(path: Path) -> Path:
         {"shipped_method": "sqp"},
     )
     out = path.with_name("design.nc")
-    datasets.write(design, out, "design", provenance.attributes(asked, "design"))
+    datasets.write(design, out, "design", provenance.of_study(asked, "design"))
     return out

@@ -14,7 +14,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.datasets.tables import TABLES
+from pipeline.datasets.tables import TABLES, Kind
 from pipeline.posing import (
     lattice_of,
     law_comparison,
@@ -64,8 +64,8 @@ def written(folder: Path, more: str) -> StudyResults:
         stage = REPORTED[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
         posed = law_comparison.geometric(chosen) if kind == "geometric_response" else chosen
-        about = provenance.attributes(posed, stage.name, plan=plan)
-        datasets.write(made[kind], files[kind], cast(datasets.Kind, stage.kind), about)
+        about = provenance.of_study(posed, stage.name, plan=plan)
+        datasets.write(made[kind], files[kind], cast(Kind, stage.kind), about)
     return study_results.load(path, None, files)
 
 
@@ -166,7 +166,7 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     )
 
 
-def _filled(kind: datasets.Kind, shape: tuple[int, ...]) -> dict[str, Any]:
+def _filled(kind: Kind, shape: tuple[int, ...]) -> dict[str, Any]:
     """Every variable of a kind on (structure, case, time, ...) with a small constant."""
     sizes = dict(zip(("structure", "case", "time", "unit", "dof"), shape, strict=True))
     sizes |= {"xy": 2, "contact_law": 2}

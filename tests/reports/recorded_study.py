@@ -29,7 +29,7 @@ def with_recordings(study: StudyResults, folder: Path, *shown: tuple[str, int]) 
     for structure, case in shown:
         file = folder / f"{structure}_{case}/comparison.nc"
         made = comparison(study, structure, case)
-        about = provenance.attributes(study.problem, "compare") | {"synthetic": "yes"}
+        about = provenance.of_study(study.problem, "compare") | {"synthetic": "yes"}
         datasets.write(made, file, "comparison", about | {"recording": "{}"})
         compared[file.parent.name] = datasets.read(file, "comparison")
     return dataclasses.replace(study, compared=compared)

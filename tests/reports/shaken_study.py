@@ -42,16 +42,16 @@ def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:
     lattice = _lattice(chosen)
     paths = (folder / "design.nc", folder / "response.nc", folder / "sweep.nc")
     datasets.write(
-        design(chosen, lattice), paths[0], "design", provenance.attributes(chosen, "design")
+        design(chosen, lattice), paths[0], "design", provenance.of_study(chosen, "design")
     )
     shared = ["simulation of the unloaded reference: it is zero"]
     plan = {
         "altered": {"integrator": "implicit", "skipped": [*shared, "2 of 4 load cases"]},
         "cloaked": {"integrator": "implicit", "skipped": shared},
     }
-    about = provenance.attributes(chosen, "simulate", parents={"design": paths[0]}, plan=plan)
+    about = provenance.of_study(chosen, "simulate", parents={"design": paths[0]}, plan=plan)
     datasets.write(response(chosen, lattice), paths[1], "response", about)
-    datasets.write(sweep(chosen), paths[2], "sweep", provenance.attributes(chosen, "sweep"))
+    datasets.write(sweep(chosen), paths[2], "sweep", provenance.of_study(chosen, "sweep"))
     return paths
 
 
@@ -239,7 +239,7 @@ def _motion(chosen: Problem, lattice: Lattice, time: np.ndarray, reach: float) -
 
 def sweep(chosen: Problem) -> xr.Dataset:
     assert chosen.sweep is not None
-    cases = list(sweep_cases.settings(chosen.sweep))
+    cases = list(sweep_cases.list_settings(chosen.sweep))
     words = np.array([[str(case[key]) for key in chosen.sweep.keys] for case in cases])
     value = np.array([[float(word.split()[0]) for word in row] for row in words])
     direction, frequency = value.T

@@ -18,16 +18,16 @@ import xarray as xr
 
 from pipeline.calibration import computed_sets, computed_track, estimates, fit_uncertainty
 from pipeline.calibration.experiments import Experiment, force_displacement, free_decay, full_field
-from pipeline.calibration.fit_constants import settled
+from pipeline.calibration.fit_constants import fit_settled
 from pipeline.calibration.inputs import (
     Calibration,
     Constants,
     ForceDisplacement,
     FreeDecay,
     TrackedMotion,
-    start,
+    start_constants,
 )
-from pipeline.calibration.least_squares import Model
+from pipeline.calibration.least_squares import FitModel
 from pipeline.runtime import ROOT
 from sim.core import Floats
 from tests.pipeline.calibration.specimens import (
@@ -66,13 +66,13 @@ class Case(NamedTuple):
 
 def forces_case(folder: Path) -> Case:
     asked = loaded(folder, described(force_sets(points=12), STIFFNESS))
-    begin, true = start(asked), computed_sets.truth(asked)
+    begin, true = start_constants(asked), computed_sets.true_constants(asked)
     clean: list[tuple[force_displacement.ForceTest, Floats, float]] = []
     for each in asked.data:
         assert isinstance(each, ForceDisplacement)
         assert each.virtual is not None
         along = np.linspace(0.0, each.virtual.end, each.virtual.points + 1)[1:]
-        test = force_displacement.experiment(each, begin, along, np.zeros(len(along)))
+        test = force_displacement.pose_force_test(each, begin, along, np.zeros(len(along)))
         clean.append((test, test.simulation.predict(true), each.virtual.noise))
 
     def draw(random: np.random.Generator) -> list[Experiment]:
@@ -95,16 +95,16 @@ def forces_case(folder: Path) -> Case:
 
 def decay_case(folder: Path) -> Case:
     asked = loaded(folder, described([decay_set()], ["damping_ratio"]))
-    true, each = computed_sets.truth(asked), asked.data[0]
+    true, each = computed_sets.true_constants(asked), asked.data[0]
     assert isinstance(each, FreeDecay)
     assert each.virtual is not None
 
     def draw(random: np.random.Generator) -> list[Experiment]:
-        return [free_decay.experiment(each, *computed_sets.decay_of(each, true, random))]
+        return [free_decay.pose_decay(each, *computed_sets.simulate_decay(each, true, random))]
 
-    one = computed_sets.decay_of(each, true, np.random.default_rng(0))
+    one = computed_sets.simulate_decay(each, true, np.random.default_rng(0))
     known = each.model_copy(update={"noise": each.virtual.noise})
-    return Case(asked, true, draw, [free_decay.experiment(known, *one)])
+    return Case(asked, true, draw, [free_decay.pose_decay(known, *one)])
 
 
 def squeezed_case(folder: Path, noise: float = 1.0) -> Case:
@@ -137,16 +137,16 @@ def _track_case(
     shutil.copy(SPECIMENS / given["problem"], folder)
     track = {"kind": "track", "name": "motion", "structure": "altered", **given}
     asked = loaded(folder, described([track], wanted, material=begin_of))
-    begin, true, each = start(asked), computed_sets.truth(asked), asked.data[0]
+    begin, true, each = start_constants(asked), computed_sets.true_constants(asked), asked.data[0]
     assert isinstance(each, TrackedMotion)
 
     def seen(made: xr.Dataset) -> full_field.FullFieldExperiment:
-        return full_field.experiment(each, folder, begin, made)
+        return full_field.pose_track(each, folder, begin, made)
 
     def draw(random: np.random.Generator) -> list[Experiment]:
-        return [seen(computed_track.track_of(each, folder, true, random))]
+        return [seen(computed_track.simulate_track(each, folder, true, random))]
 
-    one = seen(computed_track.track_of(each, folder, true, np.random.default_rng(0)))
+    one = seen(computed_track.simulate_track(each, folder, true, np.random.default_rng(0)))
     return Case(asked, true, draw, [one.with_drive_noise(true).with_drive_noise(true)])
 
 
@@ -169,9 +169,11 @@ def tried(case: Case) -> Trials:
     true = case.true.logs(names)
     inside, width = [], []
     for seed in range(SEEDS):
-        model = Model(start(case.asked), names, case.draw(np.random.default_rng([7, seed])))
-        found = settled(model)
-        estimate = estimates.estimate(found, fit_uncertainty.uncertainty(found))
+        model = FitModel(
+            start_constants(case.asked), names, case.draw(np.random.default_rng([7, seed]))
+        )
+        found = fit_settled(model)
+        estimate = estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
         low, high = (np.log(ends[: len(names)]) for ends in (estimate.low, estimate.high))
         inside.append((low < true) & (true < high))
         width.append((high - low) / 2)
@@ -183,7 +185,7 @@ def tried(case: Case) -> Trials:
 
 def _bound(case: Case) -> Floats:
     """Standard errors of the wanted constants by the bound of Cramer and Rao."""
-    model = Model(start(case.asked), case.asked.fit, case.known)
+    model = FitModel(start_constants(case.asked), case.asked.fit, case.known)
     own = model.start[len(case.asked.fit) :]
     jacobian = model.jacobian(np.append(case.true.logs(case.asked.fit), own))
     covariance = np.linalg.inv(jacobian.T @ jacobian)
@@ -205,9 +207,11 @@ def test_a_track_of_little_noise_tells_constants_within_1_percent(
     case: Callable[[Path, float], Case], tmp_path: Path
 ) -> None:
     made = case(tmp_path, 0.1)
-    model = Model(start(made.asked), made.asked.fit, made.draw(np.random.default_rng(0)))
-    found = settled(model)
-    estimate = estimates.estimate(found, fit_uncertainty.uncertainty(found))
+    model = FitModel(
+        start_constants(made.asked), made.asked.fit, made.draw(np.random.default_rng(0))
+    )
+    found = fit_settled(model)
+    estimate = estimates.estimate_constants(found, fit_uncertainty.estimate_errors(found))
     middle = np.sqrt(estimate.low * estimate.high)[: len(made.asked.fit)]
     true = np.exp(made.true.logs(made.asked.fit))
     np.testing.assert_allclose(middle, true, rtol=0.01)

@@ -4,8 +4,8 @@ from . import full_field as full_field
 from . import tracked_specimen as tracked_specimen
 from .experiment import Experiment as Experiment
 from .force_displacement import ForceTest as ForceTest
-from .free_decay import Decay as Decay
+from .free_decay import DecayTest as DecayTest
 from .full_field import FullFieldExperiment as FullFieldExperiment
-from .full_field import three as three
+from .full_field import per_dof as per_dof
 from .tracked_specimen import TrackedSpecimen as TrackedSpecimen
-from .tracked_specimen import specimen as specimen
+from .tracked_specimen import pose_specimen as pose_specimen

@@ -1,4 +1,4 @@
-"""One set of measurements as the estimator sees it, whatever its kind."""
+"""Defines a set of measurements as the estimator sees it, whatever its kind."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from pipeline.calibration.inputs import Constants, Name
+from pipeline.calibration.inputs import ConstantName, Constants
 from sim.core import Floats, Ints
 
 Kind = Literal["force_displacement", "free_decay", "track"]
 
 _UNSEEN = 1e-8
 
-ELASTIC: tuple[Name, ...] = (
+LEAST_LINES = 5
+"""Lines of a file of readings that any fit needs."""
+ELASTIC: tuple[ConstantName, ...] = (
     "axial_stiffness",
     "shear_stiffness",
     "bending_stiffness",
@@ -25,7 +27,7 @@ ELASTIC: tuple[Name, ...] = (
 
 @dataclass(frozen=True)
 class MeasuredValues:
-    """The measured values of one set.
+    """Holds the measured values of one set.
 
     Attributes:
         name: of the set.
@@ -59,7 +61,7 @@ class MeasuredValues:
     remarks: tuple[str, ...] = ()
 
     def whitened(self, deviation: Floats) -> Floats:
-        """Deviations (n, ...) from the values as numbers of unit variance, without correlation.
+        """Scales deviations (n, ...) to numbers of unit variance, without correlation.
 
         The covariance in a channel is D + b^2 1 1', with D the squared ``sigma``: its inverse root
         takes from D^-1/2 x a part of the component along D^-1/2 1.
@@ -67,11 +69,11 @@ class MeasuredValues:
         return self._less_common(self._less_mean((deviation.T / self.sigma).T))
 
     def transposed(self, white: Floats) -> Floats:
-        """What the transpose of ``whitened`` makes of whitened numbers (n,)."""
+        """Applies the transpose of ``whitened`` to whitened numbers (n,)."""
         return self._less_mean(self._less_common(white)) / self.sigma
 
     def with_common(self, causes: Floats) -> MeasuredValues:
-        """The same with what independent causes do to the values, (n, m) per standard deviation.
+        """Adds the effect of independent causes on the values, (n, m) per standard deviation.
 
         The covariance of whitened values is then 1 + C C': along the axes of C they are divided by
         what it is there.
@@ -85,12 +87,12 @@ class MeasuredValues:
         )
 
     def causes(self, deviation: Floats) -> Floats:
-        """The expected causes (m, ...) of deviations (n, ...), in standard deviations."""
+        """Estimates the causes (m, ...) of deviations (n, ...), in standard deviations."""
         along = self.axes.T @ self._less_mean((deviation.T / self.sigma).T)
         return np.asarray(self.mixture @ (along.T * self.spread / (1 + self.spread**2)).T)
 
     def unexplained(self, causes: Floats) -> Floats:
-        """Causes (m, ...) times their covariance once the values are known, 1 before."""
+        """Multiplies causes (m, ...) by their covariance once the values are known, 1 before."""
         known = self.spread**2 / (1 + self.spread**2)
         return causes - self.mixture @ (known * (self.mixture.T @ causes).T).T
 
@@ -101,7 +103,7 @@ class MeasuredValues:
         return white - self.axes @ (part * (self.axes.T @ white).T).T
 
     def _less_mean(self, scaled: Floats) -> Floats:
-        """Multiples (n, ...) of ``sigma`` without what a bias of their channels may explain."""
+        """Takes from multiples (n, ...) of ``sigma`` what a bias of their channels may explain."""
         if not len(self.bias):
             return scaled
         weight = 1 / self.sigma
@@ -124,16 +126,16 @@ class MeasuredValues:
 
 
 class Experiment(Protocol):
-    """What was measured, and a model of it."""
+    """Combines measurements with a model of them."""
 
     @property
     def measured(self) -> MeasuredValues:
-        """The measurements."""
+        """Returns the measurements."""
         ...
 
     @property
-    def sees(self) -> tuple[Name, ...]:
-        """The constants that the measurements depend on."""
+    def sees(self) -> tuple[ConstantName, ...]:
+        """Returns the constants that the measurements depend on."""
         ...
 
     @property
@@ -147,7 +149,7 @@ class Experiment(Protocol):
         ...
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """(n,) what would be measured without errors.
+        """Predicts the measurements (n,) without errors.
 
         Raises:
             SimulationError: there is no such state.

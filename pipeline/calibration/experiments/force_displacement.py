@@ -1,4 +1,4 @@
-"""Force over displacement of a small lattice: bottom row clamped, top row moved."""
+"""Tests force over displacement of a small lattice: bottom row clamped, top row moved."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
+from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
 from pipeline.calibration.experiments.simulated_experiment import (
     KnownDrive,
     Seen,
     SpecimenSimulation,
 )
-from pipeline.calibration.inputs import Constants, ForceDisplacement, Name, csv_readings
-from pipeline.problem.fields import units
+from pipeline.calibration.inputs import ConstantName, Constants, ForceDisplacement
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
@@ -32,7 +32,7 @@ TOLERANCE = 1e-12
 
 
 def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
-    """Displacements in mm and forces in N from the file of a set.
+    """Reads displacements in mm and forces in N from the file of a set.
 
     Raises:
         UserError: the file cannot be used.
@@ -40,7 +40,7 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
     assert asked.file is not None
     path = folder / asked.file
     wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
-    displacement, force = csv_readings.read(path, wanted).T
+    displacement, force = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
     if not (np.abs(displacement) > 0).any():
         remedy = "give a test in which the top row moves"
         raise UserError("the displacement is zero throughout", file=path, remedy=remedy)
@@ -49,16 +49,16 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class ForceTest:
-    """A test of forces (``experiment.Experiment``)."""
+    """Holds a test of forces (``experiment.Experiment``)."""
 
     measured: MeasuredValues
     simulation: SpecimenSimulation
     tare: bool
-    sees: tuple[Name, ...] = ELASTIC
+    sees: tuple[ConstantName, ...] = ELASTIC
 
     @property
     def own_start(self) -> Floats:
-        """The load cell's zero, N, if it is unknown."""
+        """Computes the load cell's zero, N, if it is unknown."""
         return np.zeros(int(self.tare))
 
     @property
@@ -67,28 +67,28 @@ class ForceTest:
         return np.full(int(self.tare), float(np.abs(self.measured.values).max()))
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
+        """Predicts forces, see ``experiment.Experiment``."""
         return self.simulation.predict(constants) + own.sum()
 
     def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
         return self.simulation.pulled_back(constants, bar)
 
 
-def experiment(
+def pose_force_test(
     asked: ForceDisplacement, begin: Constants, displacement: Floats, force: Floats
 ) -> ForceTest:
-    """The set as an experiment on equilibria."""
+    """Returns the set as an experiment on equilibria."""
     sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
     known = asked.noise is not None
     measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
-    return ForceTest(measured, simulation(asked, begin, displacement), asked.tare)
+    return ForceTest(measured, pose_simulation(asked, begin, displacement), asked.tare)
 
 
-def simulation(
+def pose_simulation(
     asked: ForceDisplacement, begin: Constants, displacement: Floats
 ) -> SpecimenSimulation:
-    """The specimen at the measured displacements."""
+    """Poses the specimen at the measured displacements."""
     lattice, contact = asked.lattice.network(), begin.contact
     bottom, top = (np.array(asked.lattice.side(name)) for name in ("bottom", "top"))
     towards = np.array([*DIRECTIONS[asked.test], 0.0])
@@ -107,7 +107,7 @@ def simulation(
 
 
 def force_on(lattice: Lattice, moved: Ints, towards: Floats) -> Seen:
-    """The force (n,) on units along a direction: the change of energy with their displacement.
+    """Computes the force (n,) on units along a direction: the slope of energy over their shift.
 
     Contact acts on rotations alone, so its energy does not change with a displacement.
     """

@@ -1,4 +1,4 @@
-"""Free decay of two units on one ligament: an angle over time."""
+"""Measures the free decay of two units on one ligament: an angle over time."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import detrend, find_peaks
 
-from pipeline.calibration.experiments.experiment import MeasuredValues
-from pipeline.calibration.inputs import Constants, FreeDecay, Name, csv_readings
-from pipeline.problem.fields import units
+from pipeline.calibration.experiments.experiment import LEAST_LINES, MeasuredValues
+from pipeline.calibration.inputs import ConstantName, Constants, FreeDecay
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
 
@@ -24,8 +24,8 @@ SAMPLES = 32
 """Least number of samples of a trace."""
 
 
-class Peaks(NamedTuple):
-    """What a line through the logarithms of peaks tells.
+class DecayPeaks(NamedTuple):
+    """Holds the decay by a line through the logarithms of peaks.
 
     Attributes:
         ratio, error: damping ratio and its standard error.
@@ -38,7 +38,7 @@ class Peaks(NamedTuple):
 
 
 def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
-    """Times in s, from zero, and angles in rad from the file of a set.
+    """Reads times in s, from zero, and angles in rad from the file of a set.
 
     Raises:
         UserError: the file cannot be used.
@@ -46,7 +46,7 @@ def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
     assert asked.file is not None
     path = folder / asked.file
     wanted = {asked.columns.time: units.TIME, asked.columns.angle: units.ANGLE}
-    time, angle = csv_readings.read(path, wanted).T
+    time, angle = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
     key, remedy = asked.columns.time, "sort the lines by time, each time once"
     if (np.diff(time) <= 0).any():
         line = int(np.argmax(np.diff(time) <= 0)) + 2
@@ -55,14 +55,14 @@ def read(asked: FreeDecay, folder: Path) -> tuple[Floats, Floats]:
     if len(time) < SAMPLES:
         remedy = f"give {SAMPLES} lines or more"
         raise UserError(f"only {len(time)} samples", file=path, remedy=remedy)
-    if by_peaks(time - time[0], angle) is None:
+    if fit_peaks(time - time[0], angle) is None:
         remedy = "cut the trace to begin after the release, with several periods above the noise"
         raise UserError("no decaying oscillation is seen", file=path, remedy=remedy)
     return time - time[0], angle
 
 
-def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
-    """Damping ratio by the authors' method: the slope of the logarithms of the peaks.
+def fit_peaks(time: Floats, angle: Floats) -> DecayPeaks | None:
+    """Computes the damping ratio by the authors' method: the slope of the logarithms of peaks.
 
     A trend is taken off first. With the slope m and the frequency w of the damped oscillation, the
     ratio is 1 / sqrt(1 + (w / m)^2). The logarithms are weighted by the peaks' heights, since noise
@@ -87,26 +87,26 @@ def by_peaks(time: Floats, angle: Floats) -> Peaks | None:
         return None
     ratio = 1 / np.sqrt(1 + (frequency / slope) ** 2)
     error = ratio * (1 - ratio**2) * np.sqrt(scatter[0, 0]) / -slope
-    return Peaks(float(ratio), float(error), frequency)
+    return DecayPeaks(float(ratio), float(error), frequency)
 
 
 @dataclass(frozen=True)
-class Decay:
-    """A trace (``experiment.Experiment``).
+class DecayTest:
+    """Holds a trace (``experiment.Experiment``).
 
     Its own unknowns are offset (rad), drift (rad/s), the amplitudes of cosine and sine (rad), and
     the logarithm of the undamped frequency (rad/s).
     """
 
     measured: MeasuredValues
-    peaks: Peaks
-    sees: tuple[Name, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
+    peaks: DecayPeaks
+    sees: tuple[ConstantName, ...] = ("damping_ratio", "damping_rotation", "bending_stiffness")
 
     @property
     def own_start(self) -> Floats:
-        """What a linear fit with the peaks' frequency and damping finds."""
+        """Fits offset, drift and amplitudes at the peaks' frequency and damping."""
         frequency = self.peaks.frequency / np.sqrt(1 - self.peaks.ratio**2)
-        shapes = terms(self.measured.abscissa, self.peaks.ratio, frequency)
+        shapes = decay_terms(self.measured.abscissa, self.peaks.ratio, frequency)
         return np.append(np.linalg.lstsq(shapes, self.measured.values)[0], np.log(frequency))
 
     @property
@@ -116,22 +116,22 @@ class Decay:
         return np.array([size, size / whole, size, size, 1 / (self.peaks.frequency * whole)])
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
-        shapes = terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
+        """Predicts angles, see ``experiment.Experiment``."""
+        shapes = decay_terms(self.measured.abscissa, constants.ratio, float(np.exp(own[-1])))
         return np.asarray(shapes @ own[:-1])
 
 
-def terms(time: Floats, ratio: float, frequency: float) -> Floats:
-    """What the trace (n,) is a sum of (n, 4): 1, t, and a decaying cosine and sine."""
+def decay_terms(time: Floats, ratio: float, frequency: float) -> Floats:
+    """Computes the terms (n, 4) of a trace (n,): 1, t, and a decaying cosine and sine."""
     envelope, phase = np.exp(-ratio * frequency * time), frequency * np.sqrt(1 - ratio**2) * time
     oscillation = [envelope * np.cos(phase), envelope * np.sin(phase)]
     return np.stack([np.ones_like(time), time, *oscillation], axis=1)
 
 
-def experiment(asked: FreeDecay, time: Floats, angle: Floats) -> Decay:
-    """The set as an experiment."""
+def pose_decay(asked: FreeDecay, time: Floats, angle: Floats) -> DecayTest:
+    """Returns the set as an experiment."""
     sigma = np.full(len(angle), 1.0 if asked.noise is None else asked.noise)
     measured = MeasuredValues(asked.name, asked.kind, time, angle, sigma, asked.noise is not None)
-    peaks = by_peaks(time, angle)
+    peaks = fit_peaks(time, angle)
     assert peaks is not None
-    return Decay(measured, peaks)
+    return DecayTest(measured, peaks)

@@ -1,4 +1,4 @@
-"""Full-field fit: the motion of every free unit of a track, driven as its held units were."""
+"""Fits the motion of every free unit of a track, driven as its held units were."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import xarray as xr
 from jax import Array
 
 from pipeline.calibration.experiments.experiment import ELASTIC, MeasuredValues
-from pipeline.calibration.experiments.load_cell import LoadCellReadings, load_of
-from pipeline.calibration.experiments.measured_drive import Change, changed, followed
+from pipeline.calibration.experiments.load_cell import LoadCellReadings, read_load
+from pipeline.calibration.experiments.measured_drive import DriveChange, apply_changes, smooth_drive
 from pipeline.calibration.experiments.simulated_experiment import (
     AnySolver,
     KnownDrive,
     Seen,
     SpecimenSimulation,
 )
-from pipeline.calibration.experiments.tracked_specimen import specimen
-from pipeline.calibration.inputs import Constants, Error, Name, TrackedMotion
+from pipeline.calibration.experiments.tracked_specimen import pose_specimen
+from pipeline.calibration.inputs import ConstantName, Constants, PoseError, TrackedMotion
 from pipeline.comparison import redrive
 from pipeline.datasets.tables import TABLES
 from pipeline.runtime import UserError
@@ -39,7 +39,7 @@ STEPS = 2
 """In time, between knots of the drive; more where it matters (``fitting``)."""
 UNKNOWN = np.array([0.1, 0.1, np.deg2rad(0.5)])
 """Standard deviation (mm, mm, rad) of what stays with a held unit, where it is not stated."""
-DAMPING: tuple[Name, ...] = ("damping_ratio", "damping_translation", "damping_rotation")
+DAMPING: tuple[ConstantName, ...] = ("damping_ratio", "damping_translation", "damping_rotation")
 COARSE = (
     "the frames are too few for the motion of the drive, so that what is between them may be"
     " missed: film faster, or drive more slowly"
@@ -48,7 +48,7 @@ COARSE = (
 
 @dataclass(frozen=True)
 class FullFieldExperiment:
-    """A track as an experiment (``experiment.Experiment``).
+    """Holds a track as an experiment (``experiment.Experiment``).
 
     Attributes:
         measured: displacements of the free units, one course after the other; then the load.
@@ -61,8 +61,8 @@ class FullFieldExperiment:
 
     measured: MeasuredValues
     simulation: SpecimenSimulation
-    sees: tuple[Name, ...]
-    changes: tuple[Change, ...]
+    sees: tuple[ConstantName, ...]
+    changes: tuple[DriveChange, ...]
     drive: KnownDrive | None = None
     part: Floats = field(default_factory=lambda: np.zeros(()))
 
@@ -77,16 +77,16 @@ class FullFieldExperiment:
         return np.zeros(0)
 
     def predict(self, constants: Constants, own: Floats) -> Floats:
-        """See ``experiment.Experiment``."""
+        """Predicts the motion, see ``experiment.Experiment``."""
         del own
         return self.simulation.predict(constants, self.drive) - self.part
 
     def pulled_back(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint."""
+        """Differentiates `bar @ predict` by the specimen's numbers (5,), by the adjoint."""
         return self.simulation.pulled_back(constants, bar, self.drive)
 
     def pulled_to_noise(self, constants: Constants, bar: Floats) -> Floats:
-        """Derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
+        """Computes derivatives (n_changes,) of `bar @ predict` by sizes of the drive's changes."""
         motion = self.simulation.pulled_to_drive(constants, bar, self.drive)
         assert isinstance(motion, redrive.HermiteMotion)
         value, slope = np.asarray(motion.value), np.asarray(motion.slope)
@@ -99,7 +99,7 @@ class FullFieldExperiment:
         )
 
     def with_drive_noise(self, constants: Constants) -> FullFieldExperiment:
-        """The same, knowing what the noise of the measured drive does to the prediction.
+        """Adds the effect of the measured drive's noise on the prediction.
 
         That is linearised about the drive that the free units speak for as well, by the noise that
         is known so far: one of a noisy drive would belong to another motion (Gauss and Newton's
@@ -110,10 +110,10 @@ class FullFieldExperiment:
         size = np.zeros(len(self.changes))
         if len(self.measured.spread):
             size = self.measured.causes(self.measured.values - self.predict(constants, np.zeros(0)))
-        units, motion = simulation.drive.units, changed(filtered, self.changes, size)
+        units, motion = simulation.drive.units, apply_changes(filtered, self.changes, size)
         drive = KnownDrive(units, motion)
         middle = simulation.predict(constants, drive)
-        moved = (changed(motion, [each], np.ones(1)) for each in self.changes)
+        moved = (apply_changes(motion, [each], np.ones(1)) for each in self.changes)
         causes = np.stack(
             [simulation.predict(constants, KnownDrive(units, each)) - middle for each in moved],
             axis=1,
@@ -122,35 +122,35 @@ class FullFieldExperiment:
         return replace(self, measured=measured, drive=drive, part=causes @ size)
 
     def finer(self) -> FullFieldExperiment:
-        """The same with half the steps in time; of equilibria there are none."""
+        """Halves the steps in time; of equilibria there are none."""
         return replace(self, simulation=self.simulation.finer())
 
 
-def experiment(
+def pose_track(
     asked: TrackedMotion, folder: Path, begin: Constants, track: xr.Dataset
 ) -> FullFieldExperiment:
-    """The set as an experiment.
+    """Returns the set as an experiment.
 
     Raises:
         UserError: the problem is wrong, or the track is of something else.
     """
-    made, path = specimen(asked, folder), folder / str(asked.file)
+    made, path = pose_specimen(asked, folder), folder / str(asked.file)
     _refuse_other_contact(made.scene, begin, folder / asked.problem)
     vertices = made.vertices(track, path)
     upright = made.upright(track, vertices)
-    bias = UNKNOWN if asked.bias is None else three(asked.bias)
+    bias = UNKNOWN if asked.bias is None else per_dof(asked.bias)
     try:
-        drive = followed(upright, made.scene, bias)
+        drive = smooth_drive(upright, made.scene, bias)
     except UserError as error:
         error.file = str(path)
         raise
-    driven = redrive.under(made.scene, drive.held)
+    driven = redrive.drive_as_measured(made.scene, drive.held)
     frames = np.arange(0, track.sizes["time"], asked.every)
     shown = upright.isel(time=frames)
-    chosen = _chosen(shown, driven)
+    chosen = _select_values(shown, driven)
     measured, load = _measured(asked, shown, driven, chosen), None
     if asked.load is not None:
-        load = load_of(asked.load, made, asked.case, shown, path)
+        load = read_load(asked.load, made, asked.case, shown, path)
         measured = load.joined(measured)
     simulation = SpecimenSimulation(
         driven.lattice,
@@ -169,8 +169,8 @@ def experiment(
     return FullFieldExperiment(replace(measured, remarks=remarks), simulation, sees, drive.changes)
 
 
-def three(error: Error) -> Floats:
-    """An error of places and rotations for (ux, uy, theta)."""
+def per_dof(error: PoseError) -> Floats:
+    """Repeats an error of places and rotations for (ux, uy, theta)."""
     return np.array([error.displacement, error.displacement, error.rotation])
 
 
@@ -185,8 +185,8 @@ def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
         raise UserError(what, file=path, key="contact", remedy=remedy)
 
 
-def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
-    """(n, 3) place of the unit, dof, frame of what counts: free, well seen, course by course.
+def _select_values(track: xr.Dataset, driven: Scene) -> Ints:
+    """Selects (n, 3) place of the unit, dof, frame: free, well seen, course by course.
 
     The first frame is the reference of all others: by definition nothing has moved.
     """
@@ -204,14 +204,14 @@ def _chosen(track: xr.Dataset, driven: Scene) -> Ints:
 def _measured(
     asked: TrackedMotion, track: xr.Dataset, driven: Scene, chosen: Ints
 ) -> MeasuredValues:
-    """What counts of a track in the design's frame."""
+    """Selects the values of a track that count, in the design's frame."""
     place, dof, frame = chosen.T
     unit = driven.lattice.id[place]
     values, sigma = (
         track[name].transpose("unit", "dof", "time").values.astype(float)[unit, dof, frame]
         for name in ("displacement", "sigma")
     )
-    own = np.full(3, np.inf) if asked.bias is None else three(asked.bias)
+    own = np.full(3, np.inf) if asked.bias is None else per_dof(asked.bias)
     return MeasuredValues(
         asked.name,
         asked.kind,
@@ -225,7 +225,7 @@ def _measured(
 
 
 def _seen(chosen: Ints, load: LoadCellReadings | None) -> Seen:
-    """What is measured of a motion: what counts of it, and the load if there is a cell."""
+    """Measures a motion: the displacements that count, and the load if there is a cell."""
     unit, dof, frame = chosen.T
 
     def seen(motion: Numbers, made: Parameters) -> Array:

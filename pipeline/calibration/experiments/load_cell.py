@@ -1,4 +1,4 @@
-"""The load cell of a track: the force of the drive along its direction, at equilibria."""
+"""Reads the load cell of a track: the force of the drive along its direction, at equilibria."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pipeline.calibration.experiments.experiment import MeasuredValues
 from pipeline.calibration.experiments.force_displacement import force_on
 from pipeline.calibration.experiments.simulated_experiment import Seen
 from pipeline.calibration.experiments.tracked_specimen import TrackedSpecimen
-from pipeline.calibration.inputs import LoadCell
+from pipeline.calibration.inputs import LoadCellOptions
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
 from sim.structure import DistanceContact
@@ -41,7 +41,7 @@ class LoadCellReadings(NamedTuple):
     channel: int
 
     def joined(self, motion: MeasuredValues) -> MeasuredValues:
-        """The motion with the readings behind it."""
+        """Appends the readings to a motion."""
         count = len(self.value)
         return replace(
             motion,
@@ -53,10 +53,10 @@ class LoadCellReadings(NamedTuple):
         )
 
 
-def load_of(
-    asked: LoadCell, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
+def read_load(
+    asked: LoadCellOptions, made: TrackedSpecimen, case: int, track: xr.Dataset, path: Path
 ) -> LoadCellReadings:
-    """The readings of a track's load cell.
+    """Reads the load cell of a track.
 
     Raises:
         UserError: there are none, or what they read is not known.

@@ -1,4 +1,4 @@
-"""The measured motion of the held units as a fit takes it: without bias, and with its covariance.
+"""Smooths the measured motion of the held units: without bias, and with its covariance.
 
 Every course is a cubic spline with equal intervals that begins at zero, as the simulation does, and
 a constant that stays with its unit, which is no motion. A spline that smooths until its residuals
@@ -36,8 +36,8 @@ _PART = 0.5
 """Coefficients are at most this part of the frames."""
 
 
-class Change(NamedTuple):
-    """One course of a drive changed by one standard deviation of its noise.
+class DriveChange(NamedTuple):
+    """Changes one course of a drive by one standard deviation of its noise.
 
     Attributes:
         place, dof: which course.
@@ -50,10 +50,10 @@ class Change(NamedTuple):
     slope: Floats
 
 
-def changed(
-    motion: redrive.HermiteMotion, changes: Sequence[Change], size: Floats
+def apply_changes(
+    motion: redrive.HermiteMotion, changes: Sequence[DriveChange], size: Floats
 ) -> redrive.HermiteMotion:
-    """The motion with changes of a size each, in standard deviations."""
+    """Adds changes of a size each to a motion, in standard deviations."""
     value, slope = (np.array(part) for part in (motion.value, motion.slope))
     for each, times in zip(changes, size, strict=True):
         value[:, each.place, each.dof] += times * each.value
@@ -61,8 +61,8 @@ def changed(
     return motion._replace(value=value, slope=slope)
 
 
-class Followed(NamedTuple):
-    """The drive of a fit.
+class SmoothedDrive(NamedTuple):
+    """Holds the drive of a fit.
 
     Attributes:
         held: units, and their motion by values and slopes at the knots.
@@ -70,14 +70,14 @@ class Followed(NamedTuple):
         coarse: whether the frames are too few for enough intervals.
     """
 
-    held: redrive.Held
-    changes: tuple[Change, ...]
+    held: redrive.HeldMotion
+    changes: tuple[DriveChange, ...]
     coarse: bool
 
 
 @dataclass(frozen=True)
-class _Seen:
-    """Courses of the held units. At the first frame they rest: it tells the constants.
+class _HeldCourses:
+    """Holds courses of the held units. At the first frame they rest: it tells the constants.
 
     Attributes:
         time: (n,) s.
@@ -95,7 +95,7 @@ class _Seen:
     reach: Floats
 
     def equations(self, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
-        """Whitened equations (n, 1 + n_coefficients) of a course, and their right sides (n,).
+        """Builds whitened equations (n, 1 + n_coefficients) of a course, and right sides (n,).
 
         The first unknown is the constant; the first coefficient is zero. Where no frame tells a
         coefficient, the course goes on as it went, give or take the range of the motions.
@@ -111,24 +111,24 @@ class _Seen:
         return rows, np.append(given, np.zeros(len(straight) + 1))
 
     def basis(self, intervals: int) -> Floats:
-        """(n, n_coefficients) all splines of the basis at the frames."""
+        """Evaluates all splines of the basis at the frames (n, n_coefficients)."""
         knots = self.knots(intervals)
         return np.asarray(BSpline.design_matrix(self.time, knots, _DEGREE).toarray())
 
     def knots(self, intervals: int) -> Floats:
-        """Of the spline, those at the ends fourfold."""
+        """Places the knots of the spline, those at the ends fourfold."""
         inner = np.linspace(0.0, self.time[-1], intervals + 1)
         return np.pad(inner, _DEGREE, mode="edge")
 
     def misfit(self, intervals: int, place: int, dof: int) -> float:
-        """Sum of squares that a course of so many intervals leaves, in the tracker's variances."""
+        """Sums squares that a course of so many intervals leaves, in the tracker's variances."""
         rows, given = self.equations(intervals, place, dof)
         rest = rows @ np.linalg.lstsq(rows, given)[0] - given
         return float(np.sum(rest[: np.count_nonzero(self.there[:, place])] ** 2))
 
 
-def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
-    """The motion of the held units of a track, which begins at rest.
+def smooth_drive(track: xr.Dataset, scene: Scene, bias: Floats) -> SmoothedDrive:
+    """Smooths the motion of the held units of a track, which begins at rest.
 
     Args:
         track: of the specimen, in the design's frame.
@@ -138,28 +138,30 @@ def followed(track: xr.Dataset, scene: Scene, bias: Floats) -> Followed:
     Raises:
         UserError: no driven unit was seen.
     """
-    held = redrive.held_motion(track, scene)
-    seen = _seen(track, held, scene, bias)
+    held = redrive.filter_held_motion(track, scene)
+    seen = _held_courses(track, held, scene, bias)
     places = np.flatnonzero(~held.assumed).tolist()
     most = max(1, int(_PART * len(seen.time)) - _DEGREE)
-    best = min(_doubled(most), key=lambda count: _criterion(seen, places, count))
+    best = min(_powers_of_two(most), key=lambda count: _criterion(seen, places, count))
     intervals = min(_FINER * best, most)
     value, slope = (np.zeros((intervals + 1, len(held.unit), 3)) for _ in range(2))
-    changes: list[Change] = []
+    changes: list[DriveChange] = []
     for place in places:
         for dof in range(3):
             values, slopes = _course(seen, intervals, place, dof)
             value[:, place, dof], slope[:, place, dof] = values[0], slopes[0]
             pairs = zip(values[1:], slopes[1:], strict=True)
-            changes.extend(Change(place, dof, *pair) for pair in pairs)
+            changes.extend(DriveChange(place, dof, *pair) for pair in pairs)
     mean, guessed = held.driven & ~held.assumed, held.driven & held.assumed
     for course in (value, slope):
         course[:, guessed] = course[:, mean].mean(axis=1, keepdims=True)
     motion = redrive.HermiteMotion(seen.time[-1] / intervals, value, slope)
-    return Followed(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
+    return SmoothedDrive(held._replace(motion=motion), tuple(changes), intervals < _COARSE * best)
 
 
-def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> _Seen:
+def _held_courses(
+    track: xr.Dataset, held: redrive.HeldMotion, scene: Scene, bias: Floats
+) -> _HeldCourses:
     chosen = track.sel(unit=scene.lattice.id[held.unit])
     measured, sigma = (
         chosen[name].transpose("time", "unit", "dof").values.astype(float)
@@ -169,16 +171,16 @@ def _seen(track: xr.Dataset, held: redrive.Held, scene: Scene, bias: Floats) -> 
     reach = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
     reach += np.nanmax(sigma, axis=(0, 1))
     time = track["time"].values - track["time"].values[0]
-    return _Seen(time, measured, sigma, there, bias, reach)
+    return _HeldCourses(time, measured, sigma, there, bias, reach)
 
 
-def _doubled(most: int) -> list[int]:
-    """1, 2, 4 and so on, up to a number."""
+def _powers_of_two(most: int) -> list[int]:
+    """Lists 1, 2, 4 and so on, up to a number."""
     return [1 << k for k in range(most.bit_length())]
 
 
-def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
-    """Akaike's criterion of all courses with so many intervals."""
+def _criterion(seen: _HeldCourses, places: list[int], intervals: int) -> float:
+    """Computes Akaike's criterion of all courses with so many intervals."""
     count = 3 * int(seen.there[:, places].sum())
     unknown = 3 * len(places) * (intervals + _DEGREE)
     misfit = sum(seen.misfit(intervals, place, dof) for place in places for dof in range(3))
@@ -186,8 +188,8 @@ def _criterion(seen: _Seen, places: list[int], intervals: int) -> float:
     return count * float(np.log(max(misfit / count, _FLOOR))) + 2 * unknown * correction
 
 
-def _course(seen: _Seen, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
-    """Values and slopes (1 + n_changes, n_knots) of a course, and of its independent changes."""
+def _course(seen: _HeldCourses, intervals: int, place: int, dof: int) -> tuple[Floats, Floats]:
+    """Fits values and slopes (1 + n_changes, n_knots) of a course and its independent changes."""
     rows, given = seen.equations(intervals, place, dof)
     orthogonal, factor = np.linalg.qr(rows)
     root = np.linalg.inv(factor)

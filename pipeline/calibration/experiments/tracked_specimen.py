@@ -1,4 +1,4 @@
-"""The specimen of a track: a structure of a study, and its motion in the frame of the design."""
+"""Poses the structure that a track is of, and turns its motion into the design's frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline import problem as problems
 from pipeline.calibration.inputs import TrackedMotion
-from pipeline.comparison import measured_places, register
+from pipeline.comparison import measure_places, register
 from pipeline.posing import flat_vertices, scene_of, spread
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
@@ -23,7 +23,7 @@ LEAST_FRAMES = 8
 
 
 class TrackedSpecimen(NamedTuple):
-    """A structure of a study.
+    """Holds a structure of a study.
 
     Attributes:
         problem: of the study.
@@ -36,7 +36,7 @@ class TrackedSpecimen(NamedTuple):
     stiffer: Floats
 
     def vertices(self, track: xr.Dataset, path: Path) -> Floats:
-        """(n_vertices, 2) as built, mm.
+        """Reads the vertices (n_vertices, 2) as built, mm.
 
         Raises:
             UserError: the track, read from `path`, is of something else.
@@ -51,21 +51,21 @@ class TrackedSpecimen(NamedTuple):
         return built
 
     def upright(self, track: xr.Dataset, vertices: Floats) -> xr.Dataset:
-        """The track turned into the design's frame; `vertices` (n_vertices, 2) are as built."""
+        """Turns the track into the design's frame; `vertices` (n_vertices, 2) are as built."""
         lattice = self.scene.lattice
         centre = spread(np.asarray(shape(lattice, vertices).centroid), lattice, track.sizes["unit"])
-        found = register(centre, measured_places(track, centre))
+        found = register(centre, measure_places(track, centre))
         seen = track["displacement"].transpose("time", "unit", "dof").values.astype(float)
         return track.assign(displacement=(("time", "unit", "dof"), found.upright(seen)))
 
     def towards(self, case: int) -> Floats | None:
-        """(3,) unit vector along which a load case drives; None where it has no such direction."""
+        """Computes the direction (3,) of a load case, a unit vector; None where it has none."""
         along = getattr(self.problem.drive, "directions", None)
         return None if along is None else np.array([np.cos(along[case]), np.sin(along[case]), 0.0])
 
 
-def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
-    """The structure that a set is of.
+def pose_specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
+    """Poses the structure that a set is of.
 
     Raises:
         UserError: the problem is wrong, or has no such load case.
@@ -85,8 +85,8 @@ def specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
     )
 
 
-def read(asked: TrackedMotion, folder: Path) -> xr.Dataset:
-    """The track of a set.
+def read_track(asked: TrackedMotion, folder: Path) -> xr.Dataset:
+    """Reads the track of a set.
 
     Raises:
         UserError: it cannot be read, or is too short.

@@ -1,4 +1,4 @@
-"""What computed measurements are made with: the sections `virtual` of a calibration."""
+"""Describes computed measurements: the sections `virtual` of a calibration."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class VirtualDecay(Section):
     noise: Amplitude
 
 
-class Error(Section):
+class PoseError(Section):
     """Standard deviations.
 
     Attributes:
@@ -65,13 +65,13 @@ class VirtualTrack(Section):
     """
 
     rate: Frequency
-    noise: Error
-    bias: Error | None = None
+    noise: PoseError
+    bias: PoseError | None = None
     load: Force | None = None
 
 
 class ComputedMeasurements(Section):
-    """What computed data are made with.
+    """True constants and noise of computed data.
 
     Attributes:
         truth: the true constants.

@@ -1,4 +1,4 @@
-"""The constants that can be found, and a specimen's values of them as logarithms."""
+"""Converts the constants of a specimen to logarithms and back."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.calibration.inputs.description import Calibration, Name
+from pipeline.calibration.inputs.description import Calibration, ConstantName
 from pipeline.problem.sections import Contact, MaterialConstants
 from sim.core import Floats
 from sim.structure import VoidAngleContact, unrotated_inertia
 
-UNITS: dict[Name, str] = {
+UNITS: dict[ConstantName, str] = {
     "axial_stiffness": "N/mm",
     "shear_stiffness": "N/mm",
     "bending_stiffness": "N mm/rad",
@@ -24,7 +24,7 @@ UNITS: dict[Name, str] = {
 }
 """Working unit of each."""
 
-WRITTEN: dict[Name, tuple[str, float]] = {
+WRITTEN: dict[ConstantName, tuple[str, float]] = {
     "axial_stiffness": ("N/mm", 1.0),
     "shear_stiffness": ("N/mm", 1.0),
     "bending_stiffness": ("N mm/rad", 1.0),
@@ -37,7 +37,7 @@ WRITTEN: dict[Name, tuple[str, float]] = {
 
 
 class Constants(NamedTuple):
-    """Values of all constants of a specimen, wanted or not.
+    """Holds values of all constants of a specimen, wanted or not.
 
     Attributes:
         material: density, stiffness and damping.
@@ -67,8 +67,8 @@ class Constants(NamedTuple):
         _, rotation = self.material.damping_coefficients(self.spacing)
         return rotation / (2 * math.sqrt(inertia * self.material.bending_stiffness))
 
-    def value(self, name: Name) -> float:
-        """The value of one constant in its working unit."""
+    def value(self, name: ConstantName) -> float:
+        """Computes the value of one constant in its working unit."""
         if name == "contact_cutoff":
             return self.law.cutoff
         if name == "damping_ratio":
@@ -88,15 +88,15 @@ class Constants(NamedTuple):
             self.contact.barrier_angle, given if self.cutoff is None else self.cutoff
         )
 
-    def logs(self, names: Sequence[Name]) -> Floats:
+    def logs(self, names: Sequence[ConstantName]) -> Floats:
         """Natural logarithms of constants; of the cut-off, that of its distance to the barrier."""
         barrier = self.law.barrier
         return np.log(
             [self.value(name) - (barrier if name == "contact_cutoff" else 0.0) for name in names]
         )
 
-    def at(self, names: Sequence[Name], logs: Floats) -> Constants:
-        """These constants with the named ones replaced."""
+    def at(self, names: Sequence[ConstantName], logs: Floats) -> Constants:
+        """Replaces the named constants."""
         stiffness: dict[str, float] = {}
         damping: dict[str, float] = {}
         cutoff = self.cutoff
@@ -112,7 +112,7 @@ class Constants(NamedTuple):
         return self._replace(material=changed, cutoff=cutoff)
 
 
-def start(asked: Calibration) -> Constants:
-    """The constants that a calibration starts from."""
+def start_constants(asked: Calibration) -> Constants:
+    """Returns the constants that a calibration starts from."""
     made = Constants(asked.material, asked.contact, asked.spacing)
     return made._replace(cutoff=made.law.cutoff) if "contact_cutoff" in asked.fit else made

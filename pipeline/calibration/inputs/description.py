@@ -1,4 +1,4 @@
-"""The YAML file of a calibration: which constants are wanted, and what was measured."""
+"""Describes a calibration: the wanted constants and the measurements."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field, StringConstraints, model_validator
 from pipeline.calibration.inputs.computed_measurements import (
     Amplitude,
     ComputedMeasurements,
-    Error,
+    PoseError,
     VirtualDecay,
     VirtualForces,
     VirtualTrack,
@@ -17,7 +17,7 @@ from pipeline.calibration.inputs.computed_measurements import (
 from pipeline.problem.fields import Count, Force, Length, Section, exactly_one, fault
 from pipeline.problem.sections import Contact, Lattice, MaterialConstants
 
-Name = Literal[
+ConstantName = Literal[
     "axial_stiffness",
     "shear_stiffness",
     "bending_stiffness",
@@ -109,7 +109,7 @@ class FreeDecay(Section):
         return self
 
 
-class LoadCell(Section):
+class LoadCellOptions(Section):
     """A load cell that was read during a recording, along the drive of a static load case.
 
     Attributes:
@@ -150,8 +150,8 @@ class TrackedMotion(Section):
     case: Annotated[int, Field(ge=0, strict=True)] = 0
     every: Count = 1
     noise: Literal["tracker", "estimated"] = "estimated"
-    bias: Error | None = None
-    load: LoadCell | None = None
+    bias: PoseError | None = None
+    load: LoadCellOptions | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -162,11 +162,13 @@ class TrackedMotion(Section):
         return self
 
 
-Set = Annotated[ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminator="kind")]
+MeasurementSet = Annotated[
+    ForceDisplacement | FreeDecay | TrackedMotion, Field(discriminator="kind")
+]
 
 
 class Calibration(Section):
-    """Which constants are wanted, from which measurements.
+    """Constants that are wanted, and the measurements to find them from.
 
     Attributes:
         title: one line about it.
@@ -185,8 +187,8 @@ class Calibration(Section):
     spacing: Length
     material: MaterialConstants
     contact: Contact | None = None
-    fit: Annotated[tuple[Name, ...], Field(min_length=1)]
-    data: Annotated[tuple[Set, ...], Field(min_length=1)]
+    fit: Annotated[tuple[ConstantName, ...], Field(min_length=1)]
+    data: Annotated[tuple[MeasurementSet, ...], Field(min_length=1)]
     virtual: ComputedMeasurements | None = None
     synthetic: bool = False
 
@@ -198,7 +200,7 @@ class Calibration(Section):
 
 
 def _faults(asked: Calibration) -> list[tuple[str, str, str]]:
-    """What the sections do not see by themselves: fault, remedy, key."""
+    """Checks the sections against one another: fault, remedy, key."""
     found = []
     names = [each.name for each in asked.data]
     if len(set(names)) < len(names):

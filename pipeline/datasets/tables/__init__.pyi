@@ -1,8 +1,7 @@
 from .designs import NETWORK as NETWORK
-from .schemas import ATTRIBUTES as ATTRIBUTES
 from .schemas import SCHEMA_VERSION as SCHEMA_VERSION
+from .schemas import SCHEMAS as SCHEMAS
 from .schemas import TABLES as TABLES
-from .schemas import TITLES as TITLES
 from .schemas import Kind as Kind
 from .variables import Table as Table
 from .variables import Variable as Variable

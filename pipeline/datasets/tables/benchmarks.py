@@ -1,4 +1,4 @@
-"""What datasets hold of benchmarks: times, errors and work of methods, point by point."""
+"""Lists variables of benchmarks: times, errors and work of methods, point by point."""
 
 from __future__ import annotations
 
@@ -13,13 +13,7 @@ BENCHMARK: Table = {
     "setting": names("point", "its tolerance, step or size"),
     "task": names("point", "what was computed: the loss alone, or with its gradient"),
     "units": label(("point",), "1", "number of units of the lattice", "int64"),
-    "own": Variable(
-        ("point",),
-        "1",
-        "whose method it is",
-        "int8",
-        flags={"baseline": 0, "own": 1},
-    ),
+    "own": Variable(("point",), "1", "whose method it is", "int8", flags={"baseline": 0, "own": 1}),
     "cpu_time": Variable(_RUN, "s", "processor time of a run, one core", gaps=True),
     "wall_time": Variable(_RUN, "s", "time of a run by the clock", gaps=True),
     "compile_time": Variable(

@@ -1,4 +1,4 @@
-"""What datasets hold of calibrations: constants with their errors, and the fit to the data."""
+"""Lists variables of calibrations: constants with their errors, and the fit to the data."""
 
 from __future__ import annotations
 

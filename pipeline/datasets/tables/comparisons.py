@@ -1,4 +1,4 @@
-"""What datasets hold of a recording beside the simulation of what it shows."""
+"""Lists variables of a recording with the simulation of the same motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What datasets hold of a design: the network, its shape, and how the optimiser came to it."""
+"""Lists variables of a design: the network, its shape, the history of its optimisations."""
 
 from __future__ import annotations
 
@@ -22,11 +22,7 @@ NETWORK: Table = {
         flags={"outside": 0, "inside": 1},
     ),
     "support": Variable(
-        ("unit",),
-        "1",
-        "support of the unit",
-        "int8",
-        flags={"free": 0, "clamped": 1, "driven": 2},
+        ("unit",), "1", "support of the unit", "int8", flags={"free": 0, "clamped": 1, "driven": 2}
     ),
     "ligament_unit": Variable(
         ("ligament", "end"), "1", "units that the ligament of the intact lattice joins", "int64"

@@ -1,4 +1,4 @@
-"""What a dataset holds of the gains of designs that hold against more than the study asks for."""
+"""Lists variables of the gains of designs that hold against more than the study asks for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What datasets hold of simulated motions: of the structures, and of their losses over a sweep."""
+"""Lists variables of simulated motions: of the structures, and of losses over a sweep."""
 
 from __future__ import annotations
 

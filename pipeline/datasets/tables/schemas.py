@@ -1,9 +1,10 @@
-"""The schema of every dataset, as tables: which variables, on which dims, in what unit."""
+"""Lists the schema of every dataset, as tables of variables with their dims and units."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from types import MappingProxyType
+from typing import Literal, NamedTuple
 
 from pipeline.datasets.tables.benchmarks import BENCHMARK, CONTEST, MEASURED, TRACKING
 from pipeline.datasets.tables.calibrations import CALIBRATION, WARNED
@@ -37,62 +38,53 @@ Kind = Literal[
     "tracking",
 ]
 
-TABLES: Mapping[Kind, Table] = {
-    "design": DESIGN,
-    "design_method": DESIGNMETHOD,
-    "response": RESPONSE,
-    "sweep": SWEEP,
-    "scatter": SCATTER,
-    "verification": VERIFICATION,
-    "spectrum": SPECTRUM,
-    "gains": GAINS,
-    "specimen": SPECIMEN,
-    "track": TRACK,
-    "truth": TRUTH,
-    "comparison": COMPARISON,
-    "calibration": CALIBRATION,
-    "benchmark": BENCHMARK,
-    "contest": CONTEST,
-    "tracking": TRACKING,
-}
-"""The variables of each kind of dataset, in the order in which they are written."""
 
-ATTRIBUTES: Mapping[Kind, Mapping[str, str]] = {
-    "design": {"shipped_method": "the method whose design this is"},
-    "design_method": {},
-    "response": {},
-    "sweep": {},
-    "scatter": {},
-    "verification": {},
-    "spectrum": {},
-    "gains": {},
-    "specimen": RECORDED,
-    "track": RECORDED,
-    "truth": RECORDED,
-    "comparison": COMPARED,
-    "calibration": WARNED,
-    "benchmark": MEASURED,
-    "contest": MEASURED,
-    "tracking": MEASURED,
-}
-"""What each kind tells in attributes of its own, beside its provenance."""
+class Schema(NamedTuple):
+    """Describes one kind of dataset.
 
-TITLES: Mapping[Kind, str] = {
-    "design": "Cloak as designed, with the history of its optimisations",
-    "design_method": "Cloak as designed by one method, with the history of the optimisation",
-    "response": "Motions, forces and energies of the structures, simulated",
-    "sweep": "Losses of the structures over parameters of the problem",
-    "scatter": "Responses of imperfect copies of a design",
-    "verification": "Results with finer steps and with the other law of contact",
-    "spectrum": "Small vibrations of the structures, and waves in their unit cell",
-    "gains": "Losses of designs that hold against more than the study's own drive",
-    "specimen": "Motion of a specimen for a synthetic video, simulated",
-    "track": "Motion of every unit in a video, with its uncertainty",
-    "truth": "Motion of every unit that a synthetic video shows",
-    "comparison": "Motion in a recording beside its simulation",
-    "calibration": "Constants of a specimen, found from measurements, with their errors",
-    "benchmark": "Run time, error and work of several methods",
-    "contest": "Optimisers on the same design problem, evaluation by evaluation",
-    "tracking": "Accuracy of tracking against frame rate",
+    Attributes:
+        table: its variables, in the order in which they are written.
+        title: what it holds, in a line; a dataset may have a title of its own.
+        attributes: what it tells in attributes of its own, beside its provenance.
+    """
+
+    table: Table
+    title: str
+    attributes: Mapping[str, str] = MappingProxyType({})
+
+
+SCHEMAS: Mapping[Kind, Schema] = {
+    "design": Schema(
+        DESIGN,
+        "Cloak as designed, with the history of its optimisations",
+        {"shipped_method": "the method whose design this is"},
+    ),
+    "design_method": Schema(
+        DESIGNMETHOD, "Cloak as designed by one method, with the history of the optimisation"
+    ),
+    "response": Schema(RESPONSE, "Motions, forces and energies of the structures, simulated"),
+    "sweep": Schema(SWEEP, "Losses of the structures over parameters of the problem"),
+    "scatter": Schema(SCATTER, "Responses of imperfect copies of a design"),
+    "verification": Schema(
+        VERIFICATION, "Results with finer steps and with the other law of contact"
+    ),
+    "spectrum": Schema(
+        SPECTRUM, "Small vibrations of the structures, and waves in their unit cell"
+    ),
+    "gains": Schema(GAINS, "Losses of designs that hold against more than the study's own drive"),
+    "specimen": Schema(SPECIMEN, "Motion of a specimen for a synthetic video, simulated", RECORDED),
+    "track": Schema(TRACK, "Motion of every unit in a video, with its uncertainty", RECORDED),
+    "truth": Schema(TRUTH, "Motion of every unit that a synthetic video shows", RECORDED),
+    "comparison": Schema(COMPARISON, "Motion in a recording beside its simulation", COMPARED),
+    "calibration": Schema(
+        CALIBRATION, "Constants of a specimen, found from measurements, with their errors", WARNED
+    ),
+    "benchmark": Schema(BENCHMARK, "Run time, error and work of several methods", MEASURED),
+    "contest": Schema(
+        CONTEST, "Optimisers on the same design problem, evaluation by evaluation", MEASURED
+    ),
+    "tracking": Schema(TRACKING, "Accuracy of tracking against frame rate", MEASURED),
 }
-"""What each kind holds, in a line; a dataset may have a title of its own."""
+
+TABLES: Mapping[Kind, Table] = {kind: schema.table for kind, schema in SCHEMAS.items()}
+"""The variables of each kind of dataset."""

@@ -1,4 +1,4 @@
-"""What datasets hold of small vibrations: modes, transmission, waves in the unit cell."""
+"""Lists variables of small vibrations: modes, transmission, waves in the unit cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What datasets hold of motions that were filmed: as tracked, as rendered, as simulated for it."""
+"""Lists variables of filmed motions: as tracked, as rendered, as simulated for it."""
 
 from __future__ import annotations
 

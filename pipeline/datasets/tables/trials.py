@@ -1,4 +1,4 @@
-"""What datasets hold of trials of a design: imperfect copies, finer steps."""
+"""Lists variables of trials of a design: imperfect copies, finer steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A variable of a dataset: dims, unit, meaning; and those that several datasets share.
+"""Defines variables of a dataset (dims, unit, meaning) and those that several share.
 
 Coordinates are those of the specimen frame: origin at the lattice point of unit (0, 0), x to the
 right, y up, rotations counter-clockwise; `unit` carries the design's ids.
@@ -15,7 +15,7 @@ Type = Literal["float64", "float32", "int64", "int8", "str"]
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of a dataset.
+    """Describes one variable of a dataset.
 
     Attributes:
         dims: names of its dimensions.
@@ -44,7 +44,7 @@ class Variable:
 
     @property
     def unit_attribute(self) -> str:
-        """Where a file tells the unit: no `units` of CF's is true of components that differ."""
+        """Names the attribute of the unit: no `units` of CF's holds for components that differ."""
         return "component_units" if "(" in self.units else "units"
 
 
@@ -52,12 +52,12 @@ Table = dict[str, Variable]
 
 
 def label(dims: tuple[str, ...], units: str, long_name: str, dtype: Type = "float64") -> Variable:
-    """A coordinate."""
+    """Describes a coordinate."""
     return Variable(dims, units, long_name, dtype, coordinate=True)
 
 
 def names(dim: str, long_name: str, *values: str) -> Variable:
-    """A coordinate of names; where some are given, of these in their order."""
+    """Describes a coordinate of names; where some are given, of these in their order."""
     return Variable((dim,), "1", long_name, "str", values=values, coordinate=True)
 
 
@@ -68,9 +68,7 @@ UNIT: Table = {
     "xy": names("xy", "axis of the specimen frame", "x", "y"),
 }
 
-CASE: Table = {
-    "direction": label(("case",), "degree", "direction of the drive"),
-}
+CASE: Table = {"direction": label(("case",), "degree", "direction of the drive")}
 
 ENERGY = ("N mm",)
 """Unit of a loss that is an energy."""

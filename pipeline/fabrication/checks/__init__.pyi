@@ -1,3 +1,2 @@
-from .bill_checks import rows as rows
 from .package_check import STEPS as STEPS
 from .package_check import check_package as check_package

@@ -1,52 +1,89 @@
-"""A written package that is being checked, and what it has to hold."""
+"""Holds a written package that is being checked, beside the parts that it has to hold."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from pipeline.fabrication.checks import sheet_checks
-from pipeline.fabrication.checks.assembled_specimen import Shapes
-from pipeline.fabrication.checks.expected_parts import Wanted
-from pipeline.fabrication.engraving import Reading
-from pipeline.fabrication.readback import Drawing, read_drawings
+import xarray as xr
+from shapely import Geometry, Polygon
+
+from pipeline.fabrication.readback import BUG, Drawing, Fault, read_drawing
+from pipeline.fabrication.units import network
 from pipeline.problem.sections import Fabrication
+
+NOMINAL = "nominal"
+"""Ends the names of sheets without compensation for the kerf."""
+
+Shapes = Mapping[str, Geometry]
+"""Outlines by label, where they stand in the specimen."""
+
+
+@dataclass(frozen=True)
+class ExpectedParts:
+    """Holds the units of one structure of a design, by label.
+
+    Attributes:
+        polygons: outline as designed by label, in the specimen frame.
+        joints: the ends of each ligament as (label, vertex).
+    """
+
+    polygons: dict[str, Polygon]
+    joints: tuple[tuple[tuple[str, int], tuple[str, int]], ...]
+
+    @cached_property
+    def slots(self) -> dict[str, list[int]]:
+        """Vertices at which a ligament ends, one entry a ligament, by label."""
+        vertices: dict[str, list[int]] = {label: [] for label in self.polygons}
+        for label, vertex in sorted(end for joint in self.joints for end in joint):
+            vertices[label].append(vertex)
+        return vertices
+
+
+def expected_parts(design: xr.Dataset, structure: str) -> ExpectedParts:
+    """Reads the parts of the structure intact, altered or cloaked."""
+    net = network(design, structure)
+    polygons = {net.labels[number]: net.polygons[number] for number in net.numbers}
+    joints = ((net.labels[a], p, net.labels[b], q) for _, (a, p), (b, q), _ in net.ligaments)
+    return ExpectedParts(polygons, tuple(((one, p), (other, q)) for one, p, other, q in joints))
 
 
 @dataclass(frozen=True)
 class PackageRecord:
-    """A package's folder beside what is wanted of it.
+    """Holds a package's folder beside the parts expected of it.
 
     Attributes:
-        folder: that is checked.
-        wanted: units and ligaments that have to be there.
-        found: outlines of the units in the assembled specimen.
-        asked: the parameters of fabrication.
-        letters: what small units carry instead of their ids, by id.
+        folder: to be checked.
+        expected: units and ligaments that have to be there.
+        shapes: outlines of the units in the assembled specimen.
+        settings: of the fabrication.
+        letters: carried by small units instead of their ids, by id.
     """
 
     folder: Path
-    wanted: Wanted
-    found: Shapes
-    asked: Fabrication
+    expected: ExpectedParts
+    shapes: Shapes
+    settings: Fabrication
     letters: Mapping[str, str]
 
     @cached_property
     def drawings(self) -> dict[tuple[str, str], list[Drawing]]:
         """The sheets by kind and variant, as R2010."""
-        read: dict[tuple[str, str], list[Drawing]] = {}
+        sheets: dict[tuple[str, str], list[Drawing]] = {}
         for path in sorted((self.folder / "laser").glob("*.dxf")):
             if not path.stem.endswith("_r12"):
                 kind, _, variant = path.stem.split("_")
-                read.setdefault((kind, variant), []).append(read_drawings.read(path))
-        return read
+                sheets.setdefault((kind, variant), []).append(read_drawing(path))
+        return sheets
 
-    @cached_property
-    def engraved(self) -> dict[str, Reading]:
-        """How the ids of units stand that can be read on the sheets, by id."""
-        read: dict[str, Reading] = {}
-        for drawing in self.drawings.get(("units", sheet_checks.NOMINAL), []):
-            read |= sheet_checks.ids(drawing, self.letters)
-        return read
+    def check_units(self, counts: Mapping[str, int], where: Path) -> Iterator[Fault]:
+        """Checks the number of units: each is there once, and no other."""
+        for label in self.expected.polygons:
+            if (count := counts.get(label, 0)) != 1:
+                what = "it is missing" if count == 0 else f"it is there {count} times"
+                yield Fault(f"unit {label}", what, "laser", BUG, where)
+        for label in sorted(set(counts) - set(self.expected.polygons)):
+            what = "it is made, but the structure has no such unit"
+            yield Fault(f"unit {label}", what, "laser", BUG, where)

@@ -2,132 +2,145 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import shapely
 from shapely import Geometry
 
-from pipeline.fabrication.checks import plate_checks
 from pipeline.fabrication.checks.assembled_specimen import check_outline
-from pipeline.fabrication.checks.expected_parts import every_unit
 from pipeline.fabrication.checks.package_record import PackageRecord
-from pipeline.fabrication.engraving import read_sunk
-from pipeline.fabrication.readback import BUG, Fault, MeshBody, fault, read_meshes
-from pipeline.problem.sections import Fabrication
-
-_ALIKE = 1e-3
-"""Relative difference of volume that two files of one part may have."""
+from pipeline.fabrication.readback import (
+    BUG,
+    TOLERANCE,
+    VOLUME_TOLERANCE,
+    Fault,
+    MeshBody,
+    check_solid,
+    check_volume,
+    closest,
+    read_3mf,
+    read_stl,
+)
+from pipeline.problem.sections import Fabrication, Print
 
 _NEAR = 5e-3  # mm between the same vertex of two files
+_FOOTPRINT = np.array([0.02, 0.5, 0.98])  # shares of its height where a part's footprint is taken
+_LEAST_SUNK = 0.1  # mm^2 of an id
 
 
-def check(record: PackageRecord) -> Iterator[Fault]:
-    """Faults of all meshes of parts in a package."""
-    folder, wanted, asked = record.folder / "print", record.wanted, record.asked
-    units = {path.stem: read_meshes.read_stl(path) for path in sorted(folder.glob("units/*.stl"))}
-    yield from every_unit(Counter(units.keys()), wanted, folder / "units")
+def check_print(record: PackageRecord) -> Iterator[Fault]:
+    """Checks all meshes of parts in a package."""
+    folder, settings = record.folder / "print", record.settings
+    units = {path.stem: read_stl(path) for path in sorted(folder.glob("units/*.stl"))}
+    yield from record.check_units(dict.fromkeys(units, 1), folder / "units")
     for label, solid in units.items():
-        faults = list(read_meshes.check(solid))
+        faults = list(check_solid(solid))
         yield from faults
-        if not faults and label in wanted.polygons:
-            yield from _unit(label, solid, record)
-    names, faults = _plates(folder.glob("units_*.3mf"), units, asked)
+        if not faults and label in record.expected.polygons:
+            yield from _check_unit(label, solid, record)
+    names, faults = _plate_faults(folder.glob("units_*.3mf"), units, settings)
     yield from faults
-    yield from every_unit(Counter(names), wanted, folder)
+    yield from record.check_units({name: names.count(name) for name in names}, folder)
     for path in sorted(folder.glob("coupon_*.3mf")):
-        yield from plate_checks.check_plate(read_meshes.read_3mf(path), asked.print)
+        yield from check_plate(read_3mf(path), settings.print)
 
 
 def check_fixtures(record: PackageRecord) -> Iterator[Fault]:
-    """Faults of clamps, adapter and jig: solids, each on one plate as in its own file."""
+    """Checks clamps, adapter and jig: solids, each on one plate as in its own file."""
     folder = record.folder / "fixture"
-    parts = {path.stem: read_meshes.read_stl(path) for path in sorted(folder.glob("*.stl"))}
+    parts = {path.stem: read_stl(path) for path in sorted(folder.glob("*.stl"))}
     for solid in parts.values():
-        yield from read_meshes.check(solid)
-    names, faults = _plates(folder.glob("*.3mf"), parts, record.asked)
+        yield from check_solid(solid)
+    names, faults = _plate_faults(folder.glob("*.3mf"), parts, record.settings)
     yield from faults
     if sorted(names) != sorted(parts):
         what = "the plates do not hold each of the fixture's parts once"
         yield Fault("the fixture", what, "fixture", BUG, folder)
 
 
-def first_level(asked: Fabrication) -> float:
-    """Height up to which a unit may be drawn in, or zero."""
-    return min(asked.print.layer, asked.labels.depth)
-
-
-def levels(asked: Fabrication) -> list[float]:
-    """Heights at which a unit's section changes, from the bed to its top."""
-    top, first = asked.thickness, first_level(asked)
-    recess = asked.markers.depth if asked.markers.kind != "none" else 0.0
-    raised = recess if asked.markers.kind == "dots" else -recess
-    return sorted({0.0, first, asked.labels.depth, top, top + raised})
-
-
-def _unit(label: str, solid: MeshBody, record: PackageRecord) -> Iterator[Fault]:
-    """Height, volume, outline and id of one unit."""
-    asked = record.asked
+def _check_unit(label: str, solid: MeshBody, record: PackageRecord) -> Iterator[Fault]:
+    """Checks height, volume, outline and sunk id of one unit."""
+    settings = record.settings
+    top, sunk, dots = settings.thickness, settings.labels.depth, settings.markers
+    first = min(settings.print.layer, sunk)  # height up to which it may be drawn in
+    raised = {"none": top, "recess": top - dots.depth, "dots": top + dots.depth}[dots.kind]
+    levels = sorted({0.0, first, sunk, top, raised})
     high = solid.extent[1][2]
-    tall = {asked.thickness, max(levels(asked))}  # raised dots need not have room
-    if min(abs(high - wanted) for wanted in tall) > read_meshes.TOLERANCE:
-        what = f"it is {high:.3f} mm high instead of {max(tall):g} mm"
-        yield fault(solid, what, "thickness")
-    yield from read_meshes.volume(solid, levels(asked))
-    middle = solid.section(asked.thickness / 2)
-    yield from check_outline(label, solid.file, middle, record.found)
-    yield from _id(label, solid, middle, record)
+    if min(abs(high - top), abs(high - levels[-1])) > TOLERANCE:  # dots need not have room
+        yield solid.fault(f"it is {high:.3f} mm high instead of {levels[-1]:g} mm", "thickness")
+    yield from check_volume(solid, levels)
+    middle = solid.section(top / 2)
+    yield from check_outline(label, solid.file, middle, record.shapes)
+    inner = middle.buffer(-settings.print.first_layer_inset - _NEAR)
+    underside = solid.section(((first if first < sunk else 0.0) + sunk) / 2)
+    if inner.difference(underside).area < _LEAST_SUNK:
+        yield solid.fault("its underside shows no id", "labels.height", "give larger letters")
 
 
-def _id(label: str, solid: MeshBody, outline: Geometry, record: PackageRecord) -> Iterator[Fault]:
-    """The id that is sunk into the underside, where it can be read on the top."""
-    words, pose = record.letters.get(label, label), record.engraved.get(label)
-    asked = record.asked
-    low = first_level(asked) if first_level(asked) < asked.labels.depth else 0.0
-    inner = outline.buffer(-asked.print.first_layer_inset - _NEAR)
-    underside = solid.section((low + asked.labels.depth) / 2)
-    if pose is not None and not read_sunk.shows(words, underside, inner, pose):
-        what = f"its underside does not show {words} and how it stands"
-        yield fault(solid, what, "labels.height", "give larger letters")
+def check_plate(plate: Sequence[MeshBody], printer: Print) -> Iterator[Fault]:
+    """Checks the objects of one plate: on the bed, apart, named, flat on z = 0."""
+    faults = [fault for solid in plate for fault in check_solid(solid)]
+    yield from faults
+    if faults:  # what is no solid has no footprint
+        return
+    seen = {""}
+    for solid in plate:
+        if solid.name in seen:
+            what = "two objects of this name" if solid.name else "an object without a name"
+            yield Fault(f"part {solid.name}", what, "print", BUG, solid.file)
+        seen.add(solid.name)
+    footprints = np.array([_footprint(solid) for solid in plate])
+    room = shapely.box(0.0, 0.0, *printer.bed).buffer(-printer.margin, join_style="mitre")
+    for solid, shape in zip(plate, footprints, strict=True):
+        if not room.buffer(TOLERANCE).covers(shape):
+            what = f"it does not stand on the bed less its margin of {printer.margin:g} mm"
+            yield _plate_fault(solid, what, "print.bed", (shape, room))
+    for first, second, gap in closest(footprints, printer.gap - TOLERANCE):
+        what = f"{gap:.3f} mm from part {plate[second].name}, less than {printer.gap:g} mm"
+        shown = (footprints[first], footprints[second])
+        yield _plate_fault(plate[first], what, "print.gap", shown)
 
 
-def _plates(
-    paths: Iterable[Path], parts: Mapping[str, MeshBody], asked: Fabrication
+def _plate_fault(solid: MeshBody, what: str, key: str, shown: tuple[Geometry, Geometry]) -> Fault:
+    return Fault(f"part {solid.name}", what, key, BUG, solid.file, shown, shown[0])
+
+
+def _footprint(solid: MeshBody) -> Geometry:
+    """Covers the area of a part on the bed, seen from the top."""
+    low, high = solid.extent
+    heights = low[2] + (high[2] - low[2]) * _FOOTPRINT
+    return shapely.union_all([solid.section(float(height)) for height in heights])
+
+
+def _plate_faults(
+    paths: Iterable[Path], parts: Mapping[str, MeshBody], settings: Fabrication
 ) -> tuple[list[str], list[Fault]]:
-    """Names of the objects on plates, and faults: each is to be as in its own file."""
+    """Lists names of the objects on plates, and faults: each is to be as in its own file."""
     names: list[str] = []
     faults: list[Fault] = []
     for path in sorted(paths):
-        plate = read_meshes.read_3mf(path)
+        plate = read_3mf(path)
         names += [solid.name for solid in plate]
-        faults += plate_checks.check_plate(plate, asked.print)
-        faults += _others(plate, parts)
+        faults += check_plate(plate, settings.print)
+        for solid in plate:
+            if solid.name in parts and not _is_same(solid, parts[solid.name]):
+                what = f"it is another part than {parts[solid.name].file.name}"
+                faults.append(solid.fault(what))
     return names, faults
 
 
-def _others(plate: Sequence[MeshBody], parts: Mapping[str, MeshBody]) -> Iterator[Fault]:
-    """Objects of a plate that are not what their own files hold."""
-    for solid in plate:
-        if solid.name in parts and not _same(solid, parts[solid.name]):
-            yield fault(solid, f"it is another part than {parts[solid.name].file.name}")
-
-
-def _same(one: MeshBody, other: MeshBody) -> bool:
-    """Whether two meshes have one size and one volume."""
-    first, second = (solid.extent[1] - solid.extent[0] for solid in (one, other))
-    volumes = [solid.mesh.volume for solid in (one, other)]
-    return bool(
-        np.allclose(first, second, rtol=0, atol=2 * read_meshes.TOLERANCE)
-        and abs(volumes[0] - volumes[1]) < _ALIKE * volumes[1]
-        and _astray(one, other) < _NEAR
-    )
-
-
-def _astray(one: MeshBody, other: MeshBody) -> float:
-    """Largest distance from a vertex of a mesh to one of the other, both at the origin."""
+def _is_same(one: MeshBody, other: MeshBody) -> bool:
+    """Tests that two meshes have one size, one volume, and the same vertices from their corners."""
     from scipy.spatial import KDTree
 
+    first, second = (solid.extent[1] - solid.extent[0] for solid in (one, other))
+    volume, same = one.mesh.volume, other.mesh.volume
+    if np.abs(first - second).max() > 2 * TOLERANCE or (
+        abs(volume - same) >= VOLUME_TOLERANCE * same
+    ):
+        return False
     ours, theirs = (solid.vertices - solid.extent[0] for solid in (one, other))
     there, back = KDTree(theirs).query(ours)[0], KDTree(ours).query(theirs)[0]
-    return float(max(there.max(), back.max()))
+    return bool(max(there.max(), back.max()) < _NEAR)

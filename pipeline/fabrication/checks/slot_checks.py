@@ -1,26 +1,25 @@
-"""Finds the slots in a unit as it was made, and checks them against the design.
+"""Finds the slots in the outline of a written unit, and checks them against the design.
 
-The outline that a file holds is closed by a disc somewhat wider than a slot: what that fills are
-the slots, what is still missing of the design's polygon are truncated tips and fillets.
+The outline that a file holds is closed by a disc somewhat wider than a slot: the filled
+areas are the slots, the rest of the design's polygon are truncated tips and fillets.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import shapely
 from shapely import Geometry, LineString, Point, Polygon
 
-from pipeline.fabrication.readback import Fault
+from pipeline.fabrication.readback import BUG, Fault
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
 
-TOLERANCE = 5e-3
-"""Lengths found on a closed outline are right to this, mm."""
-
+_TOLERANCE = 5e-3  # mm, of lengths on a closed outline
 _CLOSING = 1.0  # radius of the disc in slot widths
 _DEEP = 1.6  # slot widths from the inner end, where the width is measured
 _HAIRLINE = 0.01  # mm, half of the width
@@ -28,8 +27,8 @@ _FAR, _BACK, _HAIR = 50.0, 0.01, 2e-4  # mm
 
 
 @dataclass(frozen=True)
-class FoundSlot:
-    """A slot found in an outline.
+class MeasuredSlot:
+    """Holds the measures of a slot in an outline.
 
     Attributes:
         vertex: the nearest vertex of the design.
@@ -50,21 +49,21 @@ class FoundSlot:
     lip: float
 
 
-def slots(design: Polygon, made: Polygon, width: float) -> list[FoundSlot]:
-    """Slots about `width` mm wide in a unit `made` of `design`, both in one frame."""
+def measured_slots(design: Polygon, made: Polygon, width: float) -> list[MeasuredSlot]:
+    """Measures slots about `width` mm wide in a unit `made` of `design`, both in one frame."""
     filled = shapely.get_parts(closed(made, width).difference(made.buffer(1e-4)))
     corners = np.asarray(design.exterior.coords)[:-1]
-    return [_found(shape, made, corners) for shape in filled if shape.area > width**2]
+    return [_measured(shape, made, corners) for shape in filled if shape.area > width**2]
 
 
 def closed(made: Polygon, width: float) -> Geometry:
-    """The outline with its slots filled."""
+    """Fills the slots of an outline."""
     radius = _CLOSING * width
     return made.buffer(radius, quad_segs=16).buffer(-radius, quad_segs=16)
 
 
-def _found(shape: Polygon, made: Polygon, corners: Floats) -> FoundSlot:
-    """Measures of one slot."""
+def _measured(shape: Polygon, made: Polygon, corners: Floats) -> MeasuredSlot:
+    """Measures one slot."""
     vertex = _owner(shape, corners)
     ends, width = _ends(shape, corners[vertex])
     inner, mouth = ends
@@ -76,11 +75,11 @@ def _found(shape: Polygon, made: Polygon, corners: Floats) -> FoundSlot:
     around = shapely.union(made, shape.buffer(2e-4)).boundary
     wall = float(line.distance(around.difference(shape.buffer(0.1 * width))))
     within = shape.intersection(reach)
-    return FoundSlot(vertex, within, line, depth, width, wall, _lip(made, inner, axis))
+    return MeasuredSlot(vertex, within, line, depth, width, wall, _lip(made, inner, axis))
 
 
 def _owner(shape: Polygon, corners: Floats) -> int:
-    """The vertex that a slot comes from: near to it, and above all on its axis."""
+    """Finds the vertex that a slot comes from: near to it, and above all on its axis."""
     box = np.asarray(shapely.minimum_rotated_rectangle(shape).exterior.coords)[:3]
     sides = np.diff(box, axis=0)
     along = _unit(sides[np.argmax(np.linalg.norm(sides, axis=1))])
@@ -90,7 +89,7 @@ def _owner(shape: Polygon, corners: Floats) -> int:
 
 
 def _ends(shape: Polygon, vertex: Floats) -> tuple[tuple[Floats, Floats], float]:
-    """The short sides of a slot, inner one first, and its width at the inner end.
+    """Measures the short sides of a slot, inner one first, and its width at the inner end.
 
     Where the mouth is cut back unevenly it is wider, and so is the rectangle around all of it.
     """
@@ -110,7 +109,7 @@ def _short_sides(shape: Geometry, vertex: Floats) -> tuple[tuple[Floats, Floats]
 
 
 def _lip(made: Polygon, inner: Floats, axis: Floats) -> float:
-    """Thinnest wall beside the mouth, across the slot; the tips may be cut back unevenly."""
+    """Measures the thinnest wall beside the mouth; the tips may be cut back unevenly."""
     across = np.array([-axis[1], axis[0]])
     walls = []
     for corner in inner:
@@ -123,7 +122,7 @@ def _lip(made: Polygon, inner: Floats, axis: Floats) -> float:
 
 
 def _first(ray: LineString, made: Polygon) -> float:
-    """How far a ray goes through a unit before it leaves it."""
+    """Measures how far a ray goes through a unit before it leaves it."""
     start = Point(ray.coords[0])
     pieces = shapely.get_parts(ray.intersection(made))
     return max((piece.length for piece in pieces if piece.distance(start) < _HAIR), default=0.0)
@@ -134,12 +133,12 @@ def _unit(vector: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class MadeOutline:
-    """A unit as a file holds it, beside its design.
+class UnitSection:
+    """Holds a unit as a file has it, beside its design.
 
     Attributes:
         label: id of the unit.
-        file: where it was read.
+        file: with the unit.
         design: the polygon as designed.
         made: the outline in the file, in the design's frame.
         ligaments: vertices at which a ligament ends, one entry a ligament.
@@ -151,93 +150,94 @@ class MadeOutline:
     made: Geometry
     ligaments: Sequence[int]
 
+    def fault(self, what: str, key: str, remedy: str, spot: Geometry) -> Fault:
+        """Makes a fault of the unit at a spot."""
+        around = (self.design.exterior, self.made)
+        return Fault(f"unit {self.label}", what, key, remedy, self.file, around, spot)
 
-def check(shape: MadeOutline, asked: Fabrication) -> Iterator[Fault]:
-    """Faults of a unit's outline: whole, true to the design, slots where shims go, walls."""
+
+def check_section(shape: UnitSection, settings: Fabrication) -> Iterator[Fault]:
+    """Checks a unit's outline: in one piece, true to the design, slots for all shims, walls."""
     made = shape.made
     if not isinstance(made, Polygon) or made.is_empty or made.interiors:
         what = "a slot cuts through it" if not made.is_empty else "it is empty"
-        yield _fault(shape, what, "slots.depth_max", "lower it", made)
+        yield shape.fault(what, "slots.depth_max", "lower it", made)
         return
-    yield from _hairlines(shape, made)
-    found = slots(shape.design, made, asked.slot_width)
-    yield from _true_to_design(shape, closed(made, asked.slot_width), asked)
-    at, wanted = sorted(slot.vertex for slot in found), sorted(shape.ligaments)
-    if at != wanted:
-        what = f"slots at the vertices {_listed(at)}, ligaments at {_listed(wanted)}"
-        yield _fault(shape, what, "slots.depth_min", "lower it", made)
+    yield from _check_hairlines(shape, made)
+    found = measured_slots(shape.design, made, settings.slot_width)
+    yield from _check_area(shape, closed(made, settings.slot_width), settings)
+    at, ends = sorted(slot.vertex for slot in found), sorted(shape.ligaments)
+    if at != ends:
+        slots, joints = (", ".join(map(str, vertices)) or "none" for vertices in (at, ends))
+        what = f"slots at the vertices {slots}, ligaments at {joints}"
+        yield shape.fault(what, "slots.depth_min", "lower it", made)
     for slot in found:
-        yield from _of_slot(shape, slot, asked)
-    yield from _apart(shape, found, asked)
+        yield from _check_slot(shape, slot, settings)
+    yield from _check_apart(shape, found, settings)
 
 
-def _hairlines(shape: MadeOutline, made: Polygon) -> Iterator[Fault]:
-    """No walls that are thinner than any tool, however short."""
+def _check_hairlines(shape: UnitSection, made: Polygon) -> Iterator[Fault]:
+    """Checks for walls that are thinner than any tool, however short."""
     inner = made.buffer(-_HAIRLINE, join_style="mitre", mitre_limit=100.0)
     thin = made.difference(inner.buffer(1.1 * _HAIRLINE, join_style="mitre", mitre_limit=100.0))
     if thin.length > _HAIRLINE:
         what = "a hairline sticks out of it, or nearly cuts it in two"
-        yield _fault(shape, what, "slots.tip", "report a bug", thin)
+        yield shape.fault(what, "slots.tip", BUG, thin)
 
 
-def _listed(vertices: Sequence[int]) -> str:
-    return ", ".join(str(vertex) for vertex in vertices) or "none"
-
-
-def _true_to_design(shape: MadeOutline, filled: Geometry, asked: Fabrication) -> Iterator[Fault]:
-    """Nothing beyond the design but what may thicken it, nothing lost but at its corners."""
+def _check_area(shape: UnitSection, filled: Geometry, settings: Fabrication) -> Iterator[Fault]:
+    """Checks that a unit grows no more than it may, and loses area only at its corners."""
     made, design = shape.made, shape.design
-    beyond = made.difference(design.buffer(asked.slots.thicken + TOLERANCE))
+    beyond = made.difference(design.buffer(settings.slots.thicken + _TOLERANCE))
     if not beyond.is_empty:
-        yield _fault(shape, "it reaches beyond the design", "minimum_gap", "report a bug", beyond)
-    lost = design.buffer(-TOLERANCE).difference(filled).difference(_corners(shape, asked))
+        yield shape.fault("it reaches beyond the design", "minimum_gap", BUG, beyond)
+    lost = design.buffer(-_TOLERANCE).difference(filled).difference(_corners(shape, settings))
     if not lost.is_empty:
         what = "material of the design is missing away from its corners"
-        yield _fault(shape, what, "slots.depth_max", "lower it", lost)
+        yield shape.fault(what, "slots.depth_max", "lower it", lost)
 
 
-def _corners(shape: MadeOutline, asked: Fabrication) -> Geometry:
-    """Where a unit may have lost material: truncated tips where there are slots, fillets."""
-    slots = asked.slots
-    truncated = slots.depth_max - slots.depth_min + asked.slot_width
+def _corners(shape: UnitSection, settings: Fabrication) -> Geometry:
+    """Covers the corners that may lose material: truncated tips beside slots, fillets."""
+    slots = settings.slots
+    truncated = slots.depth_max - slots.depth_min + settings.slot_width
     reaches = [
-        truncated if vertex in shape.ligaments else 4 * asked.fillet_radius + 4 * TOLERANCE
+        truncated if vertex in shape.ligaments else 4 * settings.fillet_radius + 4 * _TOLERANCE
         for vertex in range(len(shape.design.exterior.coords) - 1)
     ]
     points = shapely.points(np.asarray(shape.design.exterior.coords)[:-1])
     return shapely.union_all(shapely.buffer(points, reaches))
 
 
-def _of_slot(shape: MadeOutline, slot: FoundSlot, asked: Fabrication) -> Iterator[Fault]:
-    wanted, where = asked.slots, f"the slot at vertex {slot.vertex}"
-    if abs(slot.width - asked.slot_width) > 2 * TOLERANCE:
-        what = f"{where} is {slot.width:.3f} mm wide instead of {asked.slot_width:.3f} mm"
-        yield _fault(shape, what, "slots.clearance", "report a bug", slot.shape)
-    if slot.wall < asked.minimum_wall - TOLERANCE:
-        what = f"{where} leaves a wall of {slot.wall:.2f} mm, less than {asked.minimum_wall:g} mm"
+def _check_slot(shape: UnitSection, slot: MeasuredSlot, settings: Fabrication) -> Iterator[Fault]:
+    limits, where = settings.slots, f"the slot at vertex {slot.vertex}"
+    if abs(slot.width - settings.slot_width) > 2 * _TOLERANCE:
+        what = f"{where} is {slot.width:.3f} mm wide instead of {settings.slot_width:.3f} mm"
+        yield shape.fault(what, "slots.clearance", BUG, slot.shape)
+    if slot.wall < settings.minimum_wall - _TOLERANCE:
+        what = (
+            f"{where} leaves a wall of {slot.wall:.2f} mm, less than {settings.minimum_wall:g} mm"
+        )
         remedy = "lower it, or lower slots.depth_min to let the slot be shorter"
-        yield _fault(shape, what, "minimum_wall", remedy, slot.inner)
-    if not wanted.depth_min - TOLERANCE < slot.depth < wanted.depth_max + TOLERANCE:
-        limits = f"{wanted.depth_min:g} to {wanted.depth_max:g} mm"
-        what = f"{where} is {slot.depth:.2f} mm deep, not {limits}"
-        yield _fault(shape, what, "slots.depth_min", "widen the limits", slot.shape)
-    if slot.lip < wanted.tip - TOLERANCE:
-        what = f"{where} leaves tips of {slot.lip:.2f} mm at its mouth, less than {wanted.tip:g} mm"
-        yield _fault(shape, what, "slots.tip", "report a bug", slot.shape)
+        yield shape.fault(what, "minimum_wall", remedy, slot.inner)
+    if not limits.depth_min - _TOLERANCE < slot.depth < limits.depth_max + _TOLERANCE:
+        depths = f"{limits.depth_min:g} to {limits.depth_max:g} mm"
+        what = f"{where} is {slot.depth:.2f} mm deep, not {depths}"
+        yield shape.fault(what, "slots.depth_min", "widen the limits", slot.shape)
+    if slot.lip < limits.tip - _TOLERANCE:
+        what = f"{where} leaves tips of {slot.lip:.2f} mm at its mouth, less than {limits.tip:g} mm"
+        yield shape.fault(what, "slots.tip", BUG, slot.shape)
 
 
-def _apart(shape: MadeOutline, found: Sequence[FoundSlot], asked: Fabrication) -> Iterator[Fault]:
-    """No two slots of a unit touch or leave too thin a wall between them."""
-    for number, first in enumerate(found):
-        for second in found[number + 1 :]:
-            gap = float(first.shape.distance(second.shape))
-            if gap < asked.minimum_wall - 2 * TOLERANCE:
-                pair = f"the slots at vertices {first.vertex} and {second.vertex}"
-                what = f"{pair} are {gap:.2f} mm apart, less than {asked.minimum_wall:g} mm"
-                spot = shapely.shortest_line(first.shape, second.shape)
-                yield _fault(shape, what, "slots.depth", "lower it", spot)
-
-
-def _fault(shape: MadeOutline, what: str, key: str, remedy: str, spot: Geometry) -> Fault:
-    around = (shape.design.exterior, shape.made)
-    return Fault(f"unit {shape.label}", what, key, remedy, shape.file, around, spot)
+def _check_apart(
+    shape: UnitSection, found: Sequence[MeasuredSlot], settings: Fabrication
+) -> Iterator[Fault]:
+    """Checks the walls between the slots of a unit."""
+    least = settings.minimum_wall
+    for first, second in combinations(found, 2):
+        gap = float(first.shape.distance(second.shape))
+        if gap < least - 2 * _TOLERANCE:
+            pair = f"the slots at vertices {first.vertex} and {second.vertex}"
+            what = f"{pair} are {gap:.2f} mm apart, less than {least:g} mm"
+            spot = shapely.shortest_line(first.shape, second.shape)
+            yield shape.fault(what, "slots.depth", "lower it", spot)

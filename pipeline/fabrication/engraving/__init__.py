@@ -1,4 +1,4 @@
-"""Engraves ids and marks on units, and reads them back."""
+"""Engraves ids and marks on units."""
 
 import lazy_loader as lazy
 

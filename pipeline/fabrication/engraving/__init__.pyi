@@ -1,9 +1,5 @@
-from . import id_placement as id_placement
-from . import orientation_mark as orientation_mark
-from . import read_strokes as read_strokes
-from . import read_sunk as read_sunk
-from .id_placement import fitted as fitted
-from .read_strokes import Reading as Reading
-from .stroke_font import extent as extent
-from .stroke_font import text as text
-from .stroke_font import turned as turned
+from .id_placement import orientation_mark as orientation_mark
+from .id_placement import place_id as place_id
+from .stroke_font import text_extent as text_extent
+from .stroke_font import text_strokes as text_strokes
+from .stroke_font import transformed as transformed

@@ -1,4 +1,4 @@
-"""Where the id of a unit goes."""
+"""Places the id of a unit, and beside it the mark that tells how the unit stands."""
 
 from __future__ import annotations
 
@@ -8,28 +8,41 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 from shapely import LineString, Polygon, affinity
+from shapely.geometry.base import BaseGeometry
 
-from pipeline.fabrication.engraving.free_boxes import box_at, room_for, spots
-from pipeline.fabrication.engraving.stroke_font import ADVANCE, STACK, extent, text, turned
+from pipeline.fabrication.engraving.stroke_font import (
+    ADVANCE,
+    STACK,
+    grid_points,
+    text_extent,
+    text_strokes,
+    transformed,
+)
 from pipeline.fabrication.parts import Strokes
 from pipeline.problem.sections import Labels
 from sim.core import Floats
 
-LEAST_HEIGHT = 2.0  # mm
-MARGINS = (0.4, 0.05)
-"""Wanted and least, to the rim of the part, mm."""
+Box = tuple[float, float]
+"""Width and height, mm."""
 
-_LEGIBLE = 0.7  # of the strokes
+_LEAST_HEIGHT = 2.0  # mm
+_MARGINS = (0.4, 0.05)  # preferred and least, to the rim of the part, mm
+_LEGIBLE = 0.7  # share of the strokes that has to lie on the part
 _OVERHANGS = (0.25, 0.5, 0.75)  # mm, as the last resort
-_FINE_STEP = 0.2  # mm
+_STEP, _FINE_STEP = 0.35, 0.2  # mm, of the grids of centres
+_GRID = 1e-6  # mm
 _ANGLES = np.deg2rad(np.arange(-90.0, 90.0, 10.0))  # tried where there is little room
 _ASIDE = 0.7  # mm that letters may be off the line of the first one
 _HAIR = 1e-6  # mm
 _SPECK = 0.1  # mm; shorter pieces of a clipped stroke are left out
+_MOST_ARROW, _LEAST_ARROW = 1.5, 0.8  # mm
+_ARROW_KEPT = 0.9  # of an arrow that a slot cuts
+_RING = 0.3  # mm, radius
+_ARROW = ("00 23 40", "20 23")  # on a grid of 4 by 3
 
 
-class Placed(NamedTuple):
-    """Strokes with the box that they fill.
+class PlacedId(NamedTuple):
+    """Strokes of an id with the box that they fill.
 
     Attributes:
         strokes: as read from the top.
@@ -40,12 +53,12 @@ class Placed(NamedTuple):
 
     strokes: Strokes
     mirrored: Strokes
-    box: shapely.Geometry
+    box: BaseGeometry
     kept: float
 
 
-def fitted(words: str, outline: Polygon, body: Polygon, wanted: Labels) -> Placed | None:
-    """An id inside an outline, as large, as upright and as central as there is room for.
+def place_id(words: str, outline: Polygon, body: Polygon, settings: Labels) -> PlacedId | None:
+    """Places an id inside an outline, as large, as upright and as central as there is room for.
 
     Where slots leave no room even for the smallest letters, they cut through the letters; where
     the body leaves none, the letters lose a corner.
@@ -54,60 +67,59 @@ def fitted(words: str, outline: Polygon, body: Polygon, wanted: Labels) -> Place
         words: the id.
         outline: of the part, with slots.
         body: the same without slots.
-        wanted: how large.
+        settings: preferred size of the letters.
 
     Returns:
         None if it has no room even so, or could not be read.
     """
-    whole = next(_placements(words, outline, outline, wanted), None)
-    if whole is not None:
-        return whole
+    uncut = next(_placements(words, outline, outline, settings), None)
+    if uncut is not None:
+        return uncut
     for place in (body, *(body.buffer(over) for over in _OVERHANGS)):
-        cut = list(_placements(words, place, outline, wanted))
+        cut = list(_placements(words, place, outline, settings))
         best = max(cut, key=lambda placed: round(placed.kept, 2), default=None)
         if best is not None and best.kept > _LEGIBLE:
             return best
     return None
 
 
-def _placements(words: str, place: Polygon, outline: Polygon, wanted: Labels) -> Iterator[Placed]:
-    """An id as it fits into a place, from the best to the last resort."""
-    for height, stacked, margin, angle in _attempts(place, wanted.height):
-        box = _framed(extent(words, height, stacked=stacked), height, margin, wanted)
-        centre = room_for(box, angle, place)
+def _placements(
+    words: str, place: Polygon, outline: Polygon, settings: Labels
+) -> Iterator[PlacedId]:
+    """Yields an id as it fits into a place, from the best to the last resort."""
+    for height, stacked, margin, angle in _attempts(place, settings.height):
+        box = _framed(text_extent(words, height, stacked=stacked), height, margin, settings)
+        centre = _room_for(box, angle, place)
         if centre is not None:
-            plain = text(words, height, stacked=stacked)
+            plain = text_strokes(words, height, stacked=stacked)
             mirrored = tuple(stroke * [-1.0, 1.0] for stroke in plain)
-            top, bottom = turned(plain, angle, centre), turned(mirrored, angle, centre)
-            yield _placed(top, bottom, box_at(box, angle, centre), outline)
-    apart = _letter_by_letter(words, place, outline, wanted)
+            top, bottom = (transformed(side, angle, centre) for side in (plain, mirrored))
+            yield _placed(top, bottom, _box_at(box, angle, centre), outline)
+    apart = _letter_by_letter(words, place, outline, settings)
     if apart is not None:
         yield apart
 
 
-def _framed(
-    size: tuple[float, float], height: float, margin: float, wanted: Labels
-) -> tuple[float, float]:
-    """Size of letters with the width of their strokes and a margin."""
-    more = min(wanted.stroke, 0.15 * height) + 2 * margin
+def _framed(size: Box, height: float, margin: float, settings: Labels) -> Box:
+    """Adds the width of the strokes and a margin to the size of letters."""
+    more = min(settings.stroke, 0.15 * height) + 2 * margin
     return size[0] + more, size[1] + more
 
 
-def _placed(top: Strokes, bottom: Strokes, box: shapely.Geometry, outline: Polygon) -> Placed:
-    strokes, mirrored = clipped(top, outline), clipped(bottom, outline)
-    kept = min(total_length(strokes), total_length(mirrored)) / total_length(top)
-    return Placed(strokes, mirrored, box, kept)
+def _placed(top: Strokes, bottom: Strokes, box: BaseGeometry, outline: Polygon) -> PlacedId:
+    strokes, mirrored = _clipped(top, outline), _clipped(bottom, outline)
+    kept = min(_total_length(strokes), _total_length(mirrored)) / _total_length(top)
+    return PlacedId(strokes, mirrored, box, kept)
 
 
 def _letter_by_letter(
-    words: str, place: Polygon, outline: Polygon, wanted: Labels
-) -> Placed | None:
-    """Smallest letters on a line or below each other, each where slots leave room for it."""
-    size = extent(words[0], LEAST_HEIGHT)
-    box = _framed(size, LEAST_HEIGHT, MARGINS[-1], wanted)
+    words: str, place: Polygon, outline: Polygon, settings: Labels
+) -> PlacedId | None:
+    """Places the smallest letters in a row or a stack, each where slots leave room for it."""
+    box = _framed(text_extent(words[0], _LEAST_HEIGHT), _LEAST_HEIGHT, _MARGINS[-1], settings)
     for angle in (_slope(place), *_ANGLES):
         level = affinity.rotate(place, -angle, origin=(0.0, 0.0), use_radians=True)
-        free = spots(box, 0.0, level, _FINE_STEP, level.centroid)[1:]
+        free = _centres(box, 0.0, level, _FINE_STEP, level.centroid)[1:]
         for stacked in (False, True):
             centres = _in_order(free, len(words), stacked=stacked)
             if centres is not None:
@@ -116,14 +128,14 @@ def _letter_by_letter(
 
 
 def _in_order(free: Floats, count: int, *, stacked: bool) -> Floats | None:
-    """Centres (count, 2) in reading order, as near to each other and to one line as there is room.
+    """Chooses centres (count, 2) in reading order, near to each other and to one line.
 
     Args:
         free: (n, 2) possible centres.
         count: of letters.
         stacked: below each other.
     """
-    step = LEAST_HEIGHT * (STACK if stacked else ADVANCE)
+    step = _LEAST_HEIGHT * (STACK if stacked else ADVANCE)
     level = free[:, ::-1] * [-1.0, 1.0] if stacked else free  # along, across
     best, least = None, np.inf
     for first in range(len(level)):
@@ -143,39 +155,29 @@ def _in_order(free: Floats, count: int, *, stacked: bool) -> Floats | None:
 
 
 def _apart(
-    words: str,
-    centres: Floats,
-    angle: float,
-    box: tuple[float, float],
-    outline: Polygon,
-    *,
-    stacked: bool,
-) -> Placed:
-    """Letters at their centres, before all are turned; from below they are read backwards."""
-    letters = [text(letter, LEAST_HEIGHT) for letter in words]
+    words: str, centres: Floats, angle: float, box: Box, outline: Polygon, *, stacked: bool
+) -> PlacedId:
+    """Sets letters at their centres, before all are turned; from below they run backwards."""
+    letters = [text_strokes(letter, _LEAST_HEIGHT) for letter in words]
     below = centres if stacked else centres[::-1]
     top = [stroke + at for at, one in zip(centres, letters, strict=True) for stroke in one]
     bottom = [
         stroke * [-1.0, 1.0] + at for at, one in zip(below, letters, strict=True) for stroke in one
     ]
-    boxes = shapely.union_all([box_at(box, 0.0, (float(x), float(y))) for x, y in centres])
+    boxes = shapely.union_all([_box_at(box, 0.0, (float(x), float(y))) for x, y in centres])
     origin = (0.0, 0.0)
-    return _placed(
-        turned(tuple(top), angle, origin),
-        turned(tuple(bottom), angle, origin),
-        affinity.rotate(boxes, angle, origin=origin, use_radians=True),
-        outline,
-    )
+    turned = affinity.rotate(boxes, angle, origin=origin, use_radians=True)
+    plain, mirrored = (transformed(tuple(side), angle, origin) for side in (top, bottom))
+    return _placed(plain, mirrored, turned, outline)
 
 
-def total_length(strokes: Strokes) -> float:
-    """Of strokes, mm."""
+def _total_length(strokes: Strokes) -> float:
     return sum(LineString(stroke).length for stroke in strokes)
 
 
-def clipped(strokes: Strokes, outline: Polygon) -> Strokes:
-    """What of the strokes lies on the part."""
-    inner = outline.buffer(-MARGINS[-1])
+def _clipped(strokes: Strokes, outline: Polygon) -> Strokes:
+    """Clips strokes to a part less the least margin."""
+    inner = outline.buffer(-_MARGINS[-1])
     shapely.prepare(inner)
     kept: list[Floats] = []
     for stroke in strokes:
@@ -189,25 +191,101 @@ def clipped(strokes: Strokes, outline: Polygon) -> Strokes:
 
 
 def _attempts(outline: Polygon, largest: float) -> Iterator[tuple[float, bool, float, float]]:
-    """Height, stacked or not, margin, angle; from the best to the last resort."""
-    heights = np.unique(
-        np.clip([largest, (largest + LEAST_HEIGHT) / 2, LEAST_HEIGHT], None, largest)
-    )
+    """Yields height, stacked or not, margin, angle; from the best to the last resort."""
+    steps = [largest, (largest + _LEAST_HEIGHT) / 2, _LEAST_HEIGHT]
     slope = _slope(outline)
-    for height in heights[::-1]:
-        for margin in MARGINS:
+    across = slope + np.pi / 2 if slope < 0 else slope - np.pi / 2
+    for height in np.unique(np.clip(steps, None, largest))[::-1]:
+        for margin in _MARGINS:
             yield float(height), False, margin, 0.0
             yield float(height), False, margin, slope
-            across = slope + np.pi / 2 if slope < 0 else slope - np.pi / 2
             yield float(height), True, margin, across
     for angle in _ANGLES:
-        yield LEAST_HEIGHT, False, MARGINS[-1], float(angle)
-        yield LEAST_HEIGHT, True, MARGINS[-1], float(angle)
+        yield _LEAST_HEIGHT, False, _MARGINS[-1], float(angle)
+        yield _LEAST_HEIGHT, True, _MARGINS[-1], float(angle)
 
 
 def _slope(outline: Polygon) -> float:
-    """Direction of the longest edge, between -90 and 90 deg."""
-    points = np.asarray(outline.exterior.coords)
-    edges = np.diff(points, axis=0)
+    """Measures the direction of the longest edge, between -90 and 90 deg, in rad."""
+    edges = np.diff(np.asarray(outline.exterior.coords), axis=0)
     x, y = edges[np.argmax(np.round(np.linalg.norm(edges, axis=1), 6))]
     return float(np.arctan2(y, x) if x > 0 or (x == 0 and y > 0) else np.arctan2(-y, -x))
+
+
+def _room_for(
+    box: Box, angle: float, outline: Polygon, near: shapely.Point | None = None
+) -> tuple[float, float] | None:
+    """Finds the centre of a box in an outline, nearest to its centroid or to ``near``."""
+    target = outline.centroid if near is None else near
+    centres = _centres(box, angle, outline, _STEP, target)
+    if not len(centres):
+        return None
+    distance = np.linalg.norm(centres - [target.x, target.y], axis=1)
+    x, y = centres[np.argmin(np.round(distance, 6))]
+    return float(x), float(y)
+
+
+def _centres(
+    box: Box, angle: float, outline: Polygon, step: float, target: shapely.Point
+) -> Floats:
+    """Finds centres (n, 2) of boxes inside an outline: the nearest to a target, and on a grid.
+
+    The centre lies in each copy of the outline that is shifted by minus a point of the box's rim.
+    """
+    rim = np.asarray(_box_at(box, angle, (0.0, 0.0)).exterior.coords)
+    rim = np.concatenate([rim[:-1], (rim[:-1] + rim[1:]) / 2])
+    copies = [shapely.transform(outline, lambda at, by=by: at - by) for by in rim]
+    try:
+        region = shapely.intersection_all(copies)
+    except shapely.GEOSException:  # it gives up where copies nearly coincide
+        region = shapely.intersection_all(shapely.set_precision(copies, _GRID))
+    if region.area == 0.0:
+        return np.empty((0, 2))
+    nearest = shapely.get_coordinates(shapely.shortest_line(region, target))[0]
+    x0, y0, x1, y1 = region.bounds
+    x, y = np.meshgrid(np.arange(x0, x1, step), np.arange(y0, y1, step))
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    centres = np.concatenate([nearest[None], grid[shapely.contains_xy(region, grid)]])
+    boxes = shapely.polygons(centres[:, None, :] + rim[[0, 4, 1, 5, 2, 6, 3, 7]] * (1.0 - 1e-6))
+    shapely.prepare(outline)
+    fits: Floats = centres[shapely.contains(outline, boxes)]
+    return fits
+
+
+def _box_at(size: Box, angle: float, centre: tuple[float, float]) -> Polygon:
+    width, height = size[0] / 2, size[1] / 2
+    rim = np.array([[-width, -height], [width, -height], [width, height], [-width, height]])
+    return Polygon(transformed((rim,), angle, centre)[0])
+
+
+def orientation_mark(
+    outline: Polygon, body: Polygon, taken: BaseGeometry, settings: Labels
+) -> Strokes:
+    """Draws an arrow to +y near the place of the id; a small ring at the upper end if no room."""
+    for place in (outline.difference(taken), body.difference(taken)):
+        for arrow in _arrows(place, taken.centroid, settings):
+            kept = _clipped(arrow, outline)
+            if _total_length(kept) > _ARROW_KEPT * _total_length(arrow):
+                return kept
+    return (_ring(outline),)
+
+
+def _arrows(place: BaseGeometry, near: shapely.Point, settings: Labels) -> Iterator[Strokes]:
+    """Yields arrows that fit into a place, from the best to the last resort."""
+    for size in (_MOST_ARROW, 0.8 * _MOST_ARROW, _LEAST_ARROW):
+        pen = min(settings.stroke, 0.4 * size)
+        for margin in _MARGINS:
+            box = (size + pen + 2 * margin, 0.75 * size + pen + 2 * margin)
+            centre = _room_for(box, 0.0, place, near)
+            if centre is not None:
+                scaled = tuple((grid_points(line) - [2.0, 1.5]) * size / 4 for line in _ARROW)
+                yield transformed(scaled, 0.0, centre)
+
+
+def _ring(outline: Polygon) -> Floats:
+    inner = outline.buffer(-_RING - _MARGINS[-1])
+    room = outline.representative_point() if inner.is_empty else inner
+    points = shapely.get_coordinates(room)
+    turn = np.linspace(0.0, 2 * np.pi, 9)
+    top = points[np.lexsort((points[:, 0], points[:, 1]))[-1]]
+    return top + _RING * np.column_stack([np.cos(turn), np.sin(turn)])

@@ -1,4 +1,4 @@
-"""A font of single strokes, for ids that are engraved or embossed."""
+"""Draws ids in a font of single strokes, to be engraved or embossed."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ ADVANCE = 0.7  # from letter to letter
 STACK = 1.3  # from line to line, where letters stand below each other
 
 
-def text(words: str, height: float, *, stacked: bool = False) -> Strokes:
-    """Strokes of a line of text, or of letters below each other, centred at the origin.
+def text_strokes(words: str, height: float, *, stacked: bool = False) -> Strokes:
+    """Draws a line of text, or letters below each other, centred at the origin.
 
     Raises:
         KeyError: there is no such letter.
@@ -65,7 +65,7 @@ def text(words: str, height: float, *, stacked: bool = False) -> Strokes:
     step = np.array([0.0, -STACK] if stacked else [ADVANCE, 0.0])
     scale = np.array([_WIDTH / 4, 1 / 6])
     strokes = [
-        (on_grid(line) * scale + index * step) * height
+        (grid_points(line) * scale + index * step) * height
         for index, letter in enumerate(words)
         for line in _GLYPHS[letter].split(",")
     ]
@@ -74,21 +74,21 @@ def text(words: str, height: float, *, stacked: bool = False) -> Strokes:
     return tuple(stroke - middle for stroke in strokes)
 
 
-def on_grid(line: str) -> Floats:
-    """The points of a glyph's line, which are written as pairs of digits."""
+def grid_points(line: str) -> Floats:
+    """Parses the points of a glyph's line, which are written as pairs of digits."""
     return np.array([[float(digit) for digit in point] for point in line.split()])
 
 
-def extent(words: str, height: float, *, stacked: bool = False) -> tuple[float, float]:
-    """Width and height of a text."""
+def text_extent(words: str, height: float, *, stacked: bool = False) -> tuple[float, float]:
+    """Measures width and height of a text."""
     more = len(words) - 1
     if stacked:
         return _WIDTH * height, (1 + more * STACK) * height
     return (_WIDTH + more * ADVANCE) * height, height
 
 
-def turned(strokes: Strokes, angle: float, centre: tuple[float, float]) -> Strokes:
-    """Strokes turned about the origin, then moved."""
+def transformed(strokes: Strokes, angle: float, centre: tuple[float, float]) -> Strokes:
+    """Turns strokes about the origin by an angle in rad, then moves them."""
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.array([[cosine, sine], [-sine, cosine]])
     return tuple(stroke @ turn + np.array(centre) for stroke in strokes)

@@ -1,1 +1,1 @@
-from . import package_folder as package_folder
+from .package_folder import PackageFolder as PackageFolder

@@ -1,4 +1,4 @@
-"""Meshes as files: STL for one part, 3MF for a plate of named parts; always the same bytes."""
+"""Writes meshes: STL for one part, 3MF for a plate of named parts; always the same bytes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _MODEL = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def write_stl(meshes: Iterable[Mesh], path: Path) -> None:
-    """Write meshes as one binary STL, in mm."""
+    """Writes meshes as one binary STL, in mm."""
     corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes]).astype("<f4")
     # Edges below single precision collapse; the triangles beside them go, and no hole is left.
     distinct = (corners != np.roll(corners, 1, axis=1)).any(axis=2).all(axis=1)
@@ -53,7 +53,7 @@ def write_stl(meshes: Iterable[Mesh], path: Path) -> None:
 
 
 def write_3mf(parts: Sequence[tuple[str, Mesh, float, float]], path: Path) -> None:
-    """Write a plate: name and mesh of each part, and where it lies, in mm."""
+    """Writes a plate: name and mesh of each part, and where it lies, in mm."""
     objects = "".join(
         _object(number, name, mesh) for number, (name, mesh, _, _) in enumerate(parts, 1)
     )

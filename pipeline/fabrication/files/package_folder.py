@@ -2,126 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import shapely
-
-from pipeline.fabrication.files import dxf, dxf_r12, mesh_files, svg
-from pipeline.fabrication.fixtures import fixtures, flat_parts, jig, strip_parts
-from pipeline.fabrication.parts import BuiltSpecimen, FlatPart, Layer, PrintedPart, pen, unit_solid
-from pipeline.fabrication.plates import plates, sheets
+from pipeline.fabrication.files.drawing_files import write_dxf, write_svg
+from pipeline.fabrication.files.mesh_files import write_3mf, write_stl
+from pipeline.fabrication.fixtures import (
+    comb,
+    coupon,
+    coupon_solid,
+    fixtures,
+    shim_pieces,
+    strip_parts,
+    templates,
+)
+from pipeline.fabrication.parts import BuiltSpecimen, FlatPart, PrintedPart, unit_solid
+from pipeline.fabrication.plates import laser_sheets, print_plates
 from pipeline.problem import Problem
-from pipeline.problem.sections import Fabrication
-
-Done = Callable[[], object]
 
 
 @dataclass
 class PackageFolder:
-    """A folder that is being filled.
+    """Fills a folder with laser/, print/ and fixture/.
 
     Attributes:
-        folder: where.
-        specimen: what is built.
-        asked: the problem with all its parameters.
+        folder: to be filled.
+        specimen: to be built.
+        problem: with all its parameters.
         file: of the problem, for messages.
-        done: called after each of the steps.
+        done: called after each of the steps, two more than there are units.
         contents: ids of the parts in each sheet, plate and fixture, by its path in the folder.
     """
 
     folder: Path
     specimen: BuiltSpecimen
-    asked: Problem
+    problem: Problem
     file: str
-    done: Done = lambda: None
+    done: Callable[[], object] = lambda: None
     contents: dict[str, list[str]] = field(default_factory=dict)
 
-    @property
-    def wanted(self) -> Fabrication:
-        """The parameters of fabrication."""
-        return self.asked.fabrication
+    def write(self) -> None:
+        """Writes all drawings and meshes.
 
-    def path(self, name: str, ids: Sequence[str] = ()) -> Path:
-        """The path of a file; one that is cut or printed as a whole is told what it holds."""
+        Raises:
+            UserError: a part fits on no sheet or on no bed, or is too fine for the kerf.
+        """
+        self._write_laser()
+        self.done()
+        self._write_print()
+        self._write_fixture()
+        self.done()
+
+    def _path(self, name: str, ids: Sequence[str] = ()) -> Path:
+        """Makes the path of a file; notes the ids of what is cut or printed as one piece."""
         if ids:
             self.contents[name] = list(ids)
-        made = self.folder / name
-        made.parent.mkdir(parents=True, exist_ok=True)
-        return made
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path
 
+    def _write_laser(self) -> None:
+        for kind, parts in self._flat_parts():
+            for sheet in laser_sheets(kind, parts, self.problem.fabrication.laser, self.file):
+                ids = [part.id for part in sheet.parts]
+                write_dxf(sheet, self._path(f"laser/{sheet.name}.dxf", ids))
+                write_dxf(sheet, self._path(f"laser/{sheet.name}_r12.dxf"), "R12")
+                write_svg(sheet, self._path(f"laser/{sheet.name}.svg"))
 
-def steps(specimen: BuiltSpecimen) -> int:
-    """How often `write` tells of progress."""
-    return len(specimen.units) + 2
+    def _flat_parts(self) -> Iterator[tuple[str, Sequence[FlatPart]]]:
+        """Yields kinds of sheets with their parts; a kind is cut from one material."""
+        specimen, settings = self.specimen, self.problem.fabrication
+        spacing, gap = self.problem.lattice.spacing, self.problem.lattice.ligament_length
+        yield "units", [unit.part for unit in specimen.units]
+        yield "shims", shim_pieces(specimen, settings)
+        if settings.shims.strips:
+            yield "strips", strip_parts(specimen, settings)
+        yield "template", list(templates(specimen, spacing, settings))
+        yield "comb", [comb(specimen, spacing, gap, settings)]
+        yield "coupon", [coupon(settings)]
 
+    def _write_print(self) -> None:
+        settings, solids = self.problem.fabrication, []
+        for unit in self.specimen.units:
+            solids.append(unit_solid(unit, settings))
+            write_stl([solids[-1].mesh], self._path(f"print/units/{unit.label}.stl"))
+            self.done()
+        self._write_plates("print/units", solids)
+        self._write_plates("print/coupon", [coupon_solid(coupon(settings), settings)])
+        placed = (solid.mesh.moved(*solid.bounds[:2]) for solid in solids)
+        write_stl(placed, self._path("print/assembled.stl"))
 
-def write(package: PackageFolder) -> None:
-    """Write laser/, print/ and fixture/.
+    def _write_fixture(self) -> None:
+        settings, spacing = self.problem.fabrication, self.problem.lattice.spacing
+        solids = list(fixtures(self.specimen, settings, spacing))
+        for solid in solids:
+            write_stl([solid.mesh], self._path(f"fixture/{solid.id}.stl"))
+        self._write_plates("fixture/fixture", solids)
 
-    Raises:
-        UserError: a part fits on no sheet or on no bed, or is too fine for the kerf.
-    """
-    _laser(package)
-    package.done()
-    _print(package)
-    _fixture(package)
-    package.done()
-
-
-def _laser(package: PackageFolder) -> None:
-    for kind, parts in _flat_parts(package):
-        for sheet in sheets(kind, parts, package.wanted.laser, package.file):
-            dxf.write(sheet, package.path(f"laser/{sheet.name}.dxf", sheet.ids))
-            dxf_r12.write(sheet, package.path(f"laser/{sheet.name}_r12.dxf"))
-            svg.write(sheet, package.path(f"laser/{sheet.name}.svg"))
-
-
-def _flat_parts(package: PackageFolder) -> Iterator[tuple[str, Sequence[FlatPart]]]:
-    """Kinds of sheets with their parts; a kind is cut from one material."""
-    specimen, wanted, lattice = package.specimen, package.wanted, package.asked.lattice
-    yield "units", [unit.part for unit in specimen.units]
-    yield "shims", flat_parts.shim_pieces(specimen, wanted)
-    if wanted.shims.strips:
-        yield "strips", strip_parts(specimen, wanted)
-    yield "template", list(flat_parts.templates(specimen, lattice.spacing, wanted))
-    yield "comb", [flat_parts.comb(specimen, lattice.spacing, lattice.ligament_length, wanted)]
-    yield "coupon", [flat_parts.coupon(wanted)]
-
-
-def _print(package: PackageFolder) -> None:
-    wanted, units = package.wanted, package.specimen.units
-    solids = []
-    for unit in units:
-        solid = unit_solid(unit, wanted)
-        mesh_files.write_stl([solid.mesh], package.path(f"print/units/{solid.id}.stl"))
-        solids.append(solid)
-        package.done()
-    _plates(package, "print/units", solids)
-    _plates(package, "print/coupon", [coupon_solid(flat_parts.coupon(wanted), wanted)])
-    placed = (solid.mesh.moved(*solid.bounds[:2]) for solid in solids)
-    mesh_files.write_stl(placed, package.path("print/assembled.stl"))
-
-
-def coupon_solid(part: FlatPart, wanted: Fabrication) -> PrintedPart:
-    """The coupon, its clearances sunk into its top."""
-    sunk = pen(part.engraving, min(wanted.labels.stroke, 0.4))
-    top = part.height - wanted.labels.depth
-    upper = shapely.set_precision(part.outline.difference(sunk), 1e-3)
-    return PrintedPart(part.id, (Layer(part.outline, 0.0, top), Layer(upper, top, part.height)))
-
-
-def _fixture(package: PackageFolder) -> None:
-    told = (package.specimen, package.wanted, package.asked.lattice.spacing)
-    solids = [*fixtures(*told), *jig(*told)]
-    for solid in solids:
-        mesh_files.write_stl([solid.mesh], package.path(f"fixture/{solid.id}.stl"))
-    _plates(package, "fixture/fixture", solids)
-
-
-def _plates(package: PackageFolder, kind: str, solids: Iterable[PrintedPart]) -> None:
-    folder, _, name = kind.rpartition("/")
-    for plate in plates(name, list(solids), package.wanted.print, package.file):
-        path = package.path(f"{folder}/{plate.name}.3mf", plate.ids)
-        mesh_files.write_3mf([(solid.id, solid.mesh, x, y) for solid, x, y in plate.parts], path)
+    def _write_plates(self, kind: str, solids: Sequence[PrintedPart]) -> None:
+        folder, _, name = kind.rpartition("/")
+        bed = self.problem.fabrication.print
+        for plate, parts in print_plates(name, solids, bed, self.file):
+            path = self._path(f"{folder}/{plate}.3mf", [solid.id for solid, _, _ in parts])
+            write_3mf([(solid.id, solid.mesh, x, y) for solid, x, y in parts], path)

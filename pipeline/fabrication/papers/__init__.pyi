@@ -1,6 +1,10 @@
-from . import bill_of_materials as bill_of_materials
-from . import manifest as manifest
-from .assembly_sheet import write as write
+from .assembly_sheet import write_assembly_sheet as write_assembly_sheet
+from .bill_of_materials import BILL as BILL
+from .bill_of_materials import read_bill as read_bill
+from .bill_of_materials import write_bill as write_bill
+from .manifest import MANIFEST as MANIFEST
+from .manifest import read_manifest as read_manifest
+from .manifest import write_manifest as write_manifest
 from .pdf_paper import GREY as GREY
 from .pdf_paper import INK as INK
 from .pdf_paper import POINT as POINT

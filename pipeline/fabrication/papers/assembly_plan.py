@@ -1,26 +1,20 @@
-"""Draws the specimen for its assembly: units with ids and arrows, shims, rows and columns."""
+"""Draws the specimen for its assembly, at true scale over as few pages as hold it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from pipeline.fabrication.papers.page_tiles import OVERLAP, Tile
-from pipeline.fabrication.papers.pdf_paper import (
-    BOLD,
-    GREY,
-    INK,
-    PALE,
-    POINT,
-    SIGNAL,
-    Box,
-    PdfDocument,
-)
-from pipeline.fabrication.parts import BuiltSpecimen, Shim, Unit, column_letters
+from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, PALE, POINT, SIGNAL, Box, PdfDocument
+from pipeline.fabrication.parts import BuiltSpecimen, Ligament, Unit, column_letters
 from sim.core import Floats
 
+OVERLAP = 12.0
+"""Width of the strip that two neighbouring pages share, mm."""
 BORDER = 9.0
 """Room around the specimen for the names of rows and columns, mm."""
 
@@ -33,37 +27,87 @@ _ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER = 4.5
 
 
-class AssemblyPlan:
-    """The drawing of one specimen, in its own frame.
+@dataclass(frozen=True)
+class Tile:
+    """Holds one page's part of the drawing.
 
-    Args:
-        specimen: what is built.
-        sheet: where it is drawn.
+    Attributes:
+        name: row letter from the top and column number, "B2".
+        window: its part, in the drawing's coordinates.
+        row, column: from the top left, from zero.
+        of: rows and columns of pages.
     """
+
+    name: str
+    window: Box
+    row: int
+    column: int
+    of: tuple[int, int]
+
+    def joints(self) -> Iterator[tuple[str, float]]:
+        """Yields the middle lines of the strips shared with other pages: ("x" or "y", position)."""
+        left, low, width, height = self.window
+        half = OVERLAP / 2
+        if self.column > 0:
+            yield "x", left + half
+        if self.column < self.of[1] - 1:
+            yield "x", left + width - half
+        if self.row > 0:
+            yield "y", low + height - half
+        if self.row < self.of[0] - 1:
+            yield "y", low + half
+
+
+def tiles(box: Box, page: tuple[float, float]) -> list[Tile]:
+    """Covers `box` with equal windows, no larger than `page`, row by row from the top left."""
+    left, low, width, height = box
+    rows, tall = _split(height, page[1])
+    columns, wide = _split(width, page[0])
+    return [
+        Tile(
+            f"{chr(ord('A') + row)}{column + 1}",
+            (
+                left + column * (wide - OVERLAP),
+                low + (rows - 1 - row) * (tall - OVERLAP),
+                wide,
+                tall,
+            ),
+            row,
+            column,
+            (rows, columns),
+        )
+        for row in range(rows)
+        for column in range(columns)
+    ]
+
+
+def _split(length: float, most: float) -> tuple[int, float]:
+    """Counts the windows along a length, and measures each."""
+    count = max(1, math.ceil((length - OVERLAP) / (most - OVERLAP)))
+    return count, (length + (count - 1) * OVERLAP) / count
+
+
+class AssemblyPlan:
+    """Draws one specimen in its own frame on the pages of a document."""
 
     def __init__(self, specimen: BuiltSpecimen, sheet: PdfDocument) -> None:
         self._specimen, self._sheet = specimen, sheet
-        self._shim = {
-            ligament: (number, shim)
-            for number, shim in enumerate(specimen.shims, 1)
+        self._kind = {
+            ligament: number
+            for number, shim in enumerate(specimen.shims)
             for ligament in shim.ligaments
         }
-        self._at = {unit.label: unit for unit in specimen.units}
 
     @property
     def box(self) -> Box:
         """The specimen and the names around it."""
         shapes = [unit.design for unit in self._specimen.units]
-        left, low, right, high = shapely.total_bounds(shapes)
-        return (
-            float(left) - BORDER,
-            float(low) - BORDER,
-            float(right - left) + 2 * BORDER,
-            float(high - low) + 2 * BORDER,
-        )
+        left, low, right, high = shapely.total_bounds(shapes).tolist()
+        width, height = right - left + 2 * BORDER, high - low + 2 * BORDER
+        return left - BORDER, low - BORDER, width, height
 
     def draw(self, tile: Tile, place: Box) -> None:
-        """One page's part, its lower left corner at that of `place`."""
+        """Draws one page's part, its lower left corner at that of `place`."""
         origin = np.array(place[:2]) - tile.window[:2]
         seen = shapely.box(*tile.window[:2], *(np.array(tile.window[:2]) + tile.window[2:]))
         with self._sheet.window((*place[:2], *tile.window[2:])):
@@ -71,18 +115,12 @@ class AssemblyPlan:
                 if seen.intersects(unit.outline):
                     self._unit(unit, origin)
             for ligament in self._specimen.ligaments:
-                self._ligament(ligament.number, ligament.labels, origin)
+                self._ligament(ligament, origin)
             self._headings(origin)
         self._joints(tile, origin)
 
     def sketch(self, pages: Sequence[Tile], corner: tuple[float, float], scale: float) -> None:
-        """All units in small, and over them the pages that show them.
-
-        Args:
-            pages: of the plan.
-            corner: where the lower left corner of the plan goes on the page.
-            scale: how small.
-        """
+        """Draws all units in small from a lower left corner, and over them the pages' frames."""
         low = np.array(self.box[:2])
         for unit in self._specimen.units:
             points = np.asarray(unit.outline.exterior.coords)[:-1]
@@ -96,33 +134,33 @@ class AssemblyPlan:
             self._sheet.text(middle[0], middle[1] - 3.0, tile.name, 24, BOLD, SIGNAL, "middle")
 
     def _unit(self, unit: Unit, origin: Floats) -> None:
-        """Outline, id and arrow of a unit; those in fixtures are tinted."""
+        """Draws outline, id and arrow of a unit; those in fixtures are tinted."""
         held = unit.label in {*self._specimen.clamped, *self._specimen.driven}
         fill = "#dccdee" if held else PALE
         self._sheet.polygon(np.asarray(unit.outline.exterior.coords)[:-1] + origin, fill)
-        x, y, size = _name_place(unit)
-        words = np.array([x, y - 0.12 * size]) + origin
-        self._sheet.text(words[0], words[1], _name(unit), size, BOLD, at="middle")
+        name = f"{unit.label}={unit.letter}" if unit.letter else unit.label
+        x, y, size = _name_place(unit, name)
+        place = np.array([x, y - 0.12 * size]) + origin
+        self._sheet.text(place[0], place[1], name, size, BOLD, at="middle")
         for stroke in unit.mark:
             self._sheet.line(np.asarray(stroke) + origin, 0.25, SIGNAL)
 
-    def _ligament(self, number: int, ends: tuple[str, str], origin: Floats) -> None:
-        """The shim as a line from slot end to slot end, with its number between the units."""
-        found = [
-            slot for label in ends for slot in self._at[label].slots if slot.ligament == number
-        ]
-        if len(found) != 2:
+    def _ligament(self, ligament: Ligament, origin: Floats) -> None:
+        """Draws the shim from slot end to slot end, with its number between the units."""
+        ends = (self._specimen.by_label[label] for label in ligament.labels)
+        slots = [slot for unit in ends for slot in unit.slots if slot.ligament == ligament.number]
+        if len(slots) != 2:
             return
-        first, second = found
-        place, _ = self._shim[number]
-        tone = TONES[(place - 1) % len(TONES)]
+        first, second = slots
+        kind = self._kind[ligament.number]
+        tone = TONES[kind % len(TONES)]
         path = np.array([first.end, first.mouth, second.mouth, second.end])
         self._sheet.line(path + origin, 0.3, tone)
         x, y = (first.mouth + second.mouth) / 2 + origin
-        self._sheet.text(x + 0.4, y + 0.4, str(place), _NUMBER, colour=tone)
+        self._sheet.text(x + 0.4, y + 0.4, str(kind + 1), _NUMBER, colour=tone)
 
     def _headings(self, origin: Floats) -> None:
-        """Letters of the columns below and above, numbers of the rows left and right."""
+        """Writes letters of the columns below and above, numbers of the rows left and right."""
         left, low, width, height = self.box
         columns: dict[int, list[Unit]] = {}
         rows: dict[int, list[Unit]] = {}
@@ -130,63 +168,35 @@ class AssemblyPlan:
             columns.setdefault(unit.column, []).append(unit)
             rows.setdefault(unit.row, []).append(unit)
         for column, units in columns.items():
-            name = column_letters(column)
             for nearest, y in ((min, low + 2.0), (max, low + height - 5.0)):
-                x = nearest(units, key=_row).design.centroid.x
-                self._heading(np.add(origin, [x, y]), name)
+                x = nearest(units, key=lambda unit: unit.row).design.centroid.x
+                self._heading(np.add(origin, [x, y]), column_letters(column))
         for row, units in rows.items():
             for nearest, x in ((min, left + 3.5), (max, left + width - 3.5)):
-                y = nearest(units, key=_column).design.centroid.y - 1.2
+                y = nearest(units, key=lambda unit: unit.column).design.centroid.y - 1.2
                 self._heading(np.add(origin, [x, y]), str(row + 1))
 
     def _heading(self, place: Floats, name: str) -> None:
-        x, y = place
-        self._sheet.text(x, y, name, 10, BOLD, GREY, "middle")
+        self._sheet.text(place[0], place[1], name, 10, BOLD, GREY, "middle")
 
     def _joints(self, tile: Tile, origin: Floats) -> None:
-        """Where pages meet: a dashed line to cut along, and crosses that have to coincide."""
+        """Marks where pages meet: a dashed line to cut along, and crosses that have to coincide."""
         left, low, width, height = tile.window
         for axis, position in tile.joints():
-            across = axis == "x"
-            reach = (low, height) if across else (left, width)
-            ends = np.array([reach[0], reach[0] + reach[1]])
-            fixed = np.full(2, position)
-            points = np.column_stack([fixed, ends] if across else [ends, fixed])
+            order = [0, 1] if axis == "x" else [1, 0]
+            start, length = (low, height) if axis == "x" else (left, width)
+            points = np.array([[position, start], [position, start + length]])[:, order]
             self._sheet.dashed(points + origin)
             for part in (0.25, 0.75):
-                along = ends[0] + OVERLAP + part * (reach[1] - 2 * OVERLAP)
-                centre = np.array([position, along] if across else [along, position]) + origin
-                self._cross(centre)
-
-    def _cross(self, centre: Floats) -> None:
-        for step in (np.array([_CROSS, 0.0]), np.array([0.0, _CROSS])):
-            self._sheet.line(np.array([centre - step, centre + step]), 0.15, INK)
+                along = start + OVERLAP + part * (length - 2 * OVERLAP)
+                centre = np.array([position, along])[order] + origin
+                for step in (np.array([_CROSS, 0.0]), np.array([0.0, _CROSS])):
+                    self._sheet.line(np.array([centre - step, centre + step]), 0.15)
 
 
-def _name_place(unit: Unit) -> tuple[float, float, float]:
-    """Middle of the name of a unit, where it is widest, and the size of type that fits there."""
+def _name_place(unit: Unit, name: str) -> tuple[float, float, float]:
+    """Finds the middle of a unit, where it is widest, and the size of type that fits there."""
     circle = shapely.maximum_inscribed_circle(unit.outline, tolerance=0.05)
     (x, y), radius = circle.coords[0], float(circle.length)
-    fitting = 2.0 * radius * POINT / (_ASPECT * len(_name(unit)))
+    fitting = 2.0 * radius * POINT / (_ASPECT * len(name))
     return x, y, min(_ID, max(_SMALLEST, fitting))
-
-
-def _name(unit: Unit) -> str:
-    """The id of a unit, and the letter that it carries instead if it does."""
-    return f"{unit.label}={unit.letter}" if unit.letter else unit.label
-
-
-def _row(unit: Unit) -> int:
-    return unit.row
-
-
-def _column(unit: Unit) -> int:
-    return unit.column
-
-
-def legend(shims: tuple[Shim, ...]) -> list[tuple[str, str, str]]:
-    """Number on the plan, id and colour of each kind of shim."""
-    return [
-        (str(number), shim.id, TONES[(number - 1) % len(TONES)])
-        for number, shim in enumerate(shims, 1)
-    ]

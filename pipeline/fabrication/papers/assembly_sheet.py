@@ -1,40 +1,34 @@
-"""The pages of the assembly sheet: order of work, shim list, plan at 1:1, which shim goes where."""
+"""Lays out the assembly sheet: order of work, shim list, plan at 1:1, which shim goes where."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.fabrication.papers.assembly_plan import AssemblyPlan, legend
-from pipeline.fabrication.papers.assembly_words import paragraphs, steps
-from pipeline.fabrication.papers.page_tiles import Tile, tiles
-from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, Box, PdfDocument
+from pipeline.fabrication.papers.assembly_plan import TONES, AssemblyPlan, Tile, tiles
+from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, PdfDocument
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.problem.sections import Fabrication
 
 _LINE = 4.4  # mm from one line of a table to the next
 _ROW = 3.4
+_LETTERS = 104  # of the steps in a line
 
 
-def write(path: Path, specimen: BuiltSpecimen, asked: Fabrication) -> None:
-    """Write the assembly sheet of a specimen; the same specimen gives the same bytes.
-
-    Args:
-        path: the PDF to write.
-        specimen: what is built.
-        asked: the parameters of fabrication.
-    """
+def write_assembly_sheet(path: Path, specimen: BuiltSpecimen, settings: Fabrication) -> None:
+    """Writes the assembly sheet of a specimen as PDF; the same specimen gives the same bytes."""
     from reportlab.pdfgen.canvas import Canvas
 
     canvas = Canvas(str(path), invariant=1, pageCompression=1)
     title = f"{specimen.study}, {specimen.structure}"
     canvas.setTitle(f"Assembly of {title}")
     canvas.setAuthor("metacloak")
-    sheet = PdfDocument(canvas, asked.paper, title)
+    sheet = PdfDocument(canvas, settings.paper, title)
     canvas.setPageSize((sheet.width * POINT, sheet.height * POINT))
     plan = AssemblyPlan(specimen, sheet)
     pages = tiles(plan.box, sheet.room[2:])
-    _front(sheet, plan, steps(specimen, asked, pages), pages)
+    _front_page(sheet, plan, assembly_steps(specimen, settings, pages), pages)
     _shim_pages(sheet, specimen)
     for tile in pages:
         _plan_page(sheet, plan, tile)
@@ -42,30 +36,25 @@ def write(path: Path, specimen: BuiltSpecimen, asked: Fabrication) -> None:
     canvas.save()
 
 
-def _front(
-    sheet: PdfDocument, plan: AssemblyPlan, told: Sequence[str], pages: Sequence[Tile]
+def _front_page(
+    sheet: PdfDocument, plan: AssemblyPlan, steps: Sequence[str], pages: Sequence[Tile]
 ) -> None:
-    """The order of assembly, and the pages of the plan in small."""
+    """Draws the order of assembly, and below it the whole plan and its pages in small."""
     left, low, width, height = sheet.room
     with sheet.page("order of assembly"):
         y = low + height - 3.0
-        for number, step in enumerate(told, 1):
-            for k, words in enumerate(paragraphs(step, 104)):
+        for number, step in enumerate(steps, 1):
+            for k, words in enumerate(textwrap.wrap(step, _LETTERS)):
                 if k == 0:
                     sheet.text(left, y, f"{number}.", 9, BOLD, SIGNAL)
                 sheet.text(left + 7, y, words, 9)
                 y -= _LINE
             y -= 1.2
-        _sketch(sheet, plan, pages, (left, low, width, y - low - 6.0))
-
-
-def _sketch(sheet: PdfDocument, plan: AssemblyPlan, pages: Sequence[Tile], room: Box) -> None:
-    """The whole plan in small, and how its pages are joined."""
-    left, low, width, height = room
-    _, _, wide, tall = plan.box
-    scale = min(width / wide, (height - 6.0) / tall)
-    sheet.text(left, low + height - 2.0, "The plan and its pages", 9, BOLD)
-    plan.sketch(pages, (left, low + height - 6.0 - scale * tall), scale)
+        height = y - low - 6.0
+        _, _, wide, tall = plan.box
+        scale = min(width / wide, (height - 6.0) / tall)
+        sheet.text(left, low + height - 2.0, "The plan and its pages", 9, BOLD)
+        plan.sketch(pages, (left, low + height - 6.0 - scale * tall), scale)
 
 
 def _plan_page(sheet: PdfDocument, plan: AssemblyPlan, tile: Tile) -> None:
@@ -77,8 +66,7 @@ def _plan_page(sheet: PdfDocument, plan: AssemblyPlan, tile: Tile) -> None:
 
 
 def _shim_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
-    """All kinds of shims: number on the plan, id, length, pieces."""
-    tones = {name: tone for _, name, tone in legend(specimen.shims)}
+    """Lists all kinds of shims: number on the plan, id, length, pieces."""
     rows = [
         (
             str(number),
@@ -94,20 +82,21 @@ def _shim_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
     heading = ("on plan", "id", "length", "width", "needed", "spare", "to cut")
     total = sum(shim.count for shim in specimen.shims)
     title = f"shims: {total} pieces of {len(rows)} lengths"
-    _table(sheet, title, heading, rows, (16, 32, 24, 24, 18, 18, 18), [tones[r[1]] for r in rows])
+    tones = [TONES[number % len(TONES)] for number in range(len(rows))]
+    _table(sheet, title, heading, rows, (16, 32, 24, 24, 18, 18, 18), tones)
 
 
 def _ligament_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
-    """Which units are joined by another shim than the commonest one."""
+    """Lists the units that are joined by another shim than the commonest one."""
     common = max(specimen.shims, key=lambda shim: len(shim.ligaments))
     kinds = {
-        ligament: (number, shim.id)
+        ligament: (str(number), shim.id)
         for number, shim in enumerate(specimen.shims, 1)
         for ligament in shim.ligaments
         if shim is not common
     }
     rows = [
-        (" - ".join(ligament.labels), str(kinds[ligament.number][0]), kinds[ligament.number][1])
+        (" - ".join(ligament.labels), *kinds[ligament.number])
         for ligament in specimen.ligaments
         if ligament.number in kinds
     ]
@@ -124,23 +113,23 @@ def _table(
     widths: Sequence[float],
     tones: Sequence[str] = (),
 ) -> None:
-    """A table in as many columns as the page has room for, on as many pages as it takes."""
+    """Draws a table in as many columns as a page has room for, on as many pages as it takes."""
     left, low, width, height = sheet.room
-    beside = max(1, int((width + 4) // (sum(widths) + 4)))
+    side_by_side = max(1, int((width + 4) // (sum(widths) + 4)))
     deep = int((height - 2 * _LINE) // _ROW)
-    for start in range(0, max(len(rows), 1), beside * deep):
+    for start in range(0, max(len(rows), 1), side_by_side * deep):
         with sheet.page(title):
-            shown = rows[start : start + beside * deep]
-            per_column = -(-len(shown) // beside) if start else min(deep, len(shown))
-            for column in range(beside):
+            shown = rows[start : start + side_by_side * deep]
+            per_column = -(-len(shown) // side_by_side) if start else min(deep, len(shown))
+            for column in range(side_by_side):
                 part = range(column * per_column, min((column + 1) * per_column, len(shown)))
                 x = left + column * (sum(widths) + 4)
                 y = low + height - 3.0
                 if part:
-                    _cells(sheet, x, y, heading, widths, 7.5, GREY)
+                    _cells(sheet, x, y, heading, widths, GREY)
                 for k, row in enumerate(part):
                     tone = tones[start + row] if tones else INK
-                    _cells(sheet, x, y - _LINE - k * _ROW, shown[row], widths, 7.5, tone)
+                    _cells(sheet, x, y - _LINE - k * _ROW, shown[row], widths, tone)
 
 
 def _cells(
@@ -149,9 +138,51 @@ def _cells(
     y: float,
     words: Sequence[str],
     widths: Sequence[float],
-    size: float,
     colour: str,
 ) -> None:
     for word, width in zip(words, widths, strict=True):
-        sheet.text(x, y, word, size, colour=colour)
+        sheet.text(x, y, word, 7.5, colour=colour)
         x += width
+
+
+def assembly_steps(
+    specimen: BuiltSpecimen, settings: Fabrication, pages: Sequence[Tile]
+) -> list[str]:
+    """Writes the order of assembly, one step an entry, in words that fit the specimen."""
+    first, last = specimen.units[0].label, specimen.units[-1].label
+    pieces = sum(len(shim.ligaments) for shim in specimen.shims)
+    joining = "The plan fits on one page; fix it to the table."
+    if len(pages) > 1:
+        joining = (
+            f"Join the {len(pages)} pages of the plan: cut one of two neighbours along the dashed "
+            "line, lay it on the other so that the crosses coincide, and glue."
+        )
+    pairs = ", ".join(f"{letter} is {label}" for label, letter in specimen.letters.items())
+    letters = f" Units too small for their id carry a single letter: {pairs}." if pairs else ""
+    steps = [
+        "Measure the bar at the foot of each page: 100 mm, or the print is not to scale.",
+        joining,
+        f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
+        "column (from the left), a number for the row (from the bottom). The id is on the "
+        "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
+        f"top of the plan, as does a ring at the upper end.{letters}",
+        f"Cut and sort {pieces} shims and the spares by their length (next pages); on the sheet "
+        "the first of each length tells it in mm and is a spare. Numbers and colours on the plan "
+        "are those of the list. A shim is as wide as a unit is high.",
+        f"Try a shim in the coupon first: the slots are made {settings.slot_width:.2f} mm wide for "
+        f"a foil of {settings.shims.thickness:g} mm. If it is loose or stuck, change "
+        "fabrication.slots.clearance and make the package again.",
+        "Lay the plan, or the jig, on a flat table and put the units in their places with their "
+        "ids and arrows as on the plan, row by row from the bottom left.",
+        "Push the shims in from above, column by column and then row by row, until they stand "
+        "level with the units. Each must reach the inner end of both slots.",
+        "Check every gap with the comb, then glue (if at all) from the underside only.",
+    ]
+    if specimen.clamped:
+        clamped = ", ".join(specimen.clamped)
+        steps.append(f"Set the clamped units into their pads or grips: {clamped}.")
+    if specimen.driven:
+        driven = ", ".join(specimen.driven)
+        room = "Where neighbours leave an adapter no room for fingers, glue it on."
+        steps.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
+    return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]

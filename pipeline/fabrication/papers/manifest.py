@@ -1,4 +1,4 @@
-"""The manifest of a package: what it was made from, with which parameters, and what is in it."""
+"""Writes and reads the manifest of a package: its sources, its parameters, its files."""
 
 from __future__ import annotations
 
@@ -11,45 +11,45 @@ from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.problem import Problem, section_hash
 from pipeline.runtime import UserError
 
-NAME = "manifest.json"
+MANIFEST = "manifest.json"
 _AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
 _READ = ("units", "letters_for_ids", "shims", "thin_walls_mm", "files")
 
 
-def read(folder: Path) -> dict[str, Any]:
-    """What the manifest of a package tells.
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Reads the manifest of a package.
 
     Raises:
         UserError: there is none, or it is that of another version of the exporter.
     """
-    path = folder / NAME
+    path = folder / MANIFEST
     try:
-        told = dict(json.loads(path.read_text(encoding="utf-8")))
+        content = dict(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError) as error:
         what = f"the manifest cannot be read: {error}"
         raise UserError(what, file=path, remedy=_AGAIN) from error
-    if missing := [key for key in _READ if key not in told]:
+    if missing := [key for key in _READ if key not in content]:
         what = "another version of the exporter made the package: its manifest lacks a key"
         raise UserError(what, file=path, key=missing[0], remedy=_AGAIN)
-    return told
+    return content
 
 
-def write(folder: Path, specimen: BuiltSpecimen, asked: Problem, design: Path) -> None:
-    """Write the manifest of all other files in a package's folder.
+def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, design: Path) -> None:
+    """Writes the manifest of all other files in a package's folder.
 
     Args:
         folder: the package, complete but for its manifest.
         specimen: what is built.
-        asked: the problem whose section `fabrication` holds.
+        problem: the problem whose section `fabrication` holds.
         design: the design dataset.
     """
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != NAME)
-    told = {
+    files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
+    content = {
         "study": specimen.study,
         "structure": specimen.structure,
         "design_sha256": file_hash(design),
-        "problem_hash": section_hash(asked, "fabricate"),
-        "parameters": asked.fabrication.model_dump(mode="json"),
+        "problem_hash": section_hash(problem, "fabricate"),
+        "parameters": problem.fabrication.model_dump(mode="json"),
         "parameters_note": "lengths in mm; spares is a ratio",
         "units": [unit.label for unit in specimen.units],
         "letters_for_ids": specimen.letters,
@@ -59,5 +59,5 @@ def write(folder: Path, specimen: BuiltSpecimen, asked: Problem, design: Path) -
         "git_commit": git_commit(),
         "files": {path.relative_to(folder).as_posix(): file_hash(path) for path in files},
     }
-    text = json.dumps(told, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
-    (folder / NAME).write_text(text + "\n", encoding="utf-8", newline="\n")
+    text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    (folder / MANIFEST).write_text(text + "\n", encoding="utf-8", newline="\n")

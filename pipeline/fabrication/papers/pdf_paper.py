@@ -1,4 +1,4 @@
-"""A page of paper in millimetres, from its lower left corner, with what every page carries."""
+"""Draws on pages of paper in millimetres, from the lower left corner, with head and foot."""
 
 from __future__ import annotations
 
@@ -30,13 +30,7 @@ PLAIN, BOLD = "Helvetica", "Helvetica-Bold"
 
 
 class PdfDocument:
-    """The pages of one document, drawn one after the other.
-
-    Args:
-        canvas: reportlab's canvas.
-        paper: size of the pages.
-        title: what stands at the head of each page.
-    """
+    """Draws the pages of one document, one after the other, with its title at their heads."""
 
     def __init__(self, canvas: Canvas, paper: Paper, title: str) -> None:
         self.canvas = canvas
@@ -46,27 +40,26 @@ class PdfDocument:
 
     @property
     def room(self) -> Box:
-        """What head, foot and margins leave."""
+        """The box that head, foot and margins leave."""
         return room(self.width, self.height)
 
     @contextmanager
     def page(self, heading: str) -> Iterator[None]:
-        """One page with head, page number and check bar."""
+        """Opens a page with head, page number and check bar."""
         self._number += 1
-        self.text(MARGIN, self.height - MARGIN - 4.5, f"{self._title} - {heading}", 10, BOLD)
-        self.text(
-            self.width - MARGIN, self.height - MARGIN - 4.5, f"{self._number}", 10, at="right"
-        )
+        right, top = self.width - MARGIN, self.height - MARGIN - 4.5
+        self.text(MARGIN, top, f"{self._title} - {heading}", 10, BOLD)
+        self.text(right, top, f"{self._number}", 10, at="right")
         self._check_bar()
         yield
         self.canvas.showPage()
 
     def _check_bar(self) -> None:
-        """A black bar of 100 mm: the page is to scale if a ruler says so too."""
+        """Draws a black bar of 100 mm: the page is to scale if a ruler says so too."""
         self.canvas.setFillColor(INK)
         self.canvas.rect(MARGIN * POINT, MARGIN * POINT, BAR * POINT, 2 * POINT, stroke=0, fill=1)
-        told = f"{BAR:g} mm: measure this bar. Print at 100 %, without fitting to the page."
-        self.text(MARGIN, MARGIN + 3.5, told, 7, colour=GREY)
+        words = f"{BAR:g} mm: measure this bar. Print at 100 %, without fitting to the page."
+        self.text(MARGIN, MARGIN + 3.5, words, 7, colour=GREY)
 
     def text(
         self,
@@ -78,7 +71,7 @@ class PdfDocument:
         colour: str = INK,
         at: Literal["left", "middle", "right"] = "left",
     ) -> None:
-        """Words on a line whose base is at y; sizes of type in points."""
+        """Writes words on a line whose base is at y; sizes of type in points."""
         self.canvas.setFont(font, size)
         self.canvas.setFillColor(colour)
         put = {
@@ -89,12 +82,12 @@ class PdfDocument:
         put[at](x * POINT, y * POINT, words)
 
     def line(self, points: Floats, width: float = 0.2, colour: str = INK) -> None:
-        """An open polyline (n, 2), its width in mm."""
+        """Draws an open polyline (n, 2), its width in mm."""
         self._pen(width, colour)
         self.canvas.drawPath(self._path(points), stroke=1, fill=0)
 
     def polygon(self, points: Floats, fill: str = "#ffffff", width: float = 0.15) -> None:
-        """A closed polygon (n, 2), outlined in ink."""
+        """Draws a closed polygon (n, 2), outlined in ink."""
         self._pen(width, INK)
         self.canvas.setFillColor(fill)
         path = self._path(points)
@@ -102,14 +95,14 @@ class PdfDocument:
         self.canvas.drawPath(path, stroke=1, fill=1)
 
     def dashed(self, points: Floats, colour: str = GREY) -> None:
-        """A thin dashed line."""
+        """Draws a thin dashed line."""
         self.canvas.setDash(2 * POINT, 1.5 * POINT)
         self.line(points, 0.15, colour)
         self.canvas.setDash()
 
     @contextmanager
     def window(self, box: Box) -> Iterator[None]:
-        """Only what lies in the box is seen."""
+        """Clips the drawing to a box."""
         self.canvas.saveState()
         path = self.canvas.beginPath()
         path.rect(*(length * POINT for length in box))
@@ -131,6 +124,6 @@ class PdfDocument:
 
 
 def room(width: float, height: float) -> Box:
-    """What head, foot and margins leave of a page."""
+    """Measures the box that head, foot and margins leave of a page."""
     low = MARGIN + FOOT
     return MARGIN, low, width - 2 * MARGIN, height - MARGIN - HEAD - low

@@ -1,4 +1,4 @@
-"""What a check finds: the part, what is wrong with it, which parameter to change, and where."""
+"""Reports faults of written files: the part, the parameter to change, and a picture."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _INK, _FAULT = "#1a1a1a", "#d1242f"
 
 @dataclass(frozen=True)
 class Fault:
-    """One violated rule.
+    """Holds one violated rule.
 
     Attributes:
         part: the part in words, such as "unit U012".
-        what: what is wrong with it, with the measured and the wanted number.
+        what: the fault, with the measured and the required number.
         key: parameter of the section `fabrication` to change, dotted.
         remedy: how to change it.
-        file: the written file in which it was found.
+        file: the written file with the fault.
         around: outlines to show, in mm.
         spot: where the fault is, in mm.
     """
@@ -47,12 +47,14 @@ class Fault:
     spot: Geometry | None = None
 
 
-def stop(faults: Sequence[Fault], pictures: Path) -> None:
-    """Ends an export with the first fault, naming the other parts, if there is any fault.
+def unreadable(kind: str, path: Path, why: object) -> UserError:
+    """Makes the error of a written file that cannot be read back."""
+    what = f"{kind} that was just written cannot be read back: {why}"
+    return UserError(what, file=path, remedy=BUG)
 
-    Args:
-        faults: what the checks found.
-        pictures: folder for small pictures of the first faults.
+
+def stop(faults: Sequence[Fault], pictures: Path) -> None:
+    """Ends an export with the first fault, if any, and draws the first ones into a folder.
 
     Raises:
         UserError: there is a fault.
@@ -61,32 +63,23 @@ def stop(faults: Sequence[Fault], pictures: Path) -> None:
         return
     first = faults[0]
     shown = [
-        draw(
-            f"{fault.part}\n{fault.what}",
-            fault.around,
-            fault.spot,
-            pictures / f"fault_{number}.png",
-        )
-        for number, fault in enumerate(faults[:PICTURES], 1)
-        if fault.around
+        draw(f"{one.part}\n{one.what}", one.around, one.spot, pictures / f"fault_{number}.png")
+        for number, one in enumerate(faults[:PICTURES], 1)
+        if one.around
     ]
+    what = f"{first.part}: {first.what}"
+    if len(faults) > 1:
+        parts = list(dict.fromkeys(fault.part for fault in faults))
+        named = ", ".join(parts[:_NAMED]) + (", ..." if len(parts) > _NAMED else "")
+        what += f" ({len(faults)} faults in all: {named})"
     remedy = first.remedy + (f"; see {shown[0]}" if first.around else "")
-    told = f"{first.part}: {first.what}{_others(faults)}"
-    raise UserError(told, file=first.file, key=f"fabrication.{first.key}", remedy=remedy)
-
-
-def _others(faults: Sequence[Fault]) -> str:
-    """How many faults there are beside the first, and in which parts."""
-    if len(faults) == 1:
-        return ""
-    parts = list(dict.fromkeys(fault.part for fault in faults))
-    named = ", ".join(parts[:_NAMED]) + (", ..." if len(parts) > _NAMED else "")
-    return f" ({len(faults)} faults in all: {named})"
+    raise UserError(what, file=first.file, key=f"fabrication.{first.key}", remedy=remedy)
 
 
 def draw(title: str, around: Sequence[Geometry], spot: Geometry | None, path: Path) -> Path:
-    """A small picture of a fault: outlines in black, the spot in red, a scale in mm."""
+    """Draws a small picture of a fault: outlines in black, the spot in red, a scale in mm."""
     from matplotlib.figure import Figure
+    from shapely import box, total_bounds
 
     figure = Figure(figsize=(4.0, 4.0), layout="constrained")
     axes = figure.add_subplot()
@@ -94,38 +87,26 @@ def draw(title: str, around: Sequence[Geometry], spot: Geometry | None, path: Pa
         _plot(axes, outline, _INK, 1.0)
     if spot is not None:
         _plot(axes, spot, _FAULT, 2.5)
+    shapes = [*around, *([] if spot is None else [spot])]
+    left, low, right, high = total_bounds([box(*shape.bounds) for shape in shapes])
     axes.set_title(title, fontsize=7, wrap=True)
-    axes.set(aspect="equal", xlabel="mm", ylabel="mm", **_window(around, spot))
+    axes.set(aspect="equal", xlabel="mm", ylabel="mm")
+    axes.set_xlim(left - _MARGIN, right + _MARGIN)
+    axes.set_ylim(low - _MARGIN, high + _MARGIN)
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=150, metadata={"Software": None})
     return path
 
 
-def _window(around: Sequence[Geometry], spot: Geometry | None) -> dict[str, tuple[float, float]]:
-    """Limits around the part and its spot."""
-    from shapely import MultiPolygon, box, total_bounds
-
-    shapes = [*around, *([] if spot is None else [spot])]
-    left, low, right, high = total_bounds(
-        [box(*shape.bounds) for shape in shapes or [MultiPolygon()]]
-    )
-    return {
-        "xlim": (left - _MARGIN, right + _MARGIN),
-        "ylim": (low - _MARGIN, high + _MARGIN),
-    }
-
-
 def _plot(axes: Axes, shape: Geometry, colour: str, width: float) -> None:
-    """Points, lines and outlines of polygons."""
+    """Plots points, lines and outlines of polygons."""
     from matplotlib.collections import LineCollection
-    from shapely import get_coordinates, get_parts
+    from shapely import get_coordinates, get_dimensions, get_parts
 
     parts = get_parts(shape)
-    points = [get_coordinates(part) for part in parts if part.geom_type == "Point"]
-    lines = [get_coordinates(part) for part in parts if part.geom_type.startswith("Line")]
-    for part in parts:
-        if part.geom_type == "Polygon":
-            lines += [get_coordinates(ring) for ring in (part.exterior, *part.interiors)]
-    axes.add_collection(LineCollection(lines, colors=colour, linewidths=width))
-    for point in points:
-        axes.plot(*point.T, color=colour, marker="o")
+    areas = [get_parts(part.boundary) for part in parts[get_dimensions(parts) == 2]]
+    lines = [*parts[get_dimensions(parts) == 1], *(ring for rings in areas for ring in rings)]
+    segments = [get_coordinates(line) for line in lines]
+    axes.add_collection(LineCollection(segments, colors=colour, linewidths=width))
+    for point in parts[get_dimensions(parts) == 0]:
+        axes.plot(*get_coordinates(point).T, color=colour, marker="o")

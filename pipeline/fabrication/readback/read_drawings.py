@@ -1,8 +1,8 @@
 """Reads a written drawing, DXF or SVG, as plain curves in millimetres, y up.
 
 Nothing here knows how the files are made: DXF goes through ezdxf's recovering reader and its
-auditor, SVG through svgelements. An outer cut says of which part it is: in a DXF by extended data
-under the name METACLOAK, in an SVG by its label. All else belongs to the outline that it lies in.
+auditor, SVG through svgelements. In a DXF extended data under the name METACLOAK tell the part of
+a curve, in an SVG the label of an outer cut does. All else belongs to the outline around it.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from shapely import Point, Polygon, STRtree
+import shapely
+from shapely import Geometry, LineString, Point, Polygon, STRtree
 
-from pipeline.fabrication.readback.faults import BUG
-from pipeline.runtime import UserError
+from pipeline.fabrication.readback.faults import BUG, Fault, unreadable
 from sim.core import Floats
 
 if TYPE_CHECKING:
@@ -24,25 +24,25 @@ if TYPE_CHECKING:
 
 
 OUTER = "CUT_OUTER"
-APPLICATION = "METACLOAK"
-LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
-BYLAYER = 256
 MILLIMETRES = 4
-FLATNESS = 2e-4
-"""Curves become polygons that are this true to them, mm."""
+"""Value of $INSUNITS."""
 
+_APPLICATION = "METACLOAK"
+_LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
+_BYLAYER = 256
+_FLATNESS = 2e-4  # mm, to which curves become polygons
 _TURN = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One entity of a drawing.
+    """Holds one entity of a drawing.
 
     Attributes:
         part: id of the part that it belongs to, "" if there is none.
         layer: its layer.
-        kind: what the file calls it.
+        kind: its name in the file's format.
         points: vertices (n, 2) in mm, a closed curve without the repeated first one.
         closed: whether the file says that it ends where it starts.
         own_colour: whether it has another colour than its layer's.
@@ -55,10 +55,22 @@ class Curve:
     closed: bool
     own_colour: bool = False
 
+    @property
+    def polygon(self) -> Polygon:
+        """The area of a closed curve."""
+        return Polygon(self.points)
+
+    @property
+    def line(self) -> Geometry:
+        """The curve as a line; a closed one comes back to its start."""
+        if len(self.points) < 2:
+            return Point(self.points[0]) if len(self.points) else Point()
+        return LineString(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
+
 
 @dataclass(frozen=True)
 class Drawing:
-    """A file's curves in the order in which they are written, and what else it says.
+    """Holds a file's curves in the order in which they are written, and its other statements.
 
     `colours` are those of the layers that are used; `size` is the page (width, height) in mm of an
     SVG; `units` and `version` are a DXF's $INSUNITS and $ACADVER.
@@ -72,107 +84,87 @@ class Drawing:
     version: str = ""
 
     def parts(self) -> dict[str, list[Curve]]:
-        """The curves by part, parts in the order of their first curve."""
-        found: dict[str, list[Curve]] = {}
+        """Groups the curves by part, parts in the order of their first curve."""
+        groups: dict[str, list[Curve]] = {}
         for curve in self.curves:
-            found.setdefault(curve.part, []).append(curve)
-        return found
+            groups.setdefault(curve.part, []).append(curve)
+        return groups
+
+    def outlines(self) -> list[tuple[str, Polygon]]:
+        """Lists part and outer cut, in the order of the file."""
+        outer = (curve for curve in self.curves if curve.layer == OUTER and curve.closed)
+        return [(curve.part, curve.polygon) for curve in outer if len(curve.points) > 2]
+
+    def fault(
+        self,
+        what: str,
+        part: str | None = None,
+        shown: tuple[Geometry, ...] = (),
+        key: str = "laser",
+        remedy: str = BUG,
+    ) -> Fault:
+        """Makes a fault of a part, or of the whole drawing; the last shape shown is the spot."""
+        words = f"part {part}" if part else "a curve that belongs to no part"
+        words = "the drawing" if part is None else words
+        return Fault(words, what, key, remedy, self.file, shown, shown[-1] if shown else None)
 
 
-def read(path: Path) -> Drawing:
-    """The drawing in a file.
+def read_drawing(path: Path) -> Drawing:
+    """Reads a DXF or an SVG.
 
     Raises:
         UserError: it cannot be read as what its name says.
     """
-    drawing = read_svg(path) if path.suffix == ".svg" else read_dxf(path)
-    return replace(drawing, curves=_owned(drawing.curves))
-
-
-def _owned(curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
-    """The curves; those that tell no part get that of the outline around them."""
-    outlines = [curve for curve in curves if curve.layer == OUTER and curve.closed]
-    named = [curve for curve in outlines if curve.part and len(curve.points) > 2]
-    tree = STRtree([Polygon(curve.points) for curve in named])
+    drawing = _read_svg(path) if path.suffix == ".svg" else _read_dxf(path)
+    outlines = [(part, outline) for part, outline in drawing.outlines() if part]
+    tree = STRtree([outline for _, outline in outlines])
 
     def owner(curve: Curve) -> str:
         if curve.part or curve.layer == OUTER or len(curve.points) == 0:
             return curve.part
         around = tree.query(Point(curve.points[0]), predicate="intersects")
-        return named[int(min(around))].part if len(around) else ""
+        return outlines[int(min(around))][0] if len(around) else ""
 
-    return tuple(replace(curve, part=owner(curve)) for curve in curves)
+    return replace(drawing, curves=tuple(replace(c, part=owner(c)) for c in drawing.curves))
 
 
-def read_dxf(path: Path) -> Drawing:
-    """The drawing in a DXF file that its auditor has nothing to say about."""
+def _read_dxf(path: Path) -> Drawing:
+    """Reads a DXF file to which ezdxf's auditor does not object."""
     from ezdxf import recover
     from ezdxf.lldxf.const import DXFError
 
     try:
-        whole = path.read_bytes().split()[-1:] == [b"EOF"]
+        complete = path.read_bytes().split()[-1:] == [b"EOF"]
         document, auditor = recover.readfile(path)
     except (OSError, DXFError) as error:
-        raise _unreadable(path, str(error)) from error
-    if not whole:  # which the recovering reader does not mind
-        raise _unreadable(path, "its end is missing")
+        raise unreadable("a drawing", path, error) from error
+    if not complete:  # which the recovering reader does not mind
+        raise unreadable("a drawing", path, "its end is missing")
     if troubles := [*auditor.errors, *auditor.fixes]:
-        raise _unreadable(path, troubles[0].message)
-    curves = tuple(_of_dxf(entity) for entity in document.modelspace())
+        raise unreadable("a drawing", path, troubles[0].message)
+    curves = tuple(_dxf_curve(entity) for entity in document.modelspace())
     used = sorted({curve.layer for curve in curves})
     colours = {name: str(document.layers.get(name).color) for name in used}
     units = int(document.header.get("$INSUNITS", 0)) or None
     return Drawing(path, curves, colours, units=units, version=str(document.dxfversion))
 
 
-def read_svg(path: Path) -> Drawing:
-    """The drawing in an SVG file; its height turns y up."""
-    from xml.etree.ElementTree import ParseError
-
-    from svgelements import SVG
-
-    try:
-        page = SVG.parse(str(path), ppi=25.4, reify=True)
-    except (OSError, ParseError, ValueError) as error:
-        raise _unreadable(path, str(error)) from error
-    size = (float(page.width), float(page.height))
-    found = list(_of_svg(page, "", size[1]))
-    colours: dict[str, str] = {}
-    for curve, colour in found:
-        colours.setdefault(curve.layer, colour)
-    curves = tuple(
-        Curve(c.part, c.layer, c.kind, c.points, c.closed, colour != colours[c.layer])
-        for c, colour in found
-    )
-    return Drawing(path, curves, colours, size=size)
-
-
-def _of_dxf(entity: DXFEntity) -> Curve:
-    kind = entity.dxftype()
-    points, closed = _flattened(entity, kind)
-    layer = str(entity.dxf.layer)
-    colour = int(entity.dxf.get("color", BYLAYER))
-    return Curve(_named(entity), layer, kind, points, closed, own_colour=colour != BYLAYER)
-
-
-def _named(entity: DXFEntity) -> str:
-    if not entity.has_xdata(APPLICATION):
-        return ""
-    words = [str(tag.value) for tag in entity.get_xdata(APPLICATION) if tag.code == 1000]
-    return words[0] if words else ""
-
-
-def _flattened(entity: Any, kind: str) -> tuple[Floats, bool]:  # noqa: ANN401  (any entity)
-    """Vertices and closedness; an entity without an outline has no vertices."""
+def _dxf_curve(entity: DXFEntity) -> Curve:
+    """Flattens an entity; one without an outline has no vertices."""
     from ezdxf import path
 
+    kind, layer, part = entity.dxftype(), str(entity.dxf.layer), ""
+    if entity.has_xdata(_APPLICATION):
+        words = [str(tag.value) for tag in entity.get_xdata(_APPLICATION) if tag.code == 1000]
+        part = words[0] if words else ""
+    own = int(entity.dxf.get("color", _BYLAYER)) != _BYLAYER
     try:
         outline = path.make_path(entity)
     except TypeError:
-        return np.empty((0, 2)), False
-    points = np.array([(p.x, p.y) for p in outline.flattening(FLATNESS)]).reshape(-1, 2)
+        return Curve(part, layer, kind, np.empty((0, 2)), closed=False, own_colour=own)
+    points = np.array([(p.x, p.y) for p in outline.flattening(_FLATNESS)]).reshape(-1, 2)
     closed = kind == "CIRCLE" or bool(getattr(entity, "is_closed", False))
-    return _without_return(points, closed), closed
+    return Curve(part, layer, kind, _without_return(points, closed), closed, own)
 
 
 def _without_return(points: Floats, closed: bool) -> Floats:
@@ -181,38 +173,49 @@ def _without_return(points: Floats, closed: bool) -> Floats:
     return points
 
 
-def _of_svg(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
-    from svgelements import Group, Image, Shape, Text
+def _read_svg(path: Path) -> Drawing:
+    """Reads an SVG file; its height turns y up."""
+    from xml.etree.ElementTree import ParseError
+
+    from svgelements import SVG
+
+    try:
+        page = SVG.parse(str(path), ppi=25.4, reify=True)
+    except (OSError, ParseError, ValueError) as error:
+        raise unreadable("a drawing", path, error) from error
+    size = (float(page.width), float(page.height))
+    curves: list[Curve] = []
+    colours: dict[str, str] = {}
+    for curve, colour in _svg_curves(page, "", size[1]):
+        own = colours.setdefault(curve.layer, colour) != colour
+        curves.append(replace(curve, own_colour=own))
+    return Drawing(path, tuple(curves), colours, size=size)
+
+
+def _svg_curves(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
+    """Yields one curve for each stroke of each shape, and its colour."""
+    from svgelements import Circle, Group, Image, Path, Shape, Text
 
     for element in group:
+        kind = type(element).__name__.upper()
         if isinstance(element, Group):
-            yield from _of_svg(element, element.values.get("id") or layer, height)
-        elif isinstance(element, Shape):
-            yield from _shape(element, layer, height)
+            yield from _svg_curves(element, element.values.get("id") or layer, height)
         elif isinstance(element, Text | Image):
-            kind = type(element).__name__.upper()
             yield Curve("", layer, kind, np.empty((0, 2)), closed=False), str(element.stroke)
+        elif isinstance(element, Shape):
+            part = str(element.values["attributes"].get(_LABEL, ""))
+            strokes = [_svg_points(stroke) for stroke in Path(element).as_subpaths()]
+            if isinstance(element, Circle):
+                centre = [element.implicit_center.x, element.implicit_center.y]
+                strokes = [(centre + float(element.implicit_r) * _CIRCLE, True)]
+            for points, closed in strokes:
+                turned = points * [1.0, -1.0] + [0.0, height]
+                yield Curve(part, layer, kind, turned, closed), str(element.stroke)
 
 
-def _shape(shape: Any, layer: str, height: float) -> Iterator[tuple[Curve, str]]:  # noqa: ANN401
-    """One curve for each stroke of the shape's path."""
-    from svgelements import Circle
-    from svgelements import Path as SvgPath
-
-    kind = type(shape).__name__.upper()
-    part = str(shape.values["attributes"].get(LABEL, ""))
-    if isinstance(shape, Circle):
-        centre = np.array([shape.implicit_center.x, shape.implicit_center.y])
-        outlines = [(centre + float(shape.implicit_r) * _CIRCLE, True)]
-    else:
-        outlines = [_polygon(stroke) for stroke in SvgPath(shape).as_subpaths()]
-    for points, closed in outlines:
-        turned = points * [1.0, -1.0] + [0.0, height]
-        yield Curve(part, layer, kind, turned, closed), str(shape.stroke)
-
-
-def _polygon(stroke: Any) -> tuple[Floats, bool]:  # noqa: ANN401
-    from svgelements import Arc, Close, CubicBezier, Move, QuadraticBezier
+def _svg_points(stroke: Any) -> tuple[Floats, bool]:  # noqa: ANN401
+    """Flattens a stroke: its vertices (n, 2), and whether it is closed."""
+    from svgelements import Arc, Close, CubicBezier, QuadraticBezier
 
     points: list[tuple[float, float]] = []
     closed = False
@@ -221,14 +224,15 @@ def _polygon(stroke: Any) -> tuple[Floats, bool]:  # noqa: ANN401
             closed = True
         elif isinstance(segment, Arc | CubicBezier | QuadraticBezier):
             points += [tuple(segment.point(t)) for t in np.linspace(0.0, 1.0, 65)[1:]]
-        elif isinstance(segment, Move) or segment.end is not None:
+        elif segment.end is not None:
             points.append((float(segment.end.x), float(segment.end.y)))
     return _without_return(np.array(points, dtype=float).reshape(-1, 2), closed), closed
 
 
-def _unreadable(path: Path, why: str) -> UserError:
-    return UserError(
-        f"a drawing that was just written cannot be read back: {why}",
-        file=path,
-        remedy=BUG,
-    )
+def closest(shapes: np.ndarray, gap: float) -> Iterator[tuple[int, int, float]]:
+    """Yields pairs of shapes nearer to each other than `gap`, mm, and their distance."""
+    if len(shapes) == 0:
+        return
+    pairs = STRtree(shapes).query(shapes, predicate="dwithin", distance=gap).T
+    for first, second in pairs[pairs[:, 0] < pairs[:, 1]]:
+        yield int(first), int(second), float(shapely.distance(shapes[first], shapes[second]))

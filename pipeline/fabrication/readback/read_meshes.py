@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from pipeline.fabrication.readback.faults import BUG, Fault
-from pipeline.runtime import UserError
+from pipeline.fabrication.readback.faults import BUG, Fault, unreadable
 from sim.core import Floats, Ints
 
 if TYPE_CHECKING:
@@ -28,12 +27,14 @@ TOLERANCE = 1e-3
 """Lengths of a mesh are right to this, mm (binary STL holds single precision)."""
 
 VOLUME_TOLERANCE = 1e-3
+"""Relative difference of volume that two files of one part may have."""
+
 _CORE = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
 
 
 @dataclass(frozen=True)
 class MeshBody:
-    """One body of a file: its name, its vertices (n, 3) in mm and its triangles (m, 3)."""
+    """Holds one body of a file: its name, its vertices (n, 3) in mm and its triangles (m, 3)."""
 
     file: Path
     name: str
@@ -61,14 +62,23 @@ class MeshBody:
         return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
     def section(self, height: float) -> Geometry:
-        """What a plane at this height cuts."""
+        """Cuts the body by a plane at this height."""
         rings = self.manifold.slice(height).to_polygons()
         lines = [shapely.LinearRing(ring) for ring in rings if len(ring) > 2]
         return shapely.build_area(shapely.MultiLineString(lines))
 
+    def fault(self, what: str, key: str = "print", remedy: str = BUG) -> Fault:
+        """Makes a fault of the body, seen from the top."""
+        around: tuple[Geometry, ...] = ()
+        points = self.vertices[np.isfinite(self.vertices).all(axis=1), :2]
+        if len(points) > 2:
+            edges = points[self.triangles[(self.triangles < len(points)).all(axis=1)]]
+            around = (shapely.MultiLineString([[a, b, c, a] for a, b, c in edges[:2000]]),)
+        return Fault(f"part {self.name}", what, key, remedy, self.file, around)
+
 
 def read_stl(path: Path) -> MeshBody:
-    """The mesh of an STL file, named by the file.
+    """Reads the mesh of an STL file, named by the file.
 
     Raises:
         UserError: it is not one.
@@ -78,14 +88,14 @@ def read_stl(path: Path) -> MeshBody:
     try:
         mesh = trimesh.load_mesh(path, file_type="stl", process=False)
     except (OSError, ValueError, IndexError) as error:
-        raise _unreadable(path, str(error)) from error
+        raise unreadable("a mesh", path, error) from error
     if len(mesh.faces) == 0:
-        raise _unreadable(path, "it holds no triangles")
+        raise unreadable("a mesh", path, "it holds no triangles")
     return MeshBody(path, path.stem, np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def read_3mf(path: Path) -> tuple[MeshBody, ...]:
-    """The objects of a 3MF file, where the plate has them.
+    """Reads the objects of a 3MF file, where the plate has them.
 
     Raises:
         UserError: it is not one, or not in millimetres.
@@ -96,18 +106,20 @@ def read_3mf(path: Path) -> tuple[MeshBody, ...]:
         with zipfile.ZipFile(path) as package:
             root = etree.fromstring(package.read("3D/3dmodel.model"))
     except (OSError, KeyError, zipfile.BadZipFile, etree.XMLSyntaxError) as error:
-        raise _unreadable(path, str(error)) from error
+        raise unreadable("a mesh", path, error) from error
     if root.get("unit") != "millimeter":
-        raise _unreadable(path, f"its unit is {root.get('unit')!r}, not millimeter")
-    objects = {found.get("id"): found for found in root.iter(f"{_CORE}object")}
-    items = list(root.iter(f"{_CORE}item"))
-    return tuple(_placed(path, objects[item.get("objectid")], item) for item in items)
+        raise unreadable("a mesh", path, f"its unit is {root.get('unit')!r}, not millimeter")
+    objects = {body.get("id"): body for body in root.iter(f"{_CORE}object")}
+    return tuple(
+        _placed(path, objects[item.get("objectid")], item.get("transform"))
+        for item in root.iter(f"{_CORE}item")
+    )
 
 
-def _placed(path: Path, body: _Element, item: _Element) -> MeshBody:
+def _placed(path: Path, body: _Element, transform: str | None) -> MeshBody:
     vertices = _table(body, "vertex", ("x", "y", "z"))
     triangles = _table(body, "triangle", ("v1", "v2", "v3")).astype(np.int64)
-    if transform := item.get("transform"):
+    if transform:
         matrix = np.array(transform.split(), dtype=float).reshape(4, 3)
         vertices = vertices @ matrix[:3] + matrix[3]
     return MeshBody(path, str(body.get("name") or ""), vertices, triangles)
@@ -118,69 +130,44 @@ def _table(body: _Element, tag: str, columns: Sequence[str]) -> Floats:
     return np.array(rows).reshape(-1, len(columns))
 
 
-def check(solid: MeshBody, *, bodies: int = 1, floor: float | None = 0.0) -> Iterator[Fault]:
-    """Faults of a solid as such: holes, winding, parts, and whether it stands on the bed.
+def check_solid(solid: MeshBody, *, bodies: int = 1) -> Iterator[Fault]:
+    """Checks a solid as such: closed, wound, of so many bodies, and on the bed (z = 0)."""
+    what = _surface_fault(solid)
+    if what is not None:
+        yield solid.fault(what)
+        return
+    count, lowest = solid.mesh.body_count, solid.extent[0][2]
+    if count != bodies:
+        what = f"it falls into {count} pieces instead of {bodies}"
+        yield solid.fault(what, "slots.depth_max")
+    if abs(lowest) > TOLERANCE:
+        yield solid.fault(f"it starts at z = {lowest:.3f} mm instead of 0 mm")
 
-    Args:
-        solid: of a written file.
-        bodies: how many it should hold that do not touch.
-        floor: its lowest point, mm; None where that is free.
-    """
-    faults = list(_surface(solid))
-    if not faults:
-        faults = list(_body(solid, bodies, floor))
-    yield from faults
 
-
-def _surface(solid: MeshBody) -> Iterator[Fault]:
+def _surface_fault(solid: MeshBody) -> str | None:
     from manifold3d import Error
 
     if not np.isfinite(solid.vertices).all():
-        yield fault(solid, "vertices that are no numbers")
-        return
+        return "vertices that are no numbers"
     mesh = solid.mesh
-    if not mesh.is_watertight:
-        yield fault(solid, "its surface has holes")
-    elif not mesh.is_winding_consistent:
-        yield fault(solid, "its triangles are not wound all the same way")
-    elif mesh.volume <= 0.0:
-        yield fault(solid, "it is inside out")
-    elif len(mesh.faces) != len(solid.triangles):
-        yield fault(solid, "some of its triangles have no area or are there twice")
-    elif not mesh.is_volume or solid.manifold.status() != Error.NoError:
-        yield fault(solid, "it bounds no volume")
-
-
-def _body(solid: MeshBody, bodies: int, floor: float | None) -> Iterator[Fault]:
-    count = solid.mesh.body_count
-    if count != bodies:
-        yield fault(solid, f"it falls into {count} pieces instead of {bodies}", "slots.depth_max")
-    lowest = solid.extent[0][2]
-    if floor is not None and abs(lowest - floor) > TOLERANCE:
-        yield fault(solid, f"it starts at z = {lowest:.3f} mm instead of {floor:g} mm")
-
-
-def volume(solid: MeshBody, levels: Sequence[float]) -> Iterator[Fault]:
-    """Whether the volume is the area times the height, layer by layer between `levels` (mm)."""
-    layers = list(pairwise(levels))
-    areas = [solid.section((low + high) / 2).area for low, high in layers]
-    wanted = sum(area * (high - low) for area, (low, high) in zip(areas, layers, strict=True))
-    made = solid.mesh.volume
-    if abs(made - wanted) > VOLUME_TOLERANCE * wanted:
-        yield fault(solid, f"its volume is {made:.2f} mm^3, area times height {wanted:.2f} mm^3")
-
-
-def fault(solid: MeshBody, what: str, key: str = "print", remedy: str = BUG) -> Fault:
-    """A fault of the whole solid, seen from the top."""
-    around: tuple[Geometry, ...] = ()
-    points = solid.vertices[np.isfinite(solid.vertices).all(axis=1), :2]
-    if len(points) > 2:
-        edges = points[solid.triangles[(solid.triangles < len(points)).all(axis=1)]]
-        around = (shapely.MultiLineString([[a, b, c, a] for a, b, c in edges[:2000]]),)
-    return Fault(f"part {solid.name}", what, key, remedy, solid.file, around)
-
-
-def _unreadable(path: Path, why: str) -> UserError:
-    return UserError(
-        f"a mesh that was just written cannot be read back: {why}", file=path, remedy=BUG
+    tests = (
+        (mesh.is_watertight, "its surface has holes"),
+        (mesh.is_winding_consistent, "its triangles are not wound all the same way"),
+        (mesh.volume > 0.0, "it is inside out"),
+        (
+            len(mesh.faces) == len(solid.triangles),
+            "some of its triangles have no area or are there twice",
+        ),
+        (mesh.is_volume and solid.manifold.status() == Error.NoError, "it bounds no volume"),
     )
+    return next((what for passed, what in tests if not passed), None)
+
+
+def check_volume(solid: MeshBody, levels: Sequence[float]) -> Iterator[Fault]:
+    """Checks that the volume is the area times the height, layer by layer between `levels`, mm."""
+    layers = list(pairwise(levels))
+    expected = sum(solid.section((low + high) / 2).area * (high - low) for low, high in layers)
+    volume = solid.mesh.volume
+    if abs(volume - expected) > VOLUME_TOLERANCE * expected:
+        what = f"its volume is {volume:.2f} mm^3, area times height {expected:.2f} mm^3"
+        yield solid.fault(what)

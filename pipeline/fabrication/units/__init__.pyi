@@ -1,3 +1,5 @@
-from . import specimen_units as specimen_units
 from . import tracking_dots as tracking_dots
+from .specimen_units import build_specimen as build_specimen
+from .specimen_units import summary as summary
+from .unit_network import UnitNetwork as UnitNetwork
 from .unit_network import network as network

@@ -1,4 +1,4 @@
-"""Possible slots at one corner of a unit: how thick their walls are, how dear they are."""
+"""Lists possible slots at one corner of a unit, with their walls and their costs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from shapely import Polygon
 
 from pipeline.fabrication.parts import Slot
 from pipeline.problem.sections import Fabrication
-from sim.core import Floats
+from sim.core import Floats, Ints
 
 _TURNS = np.deg2rad(np.arange(-85.0, 86.0, 5.0))
 _DEPTH_STEP = 0.25  # mm; few different lengths of shims
@@ -22,10 +22,10 @@ _COST_OF_KINK = 1 / np.deg2rad(60.0)  # where the shim leaves the slot, against 
 
 @dataclass(frozen=True)
 class Corner:
-    """A vertex of a unit that takes a slot.
+    """Marks a vertex of a unit that takes a slot.
 
     Attributes:
-        vertex: which vertex of the unit.
+        vertex: number of the unit's vertex.
         ligament: id of the ligament there.
         along: (2,) unit vector of the ligament, pointing into the unit.
     """
@@ -37,7 +37,7 @@ class Corner:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Possible slots at one corner.
+    """Holds possible slots at one corner.
 
     Attributes:
         mouth: (2,) the vertex.
@@ -56,78 +56,73 @@ class Candidates:
         return len(self.depth)
 
     @property
-    def ends(self) -> Floats:
-        """(n, 2) inner ends."""
-        return self.mouth + self.depth[:, None] * self.direction
-
-    def pick(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> Candidates:
-        """Some of them."""
-        return Candidates(
-            self.mouth,
-            *(
-                values[which]
-                for values in (self.direction, self.depth, self.truncation, self.wall, self.cost)
-            ),
+    def lines(self) -> NDArray[np.object_]:
+        """(n,) centre lines, from the mouth to the inner end."""
+        ends = self.mouth + self.depth[:, None] * self.direction
+        return shapely.linestrings(
+            np.stack([np.broadcast_to(self.mouth, ends.shape), ends], axis=1)
         )
 
-
-def wanted_slot(polygon: Polygon, room: Polygon, corner: Corner, wanted: Fabrication) -> Candidates:
-    """The slot in the wanted direction at the wanted depth, if its walls are thick enough."""
-    depth = np.array([wanted.slots.depth])
-    return _candidates(polygon, room, corner, wanted, np.zeros(1), depth)
-
-
-def all_slots(polygon: Polygon, room: Polygon, corner: Corner, wanted: Fabrication) -> Candidates:
-    """Slots of all directions and depths whose walls are thick enough, the cheapest first."""
-    found = _candidates(polygon, room, corner, wanted, *_turns_and_depths(wanted))
-    return found.pick(np.argsort(found.cost, kind="stable"))
+    def pick(self, which: slice | Ints | NDArray[np.bool_]) -> Candidates:
+        """Selects some of them."""
+        values = (self.direction, self.depth, self.truncation, self.wall, self.cost)
+        return Candidates(self.mouth, *(value[which] for value in values))
 
 
-def best_wall(polygon: Polygon, room: Polygon, corner: Corner, wanted: Fabrication) -> float:
-    """The thickest walls of any slot at a corner, mm; negative if none stays inside."""
-    turns, depths = _turns_and_depths(wanted)
-    mouth, directions = _directions(polygon, corner, wanted, turns)
-    walls = _walls(room, mouth, directions, depths, wanted.slot_width)
-    return float(walls.max())
+def preferred_slot(
+    polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication
+) -> Candidates:
+    """Offers the slot in the preferred direction and depth, if its walls are thick enough."""
+    depth = np.array([settings.slots.depth])
+    return _candidates(polygon, room, corner, settings, np.zeros(1), depth)
 
 
-def _turns_and_depths(wanted: Fabrication) -> tuple[Floats, Floats]:
-    slots = wanted.slots
+def all_slots(polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication) -> Candidates:
+    """Offers slots of all directions and depths with thick enough walls, the cheapest first."""
+    offered = _candidates(polygon, room, corner, settings, *_turns_and_depths(settings))
+    return offered.pick(np.argsort(offered.cost, kind="stable"))
+
+
+def best_wall(polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication) -> float:
+    """Measures the thickest walls of any slot at a corner, mm; negative if none stays inside."""
+    turns, depths = _turns_and_depths(settings)
+    mouth, directions = _directions(polygon, corner, settings, turns)
+    return float(_walls(room, mouth, directions, depths, settings.slot_width).max())
+
+
+def _turns_and_depths(settings: Fabrication) -> tuple[Floats, Floats]:
+    slots = settings.slots
     steps = np.arange(slots.depth_min, slots.depth_max + _HAIR, _DEPTH_STEP)
     depths = np.unique(np.append(steps, slots.depth))
-    turns, depths = (grid.ravel() for grid in np.meshgrid(_TURNS, depths))
-    return turns, depths
+    turns, depths = np.meshgrid(_TURNS, depths)
+    return turns.ravel(), depths.ravel()
 
 
 def _candidates(
     polygon: Polygon,
     room: Polygon,
     corner: Corner,
-    wanted: Fabrication,
+    settings: Fabrication,
     turns: Floats,
     depths: Floats,
 ) -> Candidates:
-    """Slots at a corner, turned by ``turns`` from the wanted direction, with thick enough walls."""
-    mouth, directions = _directions(polygon, corner, wanted, turns)
-    walls = _walls(room, mouth, directions, depths, wanted.slot_width)
-    thick = walls >= wanted.minimum_wall - _HAIR
+    """Offers slots turned by ``turns`` from the preferred direction, with thick enough walls."""
+    mouth, directions = _directions(polygon, corner, settings, turns)
+    walls = _walls(room, mouth, directions, depths, settings.slot_width)
+    thick = walls >= settings.minimum_wall - _HAIR
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
-    truncation = truncations(room, mouth, directions, depths, wanted).max(axis=0)
+    truncation = truncations(room, mouth, directions, depths, settings).max(axis=0)
     kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
-    cost = (
-        np.abs(depths - wanted.slots.depth)
-        + np.abs(turns) * _COST_OF_TURN
-        + kink * _COST_OF_KINK
-        + truncation
-    )
-    held = depths - truncation >= wanted.slots.depth_min - _HAIR
+    cost = np.abs(depths - settings.slots.depth) + np.abs(turns) * _COST_OF_TURN
+    cost = cost + kink * _COST_OF_KINK + truncation
+    held = depths - truncation >= settings.slots.depth_min - _HAIR
     return Candidates(mouth, directions, depths, truncation, walls, cost).pick(held)
 
 
 def _directions(
-    polygon: Polygon, corner: Corner, wanted: Fabrication, turns: Floats
+    polygon: Polygon, corner: Corner, settings: Fabrication, turns: Floats
 ) -> tuple[Floats, Floats]:
-    """The vertex, and unit vectors (n, 2) turned from the wanted direction."""
+    """Finds the vertex, and unit vectors (n, 2) turned from the preferred direction."""
     points = np.asarray(polygon.exterior.coords)[:-1]
     mouth = points[corner.vertex]
     ways = {
@@ -135,7 +130,7 @@ def _directions(
         "ligament": corner.along,
         "bisector": _bisector(points, corner.vertex),
     }
-    x, y = ways[wanted.slots.direction] / np.linalg.norm(ways[wanted.slots.direction])
+    x, y = ways[settings.slots.direction] / np.linalg.norm(ways[settings.slots.direction])
     cosine, sine = np.cos(turns), np.sin(turns)
     return mouth, np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
@@ -151,7 +146,7 @@ def _bisector(points: Floats, vertex: int) -> Floats:
 def _walls(
     room: Polygon, mouth: Floats, directions: Floats, depths: Floats, width: float
 ) -> Floats:
-    """(n,) thickness of the walls around the inner ends; negative where a slot leaves the unit."""
+    """Measures walls (n,) around the inner ends; negative where a slot leaves the unit."""
     ends = mouth + depths[:, None] * directions
     side = width / 2 * directions[:, ::-1] * [-1.0, 1.0]
     caps = shapely.linestrings(np.stack([ends - side, ends + side], axis=1))
@@ -163,14 +158,14 @@ def _walls(
 
 
 def truncations(
-    body: Polygon, mouth: Floats, directions: Floats, depths: Floats, wanted: Fabrication
+    body: Polygon, mouth: Floats, directions: Floats, depths: Floats, settings: Fabrication
 ) -> Floats:
-    """(2, n) how far along slots the walls on their right and left are thinner than the tips.
+    """Measures (2, n) how far along slots the walls on right and left are thinner than the tips.
 
     That is as far as the band beside the slot, as wide as a tip, reaches out of the body.
     """
     left = directions[:, ::-1] * [-1.0, 1.0]
-    near, far = wanted.slot_width / 2, wanted.slot_width / 2 + wanted.slots.tip
+    near, far = settings.slot_width / 2, settings.slot_width / 2 + settings.slots.tip
     inwards = depths[:, None] * directions
     starts = [np.stack([-side * left, side * left]) + mouth for side in (near, far)]
     rings = np.stack([starts[0], starts[1], starts[1] + inwards, starts[0] + inwards], axis=-2)
@@ -182,9 +177,8 @@ def truncations(
     return cut.reshape(2, -1)
 
 
-def side_truncations(body: Polygon, slot: Slot, wanted: Fabrication) -> tuple[float, float]:
-    """The same for one slot of a body."""
-    right, left = truncations(
-        body, slot.mouth, slot.direction[None], np.array([slot.depth]), wanted
-    )[:, 0]
+def side_truncations(body: Polygon, slot: Slot, settings: Fabrication) -> tuple[float, float]:
+    """Measures the same for one slot of a body."""
+    depth = np.array([slot.depth])
+    right, left = truncations(body, slot.mouth, slot.direction[None], depth, settings)[:, 0]
     return float(right), float(left)

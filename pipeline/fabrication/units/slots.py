@@ -1,7 +1,7 @@
-"""Where the slots of a unit go: direction and depth of each, so that all walls are thick enough.
+"""Places the slots of a unit: direction and depth of each, so that all walls are thick enough.
 
-A slot starts out in the wanted direction at the wanted depth. Where walls would be too thin or
-slots would meet, all slots of the unit are chosen together: the cheapest set of turns and depths
+A slot starts out in the preferred direction at the preferred depth. Where walls would be too thin
+or slots would meet, all slots of the unit are chosen together: the cheapest set of turns and depths
 that leaves the walls. Only if there is none, the unit may grow a little beside its slots.
 """
 
@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from shapely import Polygon
+import shapely
+from numpy.typing import NDArray
+from shapely import LineString, Polygon
 
 from pipeline.fabrication.parts import Slot
 from pipeline.fabrication.units.slot_candidates import (
@@ -18,20 +20,21 @@ from pipeline.fabrication.units.slot_candidates import (
     Corner,
     all_slots,
     best_wall,
-    wanted_slot,
+    preferred_slot,
 )
-from pipeline.fabrication.units.slot_choice import distances, together
 from pipeline.problem.sections import Fabrication
 
 _KEPT = 600  # candidates per slot that are combined
+_VISITS = 50_000  # choices looked at before the best so far is taken
+_HAIR = 1e-6  # mm
 
 
 class NoRoomError(ValueError):
-    """The walls around the slots of a unit cannot be thick enough.
+    """Reports that the walls around the slots of a unit cannot be thick enough.
 
     Attributes:
         vertex: the corner where no slot at all fits, None if they only do not fit together.
-        wall: thickest walls that were found there, mm.
+        wall: thickest walls possible there, mm.
     """
 
     def __init__(self, vertex: int | None, wall: float) -> None:
@@ -40,62 +43,95 @@ class NoRoomError(ValueError):
         self.wall = wall
 
 
-def place(
-    polygon: Polygon, corners: Sequence[Corner], wanted: Fabrication, room: Polygon | None = None
+def place_slots(
+    polygon: Polygon, corners: Sequence[Corner], settings: Fabrication, room: Polygon
 ) -> tuple[Slot, ...]:
-    """The slots of a unit.
+    """Places the slots of a unit.
 
     Args:
         polygon: the unit as designed, mm, counter-clockwise.
         corners: the vertices that take a slot.
-        wanted: how the specimen is made.
-        room: what the unit may grow to, the polygon itself by default.
+        settings: depths, directions and walls of slots.
+        room: the polygon itself, or the area that the unit may grow to.
 
     Raises:
         NoRoomError: there are no slots with thick enough walls.
     """
-    within = polygon if room is None else room
-    direct = [wanted_slot(polygon, within, corner, wanted) for corner in corners]
-    chosen = together(direct, wanted) if all(map(len, direct)) else None
+    direct = [preferred_slot(polygon, room, corner, settings) for corner in corners]
+    chosen = _cheapest_choice(direct, settings) if all(map(len, direct)) else None
     if chosen is None:
-        chosen = _searched(polygon, within, corners, wanted)
-    return _as_slots(corners, chosen, wanted)
-
-
-def _searched(
-    polygon: Polygon, room: Polygon, corners: Sequence[Corner], wanted: Fabrication
-) -> list[Candidates]:
-    offered = [all_slots(polygon, room, corner, wanted) for corner in corners]
-    for corner, found in zip(corners, offered, strict=True):
-        if not len(found):
-            raise NoRoomError(corner.vertex, best_wall(polygon, room, corner, wanted))
-    chosen = together([found.pick(np.arange(min(_KEPT, len(found)))) for found in offered], wanted)
+        offered = [all_slots(polygon, room, corner, settings) for corner in corners]
+        for corner, candidates in zip(corners, offered, strict=True):
+            if not len(candidates):
+                raise NoRoomError(corner.vertex, best_wall(polygon, room, corner, settings))
+        chosen = _cheapest_choice(
+            [candidates.pick(slice(_KEPT)) for candidates in offered], settings
+        )
     if chosen is None:
         raise NoRoomError(None, 0.0)
-    return chosen
-
-
-def _as_slots(
-    corners: Sequence[Corner], chosen: Sequence[Candidates], wanted: Fabrication
-) -> tuple[Slot, ...]:
+    lines = [candidates.lines[0] for candidates in chosen]
     return tuple(
         Slot(
             corner.vertex,
             corner.ligament,
-            found.mouth,
-            found.direction[0],
-            float(found.depth[0]),
-            wanted.slot_width,
-            float(found.truncation[0]),
-            min([float(found.wall[0]), *_to_others(chosen, index, wanted)]),
+            one.mouth,
+            one.direction[0],
+            float(one.depth[0]),
+            settings.slot_width,
+            float(one.truncation[0]),
+            min(float(one.wall[0]), _clearance(lines, at) - settings.slot_width),
         )
-        for index, (corner, found) in enumerate(zip(corners, chosen, strict=True))
+        for at, (corner, one) in enumerate(zip(corners, chosen, strict=True))
     )
 
 
-def _to_others(chosen: Sequence[Candidates], index: int, wanted: Fabrication) -> list[float]:
-    return [
-        float(distances(chosen[index], other)[0, 0]) - wanted.slot_width
-        for at, other in enumerate(chosen)
-        if at != index
-    ]
+def _clearance(lines: Sequence[LineString], at: int) -> float:
+    """Measures the distance from one centre line to the nearest other one, mm."""
+    others = shapely.MultiLineString([*lines[:at], *lines[at + 1 :]])
+    return float(others.distance(lines[at])) if len(lines) > 1 else np.inf
+
+
+def _cheapest_choice(
+    offered: Sequence[Candidates], settings: Fabrication
+) -> list[Candidates] | None:
+    """Chooses the cheapest candidate per corner such that slots keep their distance.
+
+    Candidates come in ascending order of their cost. A choice strikes out what does not go with it
+    at the corners after it, whose cheapest remaining candidates bound the cost.
+    """
+    least = settings.minimum_wall + settings.slot_width - _HAIR
+    fits = {
+        (a, b): ~shapely.dwithin(offered[a].lines[:, None], offered[b].lines[None], least)
+        for b in range(len(offered))
+        for a in range(b)
+    }
+    best: tuple[float, list[int]] = (np.inf, [])
+    visits = _VISITS
+
+    def descend(picked: list[int], left: list[NDArray[np.bool_]], cost: float) -> None:
+        nonlocal best, visits
+        corner = len(picked)
+        if corner == len(offered):
+            best = (cost, picked)
+            return
+        for choice in np.flatnonzero(left[0]).tolist():
+            total = cost + float(offered[corner].cost[choice])
+            if total >= best[0] or visits == 0:
+                return
+            visits -= 1
+            later = range(corner + 1, len(offered))
+            after = [
+                allowed & fits[corner, other][choice]
+                for other, allowed in zip(later, left[1:], strict=True)
+            ]
+            if not all(allowed.any() for allowed in after):
+                continue
+            rest = zip(later, after, strict=True)
+            bound = sum(float(offered[other].cost[allowed.argmax()]) for other, allowed in rest)
+            if total + bound < best[0]:
+                descend([*picked, choice], after, total)
+
+    descend([], [np.ones(len(candidates), dtype=bool) for candidates in offered], 0.0)
+    if not best[1] and offered:
+        return None
+    return [one.pick(slice(at, at + 1)) for one, at in zip(offered, best[1], strict=True)]

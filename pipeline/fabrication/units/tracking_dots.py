@@ -1,4 +1,4 @@
-"""Where the tracking dots of a unit go."""
+"""Places the tracking dots of a unit."""
 
 from __future__ import annotations
 
@@ -10,42 +10,42 @@ from pipeline.fabrication.parts import Circle
 from pipeline.problem.sections import Markers
 
 _RIM = 0.2  # mm between a dot and the rim of the unit
-_SHARES = (1.0, 0.75, 0.5)  # of the wanted diameter
+_SHARES = (1.0, 0.75, 0.5)  # of the set diameter
 _SPREADS = np.array([1.0, 0.9, 0.8, 0.7, 0.6, 0.5])
 _ANGLES = np.deg2rad(np.arange(0.0, 180.0, 5.0))
 
 
-def dots(outline: Polygon, wanted: Markers) -> tuple[Circle, ...]:
-    """Dots on a line through the centroid, spread as far as wanted or as there is room for.
+def dots(outline: Polygon, settings: Markers) -> tuple[Circle, ...]:
+    """Places dots on a line through the centroid, spread as far as set or as there is room for.
 
-    Where there is no room for several dots of half the wanted diameter, there is one.
+    Where there is no room for several dots of half the set diameter, there is one.
 
     Returns:
         The dots; none if there is no room for one.
     """
     rooms = [
         (diameter, outline.buffer(-(diameter / 2 + _RIM)))
-        for diameter in (share * wanted.diameter for share in _SHARES)
+        for diameter in (share * settings.diameter for share in _SHARES)
     ]
     rooms = [(diameter, free) for diameter, free in rooms if not free.is_empty]
-    if wanted.count > 1:
+    if settings.count > 1:
         for diameter, free in rooms:
-            if line := _line(free, outline, diameter, wanted):
+            if line := _line(free, outline, diameter, settings):
                 return line
     return tuple(_one(free, outline, diameter) for diameter, free in rooms[:1])
 
 
 def _line(
-    free: shapely.Geometry, outline: Polygon, diameter: float, wanted: Markers
+    free: shapely.Geometry, outline: Polygon, diameter: float, settings: Markers
 ) -> tuple[Circle, ...]:
     centre = np.array([outline.centroid.x, outline.centroid.y])
-    least = 1.5 * diameter * (wanted.count - 1)
-    spreads = wanted.spread * _SPREADS
+    least = 1.5 * diameter * (settings.count - 1)
+    spreads = settings.spread * _SPREADS
     spread, angle = (
         grid.ravel() for grid in np.meshgrid(spreads[spreads >= least], _ANGLES, indexing="ij")
     )
     arm = spread[:, None] / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
-    shares = np.linspace(-1.0, 1.0, wanted.count)
+    shares = np.linspace(-1.0, 1.0, settings.count)
     places = centre + shares[None, :, None] * arm[:, None, :]
     shapely.prepare(free)
     fits = np.flatnonzero(shapely.contains_xy(free, places[..., 0], places[..., 1]).all(axis=1))

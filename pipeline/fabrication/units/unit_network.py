@@ -1,4 +1,4 @@
-"""One structure of a design before anything is made of it: units that are present, ligaments."""
+"""Reads one structure of a design: the units and ligaments that are present."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import shapely
 import xarray as xr
+from numpy.typing import NDArray
 from shapely import Polygon
 
-from pipeline.fabrication.parts import UnmadeError, labels
+from pipeline.fabrication.parts import UnbuildableUnitError, labels
 from pipeline.fabrication.units.slot_candidates import Corner
 from sim.core import Floats
 
@@ -20,7 +21,7 @@ _HAIR = 1e-6
 
 @dataclass(frozen=True)
 class UnitNetwork:
-    """One structure of a design: what is there, before anything is made of it.
+    """Holds one structure of a design, before anything is built of it.
 
     Attributes:
         numbers: (n,) ids of the units that are present.
@@ -41,39 +42,42 @@ class UnitNetwork:
 
 
 def network(design: xr.Dataset, structure: str) -> UnitNetwork:
-    """The structure "intact", "altered" or "cloaked" of a design."""
+    """Reads the structure "intact", "altered" or "cloaked" of a design.
+
+    A unit in a void is there in the intact structure only; with it go the ligaments that end there.
+    """
     vertices = design["vertices" if structure == "cloaked" else "vertices_initial"]
     shapes = vertices.transpose("unit", "vertex", "xy").values
     present = np.isfinite(shapes[:, :3]).all(axis=(1, 2))
     if structure != "intact":
-        present &= design["region"].values != _flag(design["region"], "void")
-    ids = design["unit"].values
+        present &= ~_flagged(design["region"], "void")
+    ids = [int(number) for number in design["unit"].values]
     index = list(zip(design["i"].values.tolist(), design["j"].values.tolist(), strict=True))
     names = labels(index)
+    row = {number: at for at, number in enumerate(ids)}
     ends = zip(design["ligament_unit"].values, design["ligament_vertex"].values, strict=True)
-    row = {int(number): at for at, number in enumerate(ids)}
-    joined = []
+    joints = []
     for number, ((a, b), (p, q)) in enumerate(ends):
         if present[row[int(a)]] and present[row[int(b)]]:
             vector = shapes[row[int(b)], q] - shapes[row[int(a)], p]
             along = vector / np.linalg.norm(vector)
-            joined.append((number, (int(a), int(p)), (int(b), int(q)), along))
-    support = design["support"].values
+            joints.append((number, (int(a), int(p)), (int(b), int(q)), along))
+    clamped, driven = (_flagged(design["support"], held) for held in ("clamped", "driven"))
     there = np.flatnonzero(present)
     return UnitNetwork(
-        tuple(int(ids[at]) for at in there),
-        {int(ids[at]): _polygon(shapes[at]) for at in there},
-        {int(ids[at]): names[at] for at in there},
-        {int(ids[at]): index[at] for at in there},
-        tuple(joined),
-        tuple(int(ids[at]) for at in there if support[at] == _flag(design["support"], "clamped")),
-        tuple(int(ids[at]) for at in there if support[at] == _flag(design["support"], "driven")),
+        tuple(ids[at] for at in there),
+        {ids[at]: _polygon(shapes[at]) for at in there},
+        {ids[at]: names[at] for at in there},
+        {ids[at]: index[at] for at in there},
+        tuple(joints),
+        tuple(ids[at] for at in there if clamped[at]),
+        tuple(ids[at] for at in there if driven[at]),
     )
 
 
-def _flag(variable: xr.DataArray, meaning: str) -> int:
+def _flagged(variable: xr.DataArray, meaning: str) -> NDArray[np.bool_]:
     meanings = variable.attrs["flag_meanings"].split()
-    return int(variable.attrs["flag_values"][meanings.index(meaning)])
+    return np.asarray(variable.values == variable.attrs["flag_values"][meanings.index(meaning)])
 
 
 def _polygon(points: Floats) -> Polygon:
@@ -81,19 +85,19 @@ def _polygon(points: Floats) -> Polygon:
 
 
 def corners(net: UnitNetwork) -> dict[int, list[Corner]]:
-    """The vertices that take a slot, by id of the unit."""
-    found: dict[int, list[Corner]] = defaultdict(list)
+    """Lists the vertices that take a slot, by id of the unit."""
+    slotted: dict[int, list[Corner]] = defaultdict(list)
     for number, (a, p), (b, q), along in net.ligaments:
-        found[a].append(Corner(p, number, -along))
-        found[b].append(Corner(q, number, along))
-    return found
+        slotted[a].append(Corner(p, number, -along))
+        slotted[b].append(Corner(q, number, along))
+    return slotted
 
 
 def refuse_overlaps(net: UnitNetwork, file: Path) -> None:
-    """Check that the units of a design are simple polygons, apart from each other.
+    """Checks that the units of a design are simple polygons, apart from each other.
 
     Raises:
-        UnmadeError: they are not; names the first ones and the remedy.
+        UnbuildableUnitError: they are not; names the first ones and the remedy.
     """
     polygons = [net.polygons[number] for number in net.numbers]
     for number, polygon in zip(net.numbers, polygons, strict=True):
@@ -101,7 +105,9 @@ def refuse_overlaps(net: UnitNetwork, file: Path) -> None:
             remedy = "design it with constraints on edges and angles"
             what = f"the outline of unit {net.labels[number]} crosses itself"
             lines = (polygon.exterior,)
-            raise UnmadeError(what, lines, *lines, file=file, key="vertices", remedy=remedy)
+            raise UnbuildableUnitError(
+                what, lines, *lines, file=file, key="vertices", remedy=remedy
+            )
     tree = shapely.STRtree(polygons)
     for first, second in tree.query(polygons, "intersects").T:
         shared = polygons[first].intersection(polygons[second])
@@ -110,4 +116,4 @@ def refuse_overlaps(net: UnitNetwork, file: Path) -> None:
             what = f"the units {pair} overlap in the design"
             remedy = 'ask for a gap in the design, e.g. constraints.gap: "0.2 mm"'
             both = (polygons[first], polygons[second])
-            raise UnmadeError(what, both, shared, file=file, key="vertices", remedy=remedy)
+            raise UnbuildableUnitError(what, both, shared, file=file, key="vertices", remedy=remedy)

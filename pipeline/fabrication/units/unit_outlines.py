@@ -1,4 +1,4 @@
-"""The outline of a unit as it is made: corners rounded, slots cut, thin tips taken off."""
+"""Cuts the outline of a unit: corners rounded, slots cut, thin tips taken off."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROUND = 12  # segments per quarter circle
 
 
 def filleted(polygon: Polygon, radius: float) -> Polygon:
-    """The polygon with its convex corners rounded."""
+    """Rounds the convex corners of a polygon."""
     if radius == 0.0:
         return polygon
     inner = polygon.buffer(-radius, join_style="mitre", mitre_limit=100.0)
@@ -29,87 +29,88 @@ def filleted(polygon: Polygon, radius: float) -> Polygon:
 
 
 def room_to_grow(
-    polygon: Polygon, neighbours: Sequence[Polygon], growth: float, wanted: Fabrication
+    polygon: Polygon, neighbours: Sequence[Polygon], growth: float, settings: Fabrication
 ) -> Polygon:
-    """What a unit may grow to beside its slots without coming too near to its neighbours."""
+    """Bounds the growth of a unit beside its slots by the least gap to its neighbours."""
     grown = polygon.buffer(growth, quad_segs=4)
     taken = shapely.union_all(
         [
-            other.buffer(wanted.minimum_gap + GRID, join_style="mitre", mitre_limit=100.0)
+            other.buffer(settings.minimum_gap + GRID, join_style="mitre", mitre_limit=100.0)
             for other in neighbours
-            if other.distance(grown) < wanted.minimum_gap + GRID
+            if other.distance(grown) < settings.minimum_gap + GRID
         ]
     )
     return _largest(grown.difference(taken).union(polygon))
 
 
-def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], wanted: Fabrication) -> Polygon:
-    """The polygon, thickened along slots whose inner ends have too thin walls in it."""
+def lugs(polygon: Polygon, room: Polygon, slots: Iterable[Slot], settings: Fabrication) -> Polygon:
+    """Thickens a polygon along slots whose inner ends have too thin walls in it."""
     body = polygon
     for slot in slots:
         cap = _across(slot)
-        if not polygon.contains(cap) or cap.distance(polygon.exterior) < wanted.minimum_wall - GRID:
-            side = slot.width / 2 + wanted.minimum_wall
-            lug = _rectangle(slot, 0.0, slot.depth + wanted.minimum_wall, -side, side)
+        if (
+            not polygon.contains(cap)
+            or cap.distance(polygon.exterior) < settings.minimum_wall - GRID
+        ):
+            side = slot.width / 2 + settings.minimum_wall
+            lug = _rectangle(slot, 0.0, slot.depth + settings.minimum_wall, -side, side)
             body = body.union(lug.intersection(room))
     return _largest(body) if body is not polygon else polygon
 
 
-def cut(body: Polygon, slots: Sequence[Slot], wanted: Fabrication) -> Polygon:
-    """The body with its slots cut in, and the tips beside their mouths cut back.
+def cut(body: Polygon, slots: Sequence[Slot], settings: Fabrication) -> Polygon:
+    """Cuts the slots into a body, and the tips beside their mouths back.
 
     In front of its mouth a cut leaves the walls around the inner ends of other slots alone.
     """
-    held = {slot.vertex: _across(slot).buffer(wanted.minimum_wall) for slot in slots}
+    held = {slot.vertex: _across(slot).buffer(settings.minimum_wall) for slot in slots}
     waste: list[BaseGeometry] = []
     for slot in slots:
         walls = [area for vertex, area in held.items() if vertex != slot.vertex]
         kept = shapely.intersection(_front(slot), shapely.union_all(walls))
-        waste += [_channel(slot).difference(kept), *_tips(body, slot, wanted)]
+        waste += [_channel(slot).difference(kept), *_tips(body, slot, settings)]
     # On a grid: in full precision GEOS's union may drop a piece whose edge touches another's.
     made = _largest(body.difference(shapely.union_all(waste, grid_size=GRID)))
     return _largest(shapely.set_precision(made.simplify(_SHORT), GRID))
 
 
 def wall(made: Polygon, slot: Slot) -> float:
-    """Thinnest wall around the inner end of a slot in a unit as it is made, mm."""
+    """Measures the thinnest wall around the inner end of a slot in a cut outline, mm."""
     rest = made.exterior.difference(_channel(slot).buffer(_SHORT * 10))
     return float(_across(slot).distance(rest))
 
 
-def _frame(slot: Slot) -> tuple[Floats, Floats]:
-    """Unit vectors along the slot and to its left."""
-    return slot.direction, np.array([-slot.direction[1], slot.direction[0]])
-
-
 def _across(slot: Slot) -> LineString:
-    _, left = _frame(slot)
-    side = slot.width / 2 * left
+    side = slot.width / 2 * _left(slot)
     return LineString([slot.end - side, slot.end + side])
 
 
+def _left(slot: Slot) -> Floats:
+    return np.array([-slot.direction[1], slot.direction[0]])
+
+
 def _rectangle(slot: Slot, start: float, stop: float, right: float, left: float) -> Polygon:
-    """A rectangle in the slot's own axes."""
-    along, across = _frame(slot)
+    """Draws a rectangle in the slot's own axes (along it, to its left)."""
+    along, across = slot.direction, _left(slot)
     corners = [(start, right), (stop, right), (stop, left), (start, left)]
     return Polygon([slot.mouth + s * along + t * across for s, t in corners])
 
 
 def _channel(slot: Slot) -> Polygon:
-    """The slot, lengthened outwards until it has left the unit."""
+    """Lengthens the slot outwards until it has left the unit."""
     return _rectangle(slot, -_BACK * slot.width, slot.depth, -slot.width / 2, slot.width / 2)
 
 
 def _front(slot: Slot) -> Polygon:
-    """The part of the channel before the mouth."""
+    """Widens the part of the channel before the mouth."""
     side = slot.width
     return _rectangle(slot, -_BACK * slot.width, 0.0, -side, side)
 
 
-def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
-    """Where the walls beside the slot are thinner than the tips."""
-    right, left = side_truncations(body, slot, wanted)
-    side = slot.width / 2 + wanted.slots.tip + GRID
+def _tips(body: Polygon, slot: Slot, settings: Fabrication) -> Iterable[Polygon]:
+    """Yields where the walls beside the slot are thinner than the tips."""
+    right, left = side_truncations(body, slot, settings)
+    side = slot.width / 2 + settings.slots.tip + GRID
     # From the middle of the slot: rectangles that only touch may leave a hairline between them.
     for length, across in ((right, (-side, 0.0)), (left, (0.0, side))):
         if length > GRID:
@@ -117,7 +118,7 @@ def _tips(body: Polygon, slot: Slot, wanted: Fabrication) -> Iterable[Polygon]:
 
 
 def _largest(shape: BaseGeometry) -> Polygon:
-    """The largest piece, counter-clockwise and without holes."""
+    """Keeps the largest piece, counter-clockwise and without holes."""
     pieces = [piece for piece in shapely.get_parts(shape) if isinstance(piece, Polygon)]
     piece = max(pieces, key=lambda piece: piece.area)
     return shapely.orient_polygons(Polygon(piece.exterior))

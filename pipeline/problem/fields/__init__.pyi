@@ -1,3 +1,4 @@
+from . import csv_columns as csv_columns
 from . import units as units
 from .quantities import FOLDER as FOLDER
 from .quantities import SIM_UNITS as SIM_UNITS

@@ -1,4 +1,4 @@
-"""Field types of a problem: strings with units outside, floats in mm, N, s, tonne, rad inside."""
+"""Defines field types: strings with units outside, floats in mm, N, s, tonne, rad inside."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from pipeline.problem.fields import units
+from pipeline.runtime import UserError
 
 SIM_UNITS = {"sim_units": True}
 """Validation context that takes bare floats as they are: for problems read back from a dataset."""
@@ -21,7 +22,7 @@ _LONGEST = 300  # letters of what a file's reader complains of, which may cite w
 
 
 def fault(what: str, remedy: str, key: str | None = None) -> PydanticCustomError:
-    """A validation error that knows its remedy, and the key below the validated section."""
+    """Builds a validation error with its remedy, and the key below the validated section."""
     legible = "".join(letter if letter.isprintable() else "?" for letter in what[:_LONGEST])
     told = {"what": legible, "remedy": remedy, "key": key}
     return PydanticCustomError("problem", "{what}", told)
@@ -34,9 +35,9 @@ def _reader(dimension: units.Dimension, minimum: float | None, exclusive: bool) 
         if info.context == SIM_UNITS and isinstance(value, int | float):
             return float(value)
         try:
-            number = units.parse(value, dimension)
-        except units.QuantityError as error:
-            raise fault(error.what, error.remedy) from error
+            number = units.parse_quantity(value, dimension)
+        except UserError as error:
+            raise fault(error.what, str(error.remedy)) from error
         if minimum is not None and (number < minimum or (exclusive and number == minimum)):
             bound = "greater than zero" if exclusive else "zero or more"
             raise fault(f"{dimension.name} must be {bound}", f"give a value {bound}, {example}")

@@ -1,7 +1,9 @@
-"""The base of every section of a problem: frozen, strict about its keys, with a helpful refusal."""
+"""Defines the base of all sections of a problem: frozen, strict about keys, with remedies."""
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import ClassVar
@@ -10,12 +12,14 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, model_validato
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from pipeline.problem.fields.key_docs import lead, meanings
 from pipeline.problem.fields.quantities import fault
+
+_ATTRIBUTES = re.compile(r"\n*^Attributes:\n", re.MULTILINE)
+_KEY = re.compile(r"^    (\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
 
 
 class Section(BaseModel):
-    """An immutable part of a problem; unknown keys are refused with the nearest known one."""
+    """Refuses unknown keys, with the nearest known one; no value can be changed."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(
         frozen=True, extra="forbid", validate_by_name=False, validate_by_alias=True
@@ -25,11 +29,11 @@ class Section(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """The schema, in which every key has the meaning that the docstring tells."""
+        """Adds to the schema the meaning of every key by the docstring."""
         made = handler(core_schema)
         whole = handler.resolve_ref_schema(made)
-        whole["description"] = lead(cls)
-        told = meanings(cls)
+        whole["description"] = _lead(cls)
+        told = _meanings(cls)
         for name, field in cls.model_fields.items():
             if (key := field.alias or name) in whole["properties"] and name in told:
                 whole["properties"][key]["description"] = told[name]
@@ -50,7 +54,7 @@ class Section(BaseModel):
 
 
 def exactly_one(section: Section, *names: str) -> None:
-    """Refuse a section that gives none or several of the alternatives `names`.
+    """Refuses a section that gives none or several of the alternatives `names`.
 
     Raises:
         PydanticCustomError: naming the alternatives.
@@ -59,3 +63,22 @@ def exactly_one(section: Section, *names: str) -> None:
     if len(given) != 1:
         what = "nothing given" if not given else f"{' and '.join(given)} exclude each other"
         raise fault(what, f"give exactly one of: {', '.join(names)}")
+
+
+def _lead(section: type) -> str:
+    """Takes the text before the attributes from a docstring, a line for each paragraph."""
+    told = _ATTRIBUTES.split(inspect.cleandoc(section.__doc__ or ""))[0]
+    return "\n\n".join(map(_on_one_line, told.split("\n\n")))
+
+
+def _meanings(section: type) -> dict[str, str]:
+    """Takes the meaning of each attribute from the docstrings, those of the bases first."""
+    found: dict[str, str] = {}
+    for base in reversed(section.__mro__):
+        listed = _ATTRIBUTES.split(inspect.cleandoc(base.__doc__ or ""))[1:]
+        found |= {key: _on_one_line(told) for part in listed for key, told in _KEY.findall(part)}
+    return found
+
+
+def _on_one_line(text: str) -> str:
+    return " ".join(text.split())

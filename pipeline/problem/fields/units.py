@@ -1,4 +1,4 @@
-"""Quantities in words ("15 mm", "6.18 kg/m^2") to floats in the working units mm, N, s, tonne, rad.
+"""Converts quantities ("15 mm", "6.18 kg/m^2") to floats in the units mm, N, s, tonne, rad.
 
 The registry is our own and small: it loads in a millisecond, and it counts the angle as a dimension
 so that degrees cannot be given where a length is wanted, nor a bare number where an angle is.
@@ -11,6 +11,8 @@ import re
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
+
+from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -45,7 +47,7 @@ _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:{_UNIT}|(?P<rest>\S.*?))?\s*")
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """A kind of quantity: its name, the working unit, units of equal right, and an example."""
+    """Describes a kind of quantity: its name, working unit, units of equal right, an example."""
 
     name: str
     unit: str
@@ -68,15 +70,6 @@ ROTARY_DAMPING = Dimension(
 )
 
 
-class QuantityError(ValueError):
-    """A quantity that cannot be read; `remedy` says how to write it."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.what = what
-        self.remedy = remedy
-
-
 @lru_cache(maxsize=1)
 def _registry() -> UnitRegistry:
     from pint import UnitRegistry
@@ -84,44 +77,44 @@ def _registry() -> UnitRegistry:
     return UnitRegistry(_DEFINITIONS.strip().splitlines())
 
 
-def take_apart(text: str) -> tuple[float, str] | None:
-    """Number and unit ("" if there is none) of a quantity; None if the text is none."""
+def split_quantity(text: str) -> tuple[float, str] | None:
+    """Splits a quantity into number and unit ("" for none); None if the text is none."""
     match = _QUANTITY.fullmatch(text[:_LONGEST])
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
-def parse(text: object, dimension: Dimension) -> float:
-    """The quantity `text` as a float in the working unit of `dimension`.
+def parse_quantity(text: object, dimension: Dimension) -> float:
+    """Converts the quantity `text` to a float in the working unit of `dimension`.
 
     Raises:
-        QuantityError: no unit, an unknown one, one of another dimension, or no finite number.
+        UserError: no unit, an unknown one, one of another dimension, or no finite number.
     """
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
-        raise QuantityError("not a quantity", wanted)
+        raise UserError("not a quantity", remedy=wanted)
     match = _QUANTITY.fullmatch(str(text)[:_LONGEST])
     if match is None:
-        raise QuantityError("not a number with a unit", wanted)
+        raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
-        raise QuantityError(f"unknown unit {match['rest']!r}", wanted)
+        raise UserError(f"unknown unit {match['rest']!r}", remedy=wanted)
     if match["unit"] is None:
-        raise QuantityError("the unit is missing", wanted)
+        raise UserError("the unit is missing", remedy=wanted)
     value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
     if not math.isfinite(value):
-        raise QuantityError("not a finite number", wanted)
+        raise UserError("not a finite number", remedy=wanted)
     return value
 
 
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
-    """Working units of `dimension` in one `unit`."""
+    """Converts one `unit` to working units of `dimension`."""
     from pint.errors import UndefinedUnitError
 
     registry = _registry()
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit))
     except UndefinedUnitError as error:
-        raise QuantityError(f"unknown unit {unit!r}", wanted) from error
+        raise UserError(f"unknown unit {unit!r}", remedy=wanted) from error
     for accepted in (dimension.unit, *dimension.also):
         if given.is_compatible_with(accepted):
             return float(given.to(accepted).magnitude)
-    raise QuantityError(f"the unit {unit!r} is not that of {dimension.name}", wanted)
+    raise UserError(f"the unit {unit!r} is not that of {dimension.name}", remedy=wanted)

@@ -1,12 +1,11 @@
-from . import formula as formula
-from .images import ImageError as ImageError
 from .images import read_outlines as read_outlines
-from .network_files import NetworkError as NetworkError
 from .network_files import read_network as read_network
+from .plane import FormulaError as FormulaError
 from .plane import Outline as Outline
 from .plane import Point as Point
 from .plane import box_middle as box_middle
+from .plane import compile_formula as compile_formula
 from .plane import extents as extents
-from .plane import inside as inside
-from .plane import placed as placed
-from .plane import turned as turned
+from .plane import find_inside as find_inside
+from .plane import place_outline as place_outline
+from .plane import turn_outline as turn_outline

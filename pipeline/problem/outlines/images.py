@@ -1,4 +1,4 @@
-"""The outline of what is dark in a binary image, or of the paths in an SVG drawing."""
+"""Reads outlines of the dark part of a binary image, or of the paths in an SVG drawing."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.problem.outlines.plane import Outline
-from pipeline.runtime import read_bounded
+from pipeline.runtime import UserError, read_bounded
 
 if TYPE_CHECKING:
     from svgelements import Path as SvgPath
@@ -28,31 +28,22 @@ LARGEST_DRAWING = 1_000_000
 SEGMENTS = 24  # chords of a curved piece of a path
 
 
-class ImageError(ValueError):
-    """An image that no outline can be read from; `remedy` says what to do."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.what = what
-        self.remedy = remedy
-
-
 def read_outlines(path: Path) -> tuple[Outline, ...]:
-    """Closed outlines of the shape in an image, y up, in pixels or in the drawing's own unit.
+    """Reads closed outlines of an image's shape, y up, in pixels or the drawing's own unit.
 
     A point within an odd number of them lies in the shape.
 
     Raises:
-        ImageError: no such file, unreadable, not binary, or without a shape.
+        UserError: no such file, unreadable, not binary, or without a shape.
     """
     try:
         held = read_bounded(path, LARGEST_FILE)
     except OSError as error:
         what = f"the image cannot be read: {error.strerror}"
-        raise ImageError(what, "give its path as seen from the problem file") from error
+        raise UserError(what, remedy="give its path as seen from the problem file") from error
     outlines = _of_drawing(path) if path.suffix.lower() == ".svg" else _of_pixels(held)
     if not outlines:
-        raise ImageError("the image shows no shape", "draw the void dark on a light ground")
+        raise UserError("the image shows no shape", remedy="draw the void dark on a light ground")
     return tuple(
         tuple((round(float(x), 6), round(-float(y), 6)) for x, y in points) for points in outlines
     )
@@ -75,10 +66,10 @@ def _of_pixels(held: bytes) -> list[NDArray[Any]]:
 
 
 def _grey(held: bytes) -> NDArray[np.uint8]:
-    """Grey levels of a binary image, what is transparent being white.
+    """Computes grey levels of a binary image; transparent pixels are white.
 
     Raises:
-        ImageError: unreadable, too large or not binary.
+        UserError: unreadable, too large or not binary.
     """
     import cv2
 
@@ -90,10 +81,12 @@ def _grey(held: bytes) -> NDArray[np.uint8]:
     except cv2.error:  # empty, or too many pixels, among others
         pixels = None
     if pixels is None or pixels.dtype != np.uint8:
-        raise ImageError("not a readable image", "give a PNG or JPG of 8 bits, or an SVG")
+        raise UserError("not a readable image", remedy="give a PNG or JPG of 8 bits, or an SVG")
     if max(pixels.shape[:2]) > LARGEST_SIDE:
         size = f"{pixels.shape[1]} x {pixels.shape[0]}"
-        raise ImageError(f"{size} pixels are too many", f"keep it within {LARGEST_SIDE} a side")
+        raise UserError(
+            f"{size} pixels are too many", remedy=f"keep it within {LARGEST_SIDE} a side"
+        )
     colours = pixels.reshape(*pixels.shape[:2], -1).astype(float)
     grey = colours[..., :3].mean(axis=2)
     if colours.shape[2] in (2, 4):
@@ -102,7 +95,7 @@ def _grey(held: bytes) -> NDArray[np.uint8]:
     between = float(np.mean((grey >= DARK) & (grey <= LIGHT)))
     if between > LARGEST_BLUR:
         what = f"the image is not binary: {between:.0%} of its pixels are neither dark nor light"
-        raise ImageError(what, "save it as black on white, without shades")
+        raise UserError(what, remedy="save it as black on white, without shades")
     return np.round(grey).astype(np.uint8)
 
 
@@ -114,7 +107,7 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
         _check_copies(ElementTree.parse(path).getroot())
         drawing = SVG.parse(str(path), reify=True)
     except (OSError, ValueError, SyntaxError) as error:  # an XML parse error is a SyntaxError
-        raise ImageError(f"not a readable SVG: {error}", "save it as plain SVG") from error
+        raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     shapes = (Curve(element) for element in drawing.elements() if isinstance(element, Shape))
     pieces = (_chords(Curve(piece)) for shape in shapes for piece in shape.as_subpaths())
     return [points for points in pieces if len(points) > 2]

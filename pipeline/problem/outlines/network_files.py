@@ -1,14 +1,13 @@
-"""Polygons and ligaments from a file: a list in CSV, a netCDF dataset, or a drawing in DXF."""
+"""Reads polygons and ligaments: a list in CSV, a netCDF dataset, or a drawing in DXF."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from pipeline.runtime import read_bounded
+from pipeline.problem.fields import csv_columns
+from pipeline.runtime import UserError
 
 if TYPE_CHECKING:
     from ezdxf.entities.lwpolyline import LWPolyline
@@ -17,78 +16,66 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 
-_LARGEST = 64 << 20  # bytes of a list
-
 COLUMNS = ("kind", "number", "x (mm)", "y (mm)")
 """Header of a CSV; its kinds are `unit` (one row a corner) and `ligament` (one row an end)."""
 
 
-class NetworkError(ValueError):
-    """A file that no lattice can be read from; `remedy` says what to do."""
-
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.what = what
-        self.remedy = remedy
-
-
-class Content(NamedTuple):
-    """Corners of the units and end points of the ligaments, mm."""
+class NetworkContent(NamedTuple):
+    """Holds corners of the units and end points of the ligaments, mm."""
 
     polygons: tuple[tuple[Point, ...], ...]
     ligaments: tuple[tuple[Point, Point], ...]
 
 
-def read_network(path: Path) -> Content:
-    """The units and ligaments in a file, told by its suffix.
+def read_network(path: Path) -> NetworkContent:
+    """Reads the units and ligaments in a file, told by its suffix.
 
     Raises:
-        NetworkError: no such file, unreadable, or without units or ligaments.
+        UserError: no such file, unreadable, or without units or ligaments.
     """
     readers = {".csv": _of_csv, ".nc": _of_netcdf, ".dxf": _of_dxf}
     reader = readers.get(path.suffix.lower())
     if reader is None:
-        raise NetworkError("not a kind of file that lattices are read from", "give csv, nc or dxf")
+        raise UserError(
+            "not a kind of file that lattices are read from", remedy="give csv, nc or dxf"
+        )
     if not path.is_file():
-        raise NetworkError("no such file", "give its path as seen from the problem file")
+        raise UserError("no such file", remedy="give its path as seen from the problem file")
     found = reader(path)
     if not found.polygons or not found.ligaments:
         missing = "ligaments" if found.polygons else "units"
-        raise NetworkError(f"the file has no {missing}", "list units and what joins them")
+        raise UserError(f"the file has no {missing}", remedy="list units and what joins them")
     return found
 
 
-def _of_csv(path: Path) -> Content:
-    units: dict[int, list[Point]] = {}
-    ligaments: dict[int, list[Point]] = {}
+def _of_csv(path: Path) -> NetworkContent:
+    units: dict[float, list[Point]] = {}
+    ligaments: dict[float, list[Point]] = {}
     groups = {"unit": units, "ligament": ligaments}
     remedy = f"write the header {','.join(COLUMNS)} and a row for every corner and every end"
-    try:
-        rows = list(
-            csv.reader(io.StringIO(read_bounded(path, _LARGEST).decode("utf-8"), newline=""))
-        )
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise NetworkError(f"the list cannot be read: {error}", remedy) from error
-    if not rows or tuple(name.strip() for name in rows[0]) != COLUMNS:
-        raise NetworkError("the columns of the list are wrong", remedy)
-    for number, row in enumerate(rows[1:], start=2):
-        try:
-            kind, name, x, y = row
-            groups[kind.strip()].setdefault(int(name), []).append((float(x), float(y)))
-        except (ValueError, KeyError) as error:
-            what = f"row {number} of the list is no corner and no end"
-            raise NetworkError(what, remedy) from error
+    cells = csv_columns.read_cells(path)
+    if not cells.rows or tuple(cells.rows[0]) != COLUMNS:
+        raise UserError("the columns of the list are wrong", remedy=remedy)
+    for line, row in enumerate(cells.rows[1:], start=2):
+        number, x, y = (cells.number(row, column) for column in (1, 2, 3))
+        group = groups.get(row[0]) if len(row) == len(COLUMNS) else None
+        if group is None or number is None or x is None or y is None:
+            what = f"row {line} of the list is no corner and no end"
+            raise UserError(what, remedy=remedy)
+        group.setdefault(number, []).append((x, y))
     for ligament, ends in ligaments.items():
         if len(ends) != 2:
-            raise NetworkError(f"ligament {ligament} has {len(ends)} ends", "give it two rows")
-    return Content(
+            raise UserError(
+                f"ligament {ligament:g} has {len(ends)} ends", remedy="give it two rows"
+            )
+    return NetworkContent(
         tuple(tuple(corners) for _, corners in sorted(units.items())),
         tuple((first, second) for _, (first, second) in sorted(ligaments.items())),
     )
 
 
-def _of_netcdf(path: Path) -> Content:
-    """The design of a study, or any dataset with its `vertices` and `ligament_*` variables."""
+def _of_netcdf(path: Path) -> NetworkContent:
+    """Reads a study's design, or any dataset with its `vertices` and `ligament_*` variables."""
     import numpy as np
     import xarray as xr
 
@@ -100,17 +87,17 @@ def _of_netcdf(path: Path) -> Content:
             corner = data["ligament_vertex"].transpose("ligament", "end").to_numpy()
             ends = vertices[unit, corner]
     except (OSError, ValueError, KeyError, IndexError) as error:
-        raise NetworkError(f"not a readable lattice: {error}", remedy) from error
+        raise UserError(f"not a readable lattice: {error}", remedy=remedy) from error
     polygons = (corners[~np.isnan(corners).any(axis=1)] for corners in vertices)
     present = ends[~np.isnan(ends).any(axis=(1, 2))]
-    return Content(
+    return NetworkContent(
         tuple(tuple(map(_point, corners.tolist())) for corners in polygons if len(corners)),
         tuple((_point(first), _point(second)) for first, second in present.tolist()),
     )
 
 
-def _of_dxf(path: Path) -> Content:
-    """Closed polylines as units and lines as ligaments, whatever their layers; lengths in mm."""
+def _of_dxf(path: Path) -> NetworkContent:
+    """Reads closed polylines as units, lines as ligaments, whatever their layers; to mm."""
     from ezdxf import recover
     from ezdxf.entities.lwpolyline import LWPolyline
     from ezdxf.entities.polyline import Polyline
@@ -121,9 +108,9 @@ def _of_dxf(path: Path) -> Content:
     try:
         drawing, audit = recover.readfile(path)
     except Exception as error:  # whatever a parser of another project meets in a damaged file
-        raise NetworkError(f"not a readable DXF: {error}", remedy) from error
+        raise UserError(f"not a readable DXF: {error}", remedy=remedy) from error
     if audit.has_errors:
-        raise NetworkError(f"the DXF is damaged: {audit.errors[0].message}", remedy)
+        raise UserError(f"the DXF is damaged: {audit.errors[0].message}", remedy=remedy)
     unit = InsertUnits(drawing.units)
     unitless = unit == InsertUnits.Unitless
     scale = 1.0 if unitless else conversion_factor(unit, InsertUnits.Millimeters)
@@ -137,11 +124,11 @@ def _of_dxf(path: Path) -> Content:
         (_scaled(line.dxf.start, scale), _scaled(line.dxf.end, scale))
         for line in space.query("LINE")
     )
-    return Content(polygons, ligaments)
+    return NetworkContent(polygons, ligaments)
 
 
 def _corners(line: LWPolyline | Polyline) -> list[tuple[float, float]]:
-    """Corners of a polyline, the first not repeated at its end."""
+    """Lists corners of a polyline, the first not repeated at its end."""
     from ezdxf.entities.lwpolyline import LWPolyline
 
     if isinstance(line, LWPolyline):

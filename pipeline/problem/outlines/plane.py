@@ -1,16 +1,34 @@
-"""Closed outlines in the plane: what lies within them; how they are scaled, turned and moved."""
+"""Scales, turns and moves closed outlines, finds what lies within, and computes formulas of them.
+
+A formula is one of a curve's parameter t, such as "16 * sin(t)^3".
+"""
 
 from __future__ import annotations
 
+import ast
 import math
-from collections.abc import Sequence
+import operator
+from collections.abc import Callable, Sequence
 
 Point = tuple[float, float]
 Outline = tuple[Point, ...]
 
+_BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: math.pow,
+}
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    name: getattr(math, name) for name in ("sin", "cos", "tan", "exp", "sqrt", "tanh")
+} | {"abs": abs}
+_NAMES = {"pi": math.pi}
+_LONGEST = 500
 
-def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
-    """Which points lie within an odd number of closed outlines, or within `hair` of one."""
+
+def find_inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
+    """Finds points within an odd number of closed outlines, or within `hair` of one."""
     import numpy as np
 
     px, py = np.array(points, dtype=float).reshape(-1, 2).T[..., None]
@@ -29,20 +47,20 @@ def inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) 
     return found
 
 
-def placed(
+def place_outline(
     outline: Outline, size: tuple[float, float], origin: Point, centre: Point, orientation: float
 ) -> Outline:
-    """An outline whose box is scaled to `size`, with `origin` at `centre`, turned about it."""
+    """Scales an outline's box to `size`, moves `origin` to `centre`, and turns it about that."""
     scale_x, scale_y = (wanted / has for wanted, has in zip(size, extents(outline), strict=True))
     moved = tuple(
         (centre[0] + scale_x * (x - origin[0]), centre[1] + scale_y * (y - origin[1]))
         for x, y in outline
     )
-    return turned(moved, orientation, centre)
+    return turn_outline(moved, orientation, centre)
 
 
-def turned(outline: Outline, angle: float, centre: Point) -> Outline:
-    """An outline turned by `angle` (rad) about `centre`."""
+def turn_outline(outline: Outline, angle: float, centre: Point) -> Outline:
+    """Turns an outline by `angle` (rad) about `centre`."""
     cosine, sine = math.cos(angle), math.sin(angle)
     arms = ((x - centre[0], y - centre[1]) for x, y in outline)
     return tuple(
@@ -51,12 +69,59 @@ def turned(outline: Outline, angle: float, centre: Point) -> Outline:
 
 
 def extents(outline: Outline) -> tuple[float, float]:
-    """Width and height of an outline's box."""
+    """Computes width and height of an outline's box."""
     width, height = (max(axis) - min(axis) for axis in zip(*outline, strict=True))
     return width, height
 
 
 def box_middle(outline: Outline) -> Point:
-    """The middle of an outline's box."""
+    """Computes the middle of an outline's box."""
     (x1, x2), (y1, y2) = ((min(axis), max(axis)) for axis in zip(*outline, strict=True))
     return (x1 + x2) / 2, (y1 + y2) / 2
+
+
+class FormulaError(ValueError):
+    """Reports a text that is no formula of t."""
+
+
+def compile_formula(text: str) -> Callable[[float], float]:
+    """Compiles a formula of a curve's parameter t: arithmetic and a few functions.
+
+    Raises:
+        FormulaError: not a formula, or an unknown name in it. The function raises it too, where it
+            has no finite value.
+    """
+    try:
+        tree = ast.parse(text[:_LONGEST].replace("^", "**").strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise FormulaError("not a formula") from error
+
+    def value(t: float) -> float:
+        try:
+            found = _value(tree, {**_NAMES, "t": t})
+        except (ArithmeticError, ValueError) as error:
+            if isinstance(error, FormulaError):
+                raise
+            raise FormulaError(f"no value at t = {t:g}") from error
+        if not math.isfinite(found):
+            raise FormulaError(f"no finite value at t = {t:g}")
+        return found
+
+    value(0.5)
+    return value
+
+
+def _value(node: ast.expr, names: dict[str, float]) -> float:
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
+        case ast.Name(id=name) if name in names:
+            return names[name]
+        case ast.UnaryOp(op=ast.USub(), operand=inner):
+            return -_value(inner, names)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            return _BINARY[type(op)](_value(left, names), _value(right, names))
+        case ast.Call(func=ast.Name(id=name), args=[inner], keywords=[]) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](_value(inner, names))
+    known = ", ".join(["t", *_NAMES, *_FUNCTIONS])
+    raise FormulaError(f"{ast.unparse(node)!r} is not understood (known: {known}, + - * / ^)")

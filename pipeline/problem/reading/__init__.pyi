@@ -1,10 +1,10 @@
 from . import joint_figure as joint_figure
 from . import yaml_file as yaml_file
-from .feasibility import findings as findings
-from .joint_figure import Joint as Joint
+from .feasibility import find_faults as find_faults
+from .joint_figure import JointFigure as JointFigure
+from .loading import explain_error as explain_error
+from .loading import first_fault as first_fault
 from .loading import load as load
-from .loading import overlaid as overlaid
+from .loading import load_section as load_section
+from .loading import overlay_keys as overlay_keys
 from .loading import preset_names as preset_names
-from .loading import reason as reason
-from .loading import section as section
-from .loading import told as told

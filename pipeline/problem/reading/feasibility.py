@@ -1,4 +1,4 @@
-"""What one key alone cannot tell: geometry, regions, supports, loads, a feasible start."""
+"""Checks sections against one another: geometry, regions, supports, loads, the start."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from pipeline.problem.sections import (
     Quads,
     Region,
     Selector,
-    at,
     loose_units,
+    resolve_centre,
     selected_units,
 )
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A fault in a problem: what, at which key, and what to do."""
+class ProblemFault:
+    """Reports a fault in a problem, its key, and its remedy."""
 
     what: str
     keys: KeyPath
     remedy: str
 
 
-Findings = Iterator[Finding]
+Findings = Iterator[ProblemFault]
 
 
-def findings(problem: Problem) -> Findings:
-    """The faults of a problem, in the order in which they should be mended."""
+def find_faults(problem: Problem) -> Findings:
+    """Finds the faults of a problem, in the order in which they should be mended."""
     for check in _CHECKS:
         yield from check(problem)
 
@@ -45,10 +45,10 @@ def _lattice(problem: Problem) -> Findings:
     if lattice.ligament_length >= lattice.spacing:
         what = f"ligaments of {lattice.ligament_length:g} mm leave no room for units"
         remedy = f"keep it below the spacing, {lattice.spacing:g} mm"
-        yield Finding(what, ("lattice", "ligament_length"), remedy)
+        yield ProblemFault(what, ("lattice", "ligament_length"), remedy)
     if isinstance(lattice, Quads) and abs(lattice.bias_angle) >= math.pi / 4:
         what = f"a bias of {math.degrees(lattice.bias_angle):g} deg closes the voids"
-        yield Finding(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
+        yield ProblemFault(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
 
 
 def _contact(problem: Problem) -> Findings:
@@ -58,10 +58,10 @@ def _contact(problem: Problem) -> Findings:
     )
     if barrier >= cutoff:
         what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
-        yield Finding(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
+        yield ProblemFault(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
     elif isinstance(problem.lattice, Quads) and cutoff >= (void := _smallest_void(problem.lattice)):
         what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
-        yield Finding(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
+        yield ProblemFault(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
 
 
 def _contact_distance(problem: Problem) -> Findings:
@@ -69,7 +69,9 @@ def _contact_distance(problem: Problem) -> Findings:
     room = problem.lattice.ligament_length if gap is None else gap
     if distance is not None and distance > room:
         what = f"units {room:g} mm apart at rest are within the contact distance, {distance:g} mm"
-        yield Finding(what, ("contact", "distance"), f"keep it to {room:g} mm, or leave it out")
+        yield ProblemFault(
+            what, ("contact", "distance"), f"keep it to {room:g} mm, or leave it out"
+        )
 
 
 def _smallest_void(lattice: Quads) -> float:
@@ -87,7 +89,7 @@ def _units_exist(problem: Problem) -> Findings:
         try:
             selected_units(selector, problem.lattice)
         except IndexError as error:
-            yield Finding(str(error), keys, problem.lattice.extent)
+            yield ProblemFault(str(error), keys, problem.lattice.extent)
 
 
 def _drive_is_free(problem: Problem) -> Findings:
@@ -95,23 +97,23 @@ def _drive_is_free(problem: Problem) -> Findings:
     for support in problem.supports:
         if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
             what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
-            yield Finding(what, ("drive", "units"), "drive or clamp it, not both")
+            yield ProblemFault(what, ("drive", "units"), "drive or clamp it, not both")
 
 
 def _horizon(problem: Problem) -> Findings:
     if problem.horizon.periods is not None and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no period"
-        yield Finding(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
+        yield ProblemFault(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
     if problem.horizon.steps is not None and not isinstance(problem.drive, LinearRampDrive):
         what = f"a {problem.drive.kind} drive does not load in equal steps"
-        yield Finding(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
+        yield ProblemFault(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
 
 def _robust(problem: Problem) -> Findings:
     robust = problem.objective.robust
     if robust is not None and robust.loads and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no frequency to vary"
-        yield Finding(what, ("objective", "robust", "loads"), "leave them out")
+        yield ProblemFault(what, ("objective", "robust", "loads"), "leave them out")
 
 
 def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
@@ -119,7 +121,7 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     if region.bounds is None:
         return
     centre, inner, outer = region.bounds
-    x, y = at(centre, lattice.centre_site)
+    x, y = resolve_centre(centre, lattice.centre_site)
     margin = 0.5 * lattice.spacing
     _, across, up = zip(*lattice.sites(), strict=True)
     room = margin + min(x - min(across), y - min(up), max(across) - x, max(up) - y)
@@ -128,14 +130,14 @@ def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
     if room < 0:
         what = f"the centre of the {' '.join(map(str, keys))} lies outside the lattice"
         extent = f"{max(across):g} by {max(up):g} mm"
-        yield Finding(what, (*keys, shape, "centre"), f"the outermost sites span {extent}")
+        yield ProblemFault(what, (*keys, shape, "centre"), f"the outermost sites span {extent}")
     elif outer > room:
         what = f"{keys[0]} of radius {outer:g} mm reaches beyond the lattice"
         remedy = f"keep it within {room:g} mm of its centre ({x:g}, {y:g}) mm"
-        yield Finding(what, (*keys, shape, key), remedy)
+        yield ProblemFault(what, (*keys, shape, key), remedy)
     elif inner >= outer:
         what = f"the ring's inner radius ({inner:g} mm) is not below the outer ({outer:g} mm)"
-        yield Finding(what, (*keys, shape, "inner"), f"keep it below {outer:g} mm")
+        yield ProblemFault(what, (*keys, shape, "inner"), f"keep it below {outer:g} mm")
 
 
 def _regions(problem: Problem) -> Findings:
@@ -153,7 +155,7 @@ def _cloak(problem: Problem) -> Findings:
     yield from _region_fits(problem, problem.cloak, ("cloak",))
     if not cloak_units(problem):
         what = "no unit lies in the cloak (driven units and the region of interest are left out)"
-        yield Finding(what, ("cloak",), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("cloak",), "enlarge it, or move its centre")
 
 
 def _interest(problem: Problem) -> Findings:
@@ -163,9 +165,9 @@ def _interest(problem: Problem) -> Findings:
         return
     what = "no unit lies in the region of interest"
     if problem.objective.region == "surroundings":
-        yield Finding(what, ("cloak",), "leave units outside it")
+        yield ProblemFault(what, ("cloak",), "leave units outside it")
     else:
-        yield Finding(what, ("objective", "region"), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("objective", "region"), "enlarge it, or move its centre")
 
 
 def _void(problem: Problem) -> Findings:
@@ -173,7 +175,7 @@ def _void(problem: Problem) -> Findings:
         return
     removed = void_units(problem)
     if not removed:
-        yield Finding("no unit lies in the void", ("void",), "enlarge it, or move its centre")
+        yield ProblemFault("no unit lies in the void", ("void",), "enlarge it, or move its centre")
     yield from _void_and_supports(problem, set(removed))
     yield from _void_and_rest(problem, set(removed))
 
@@ -184,10 +186,10 @@ def _inclusion(problem: Problem) -> Findings:
     stiff = set(inclusion_units(problem))
     if not stiff:
         what = "no unit lies in the inclusion"
-        yield Finding(what, ("inclusion", "region"), "enlarge it, or move its centre")
+        yield ProblemFault(what, ("inclusion", "region"), "enlarge it, or move its centre")
     if both := sorted(stiff & set(void_units(problem))):
         what = f"unit {problem.lattice.name(both[0])} is in the void and in the inclusion"
-        yield Finding(what, ("inclusion", "region"), "keep the two apart")
+        yield ProblemFault(what, ("inclusion", "region"), "keep the two apart")
 
 
 def _target(problem: Problem) -> Findings:
@@ -195,11 +197,11 @@ def _target(problem: Problem) -> Findings:
         return
     if problem.objective.kind == "strain_energy":
         what = "an energy is compared with that at rest"
-        yield Finding(what, ("objective", "target"), "give `rest`, or kind: displacement")
+        yield ProblemFault(what, ("objective", "target"), "give `rest`, or kind: displacement")
     if problem.void or problem.inclusion:
         return
     what = "nothing is altered, so there is nothing to mimic"
-    yield Finding(what, ("objective", "target"), "add `void:` or `inclusion:`, or give rest")
+    yield ProblemFault(what, ("objective", "target"), "add `void:` or `inclusion:`, or give rest")
 
 
 def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
@@ -208,7 +210,7 @@ def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
         if both := sorted(removed & set(selected_units(selector, lattice))):
             held = "driven" if keys[0] == "drive" else "clamped"
             what = f"the void touches the {held} units: it removes unit {lattice.name(both[0])}"
-            yield Finding(what, ("void",), f"make it smaller, or move it off the {held} units")
+            yield ProblemFault(what, ("void",), f"make it smaller, or move it off the {held} units")
 
 
 def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
@@ -218,7 +220,7 @@ def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
         unit = lattice.name(loose[0])
         what = f"the void splits the lattice{origin}: unit {unit} is cut off from the rest"
         remedy = "change its shape, or give `loose: remove` to take such units out as well"
-        yield Finding(what, ("void",), remedy)
+        yield ProblemFault(what, ("void",), remedy)
 
 
 def _start_is_feasible(problem: Problem) -> Findings:
@@ -236,7 +238,7 @@ def _start_is_feasible(problem: Problem) -> Findings:
             first = lattice.name(cloak_units(problem)[0])
             what = f"infeasible at the start: the undeformed units have {has:g} {unit}"
             what += f" (vertex 0 of unit {first} and all alike)"
-            yield Finding(what, ("constraints", name), f"ask for at most {has:.3g} {unit}")
+            yield ProblemFault(what, ("constraints", name), f"ask for at most {has:.3g} {unit}")
 
 
 def _degrees(angle: float | None) -> float | None:
@@ -249,16 +251,16 @@ def _symmetry(problem: Problem) -> Findings:
         return
     if problem.optimiser.symmetry == "C4" and lattice.columns != lattice.rows:
         what = f"a lattice of {lattice.columns} x {lattice.rows} has no fourfold symmetry"
-        yield Finding(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
+        yield ProblemFault(what, ("optimiser", "symmetry"), "use none, mirror_x or mirror_y")
 
 
 def _optimiser(problem: Problem) -> Findings:
     optimiser = problem.optimiser
     if not optimiser.methods.chosen:
-        yield Finding("no method chosen", ("optimiser", "methods"), "give sqp, mma or both")
+        yield ProblemFault("no method chosen", ("optimiser", "methods"), "give sqp, mma or both")
     if optimiser.trust_radius > optimiser.trust_radius_max:
         remedy = f"keep it at or below {optimiser.trust_radius_max:g} mm"
-        yield Finding("larger than its maximum", ("optimiser", "trust_radius"), remedy)
+        yield ProblemFault("larger than its maximum", ("optimiser", "trust_radius"), remedy)
 
 
 _CHECKS: tuple[Callable[[Problem], Findings], ...] = (

@@ -1,4 +1,4 @@
-"""Figures that show several studies side by side: `figure.yaml` in a folder of experiments."""
+"""Reads figures of several studies side by side: `figure.yaml` in a folder of experiments."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.runtime import UserError
 _Name = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
 
-class Joint(Section):
+class JointFigure(Section):
     """A figure of several studies.
 
     Attributes:
@@ -28,15 +28,15 @@ class Joint(Section):
     studies: Annotated[tuple[_Name, ...], Field(min_length=1)]
 
 
-def load(path: Path) -> Joint:
-    """The figure in a YAML file.
+def load_joint_figure(path: Path) -> JointFigure:
+    """Reads the figure in a YAML file.
 
     Raises:
         UserError: naming the file, the key and the remedy.
     """
-    document = yaml_file.read(path)
+    document = yaml_file.read_yaml(path)
     try:
-        joint = Joint.model_validate(document.data)
+        joint = JointFigure.model_validate(document.data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(map(str, first["loc"]))

@@ -1,4 +1,4 @@
-"""From a YAML file and the name of a preset to a checked problem, or one clear message."""
+"""Reads a YAML file and one of its presets to a checked problem, or one clear message."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from pipeline.problem import Problem
 from pipeline.problem.fields import FOLDER, Section
 from pipeline.problem.reading import yaml_file
-from pipeline.problem.reading.feasibility import findings
+from pipeline.problem.reading.feasibility import find_faults
 from pipeline.problem.reading.yaml_file import Document, KeyPath
 from pipeline.problem.sections import Sweep, TimeSeriesDrive, designs, sweep_cases
 from pipeline.runtime import UserError, read_bounded
@@ -25,7 +25,7 @@ Alone = TypeVar("Alone", bound=Section)
 
 
 def load(path: str | Path, preset: str | None = None) -> Problem:
-    """The problem in a YAML file, with one of its presets laid over it, or one of its designs.
+    """Reads the problem in a YAML file, with one of its presets laid over it, or a design.
 
     Args:
         path: the file.
@@ -34,31 +34,31 @@ def load(path: str | Path, preset: str | None = None) -> Problem:
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    document = yaml_file.read(Path(path))
+    document = yaml_file.read_yaml(Path(path))
     data = dict(document.data)
     presets = data.pop("presets", None) or {}
-    preset, number = designs.parted(preset)
+    preset, number = designs.split_name(preset)
     if preset is not None:
-        data = overlaid(data, _preset(document, presets, preset))
+        data = overlay_keys(data, _preset(document, presets, preset))
     if number is not None:
         data = _design(document, data, number)
     try:
         problem = Problem.model_validate(data, context={FOLDER: document.path.parent})
     except ValidationError as error:
-        raise told(error, document, data, preset) from error
+        raise explain_error(error, document, data, preset) from error
     if problem.sweep is not None:
         _check_sweep(problem.sweep, document, data, preset)
     if preset is None and problem.optimiser.start == "study":
         what, remedy = "a study cannot start from its own design", "say so in a preset of it"
         raise _user_error(document, preset, data, ("optimiser", "start"), what, remedy)
-    for finding in findings(problem):
+    for finding in find_faults(problem):
         raise _user_error(document, preset, data, finding.keys, finding.what, finding.remedy)
     return _with_recording(problem, document)
 
 
 def _design(document: Document, data: Mapping[str, Any], number: int) -> dict[str, Any]:
     try:
-        return designs.chosen(data, number)
+        return designs.select_design(data, number)
     except LookupError as error:
         count = designs.design_count(data)
         remedy = f"give one from 1 to {count}" if count else "name a preset, or none"
@@ -69,39 +69,39 @@ def _check_sweep(
     sweep: Sweep, document: Document, data: Mapping[str, Any], preset: str | None
 ) -> None:
     """Tries the first value of every parameter that a sweep sets, one at a time."""
-    first = next(sweep_cases.settings(sweep))
+    first = next(sweep_cases.list_settings(sweep))
     for key, word in first.items():
         try:
             Problem.model_validate(
-                sweep_cases.laid(data, {key: word}), context={FOLDER: document.path.parent}
+                sweep_cases.apply_setting(data, {key: word}), context={FOLDER: document.path.parent}
             )
         except ValidationError as error:
-            what, remedy = reason(error)
+            what, remedy = first_fault(error)
             place = ("sweep", sweep.form, key)
             raise _user_error(document, preset, data, place, what, remedy) from error
 
 
-def overlaid(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
-    """`base` with `overlay` laid over it: mappings merge, all else replaces, null removes a key."""
+def overlay_keys(base: Mapping[str, Any], overlay: Mapping[str, Any]) -> dict[str, Any]:
+    """Lays `overlay` over `base`: mappings merge, all else replaces, null removes a key."""
     merged = dict(base)
     for key, value in overlay.items():
         below = merged.get(key)
         if value is None:
             merged.pop(key, None)
         elif isinstance(value, Mapping):
-            merged[key] = overlaid(below if isinstance(below, Mapping) else {}, value)
+            merged[key] = overlay_keys(below if isinstance(below, Mapping) else {}, value)
         else:
             merged[key] = value
     return merged
 
 
 def preset_names(path: str | Path) -> tuple[str, ...]:
-    """The names of the presets in a problem file.
+    """Reads the names of the presets in a problem file.
 
     Raises:
         UserError: the file cannot be read.
     """
-    presets = yaml_file.read(Path(path)).data.get("presets")
+    presets = yaml_file.read_yaml(Path(path)).data.get("presets")
     return tuple(presets) if isinstance(presets, dict) else ()
 
 
@@ -123,23 +123,23 @@ def _preset(document: Document, presets: object, name: str) -> dict[str, Any]:
     return presets[name]
 
 
-def section(path: Path, kind: type[Alone]) -> Alone:
-    """A section that is a YAML file of its own.
+def load_section(path: Path, kind: type[Alone]) -> Alone:
+    """Reads a section that is a YAML file of its own.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    document = yaml_file.read(path)
+    document = yaml_file.read_yaml(path)
     try:
         return kind.model_validate(document.data, context={FOLDER: document.path.parent})
     except ValidationError as error:
-        raise told(error, document, document.data, None) from error
+        raise explain_error(error, document, document.data, None) from error
 
 
-def told(
+def explain_error(
     error: ValidationError, document: Document, data: dict[str, Any], preset: str | None
 ) -> UserError:
-    """The first of the errors of validation, in words; `data` is the document with its preset."""
+    """Explains the first error of validation; `data` is the document with its preset."""
     first, *others = error.errors(include_url=False)
     keys = _real_keys(first["loc"], data, missing=first["type"] == "missing")
     what, remedy, key = _in_words(first)
@@ -150,8 +150,8 @@ def told(
     return _user_error(document, preset, data, keys, what, remedy)
 
 
-def reason(error: ValidationError) -> tuple[str, str]:
-    """What is wrong first, and the remedy."""
+def first_fault(error: ValidationError) -> tuple[str, str]:
+    """Explains the first error of validation: fault and remedy."""
     what, remedy, _ = _in_words(error.errors(include_url=False)[0])
     return what, remedy
 
@@ -180,7 +180,7 @@ _WORDS = {
 
 
 def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
-    """What is wrong, the remedy, and a key below the error's place if there is one."""
+    """Translates an error: the fault, the remedy, and a key below its place if there is one."""
     context = error.get("ctx", {})
     if error["type"] == "problem":
         return context["what"], context["remedy"], context["key"]
@@ -189,7 +189,7 @@ def _in_words(error: ErrorDetails) -> tuple[str, str, str | None]:
 
 
 def _real_keys(location: KeyPath, data: object, *, missing: bool) -> KeyPath:
-    """The location without the tags of unions, which are no keys of the file."""
+    """Removes the tags of unions, which are no keys of the file, from a location."""
     keys: list[str | int] = []
     tag: object = None
     for part in location:
@@ -231,7 +231,7 @@ def _dotted(keys: KeyPath) -> str:
 
 
 def _value(data: object, keys: KeyPath) -> object:
-    """The value at `keys` if it is a plain one: a whole section would not help the reader."""
+    """Reads the value at `keys` if it is plain: a whole section would not help the reader."""
     for key in keys:
         if isinstance(data, Mapping):
             data = data.get(key)
@@ -241,7 +241,7 @@ def _value(data: object, keys: KeyPath) -> object:
 
 
 def _with_recording(problem: Problem, document: Document) -> Problem:
-    """The problem with the content hash of the measured motion that it refers to, if any."""
+    """Adds the content hash of the measured motion that a problem refers to, if any."""
     drive = problem.drive
     if not isinstance(drive, TimeSeriesDrive):
         return problem

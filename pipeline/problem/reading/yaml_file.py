@@ -1,4 +1,4 @@
-"""Reading a YAML file safely: plain data only, bounded, with the line of every key."""
+"""Reads a YAML file safely: plain data only, bounded, with the line of every key."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Document:
-    """The mapping in a YAML file, with the line (from one) of each of its keys and items."""
+    """Holds the mapping in a YAML file, with the line (from one) of its keys and items."""
 
     path: Path
     data: dict[str, Any]
     lines: dict[KeyPath, int]
 
     def line(self, keys: KeyPath) -> int | None:
-        """The line of a key, or of the nearest key above it."""
+        """Finds the line of a key, or of the nearest key above it."""
         for length in range(len(keys), 0, -1):
             if (line := self.lines.get(keys[:length])) is not None:
                 return line
@@ -38,7 +38,7 @@ class Document:
 
 
 class _Loader(yaml.SafeLoader):
-    """The safe loader for plain data only: see `_refuse`; and every key is given once."""
+    """Loads plain data only, see `_refuse`, and every key once."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         _refuse(self.peek_event())  # type: ignore[no-untyped-call]
@@ -83,8 +83,8 @@ def _fault(what: str, node: yaml.Node) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=what, problem_mark=node.start_mark)
 
 
-def read(path: Path) -> Document:
-    """The mapping in a YAML file.
+def read_yaml(path: Path) -> Document:
+    """Reads the mapping in a YAML file.
 
     Raises:
         UserError: no such file, too large, not UTF-8, not YAML, a duplicate key, or not a mapping.
@@ -109,8 +109,8 @@ def read(path: Path) -> Document:
     return Document(path, data, dict(_lines(node, ())))
 
 
-def skimmed(path: Path) -> dict[str, Any]:
-    """The mapping in a YAML file, read fast; an empty one where `read` would tell what is wrong."""
+def skim_yaml(path: Path) -> dict[str, Any]:
+    """Reads the mapping in a YAML file fast; an empty one where `read` would refuse it."""
     try:
         text = _text(path)
         _check_events(text)

@@ -1,4 +1,4 @@
-"""What moves the driven units: one model per kind of drive, told apart by the key `kind`.
+"""Describes the motion of driven units: one model per kind, told apart by the key `kind`.
 
 Driven units have all three degrees of freedom prescribed: the displacement follows the drive along
 one direction per load case, the rotation is held (a time series prescribes all three).
@@ -35,7 +35,7 @@ class _Directed(Section):
 
     @property
     def case_weights(self) -> tuple[float, ...]:
-        """The weight of each load case in the loss; equal ones where none are given."""
+        """Computes the weight of each load case in the loss; equal ones where none are given."""
         return self.weights or (1.0 / len(self.directions),) * len(self.directions)
 
     @model_validator(mode="after")
@@ -129,7 +129,7 @@ class TimeSeriesDrive(Section):
 
     @property
     def case_weights(self) -> tuple[float, ...]:
-        """One load case."""
+        """Returns the weight of the one load case."""
         return (1.0,)
 
 

@@ -1,4 +1,4 @@
-"""How a study's specimens are made: the section `fabrication`, whose defaults are the paper's."""
+"""Defines the section `fabrication` of a problem, whose defaults are the paper's."""
 
 from __future__ import annotations
 

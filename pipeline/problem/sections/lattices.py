@@ -1,4 +1,4 @@
-"""The kinds of lattices: squares or triangles on a grid, and networks read from a file.
+"""Describes lattices: squares or triangles on a grid, and networks read from a file.
 
 A unit's site is the centroid of its starting polygon, which for squares is their lattice point.
 """
@@ -15,7 +15,8 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
-from pipeline.problem.outlines import NetworkError, read_network
+from pipeline.problem.outlines import read_network
+from pipeline.runtime import UserError
 from sim.structure import kagome, listed, quads
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class _Grid(Section):
         return self.across * self.rows
 
     def unit(self, i: int, j: int) -> int:
-        """The id of unit (i, j).
+        """Returns the id of unit (i, j).
 
         Raises:
             IndexError: it is not in the lattice.
@@ -62,17 +63,17 @@ class _Grid(Section):
         return i + self.across * j
 
     def name(self, unit: int) -> str:
-        """A unit by its lattice indices."""
+        """Names a unit by its lattice indices."""
         j, i = divmod(unit, self.across)
         return f"[{i}, {j}]"
 
     @property
     def extent(self) -> str:
-        """How far the indices run, in words."""
+        """Tells the range of the indices, in words."""
         return f"i runs to {self.across - 1} and j to {self.rows - 1}, from zero"
 
     def side(self, name: str) -> tuple[int, ...]:
-        """The units along a side or at the corners, ascending."""
+        """Lists the units along a side or at the corners, ascending."""
         deep = self.across // self.columns
         every, rows = range(self.across), range(self.rows)
         ends, caps = sorted({*every[:deep], *every[-deep:]}), sorted({rows[0], rows[-1]})
@@ -104,17 +105,17 @@ class Quads(_Grid):
 
     @property
     def centre_site(self) -> Point:
-        """The site of the centre unit, or the middle of the lattice where there is none, in mm."""
+        """Returns the site of the centre unit in mm, or the middle of the lattice without one."""
         return self.spacing * (self.columns - 1) / 2, self.spacing * (self.rows - 1) / 2
 
     def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
+        """Lists every unit's id with the x and y of its site in mm, in the order of the ids."""
         for j in range(self.rows):
             for i in range(self.columns):
                 yield self.unit(i, j), i * self.spacing, j * self.spacing
 
     def bonds(self) -> Iterator[tuple[int, int]]:
-        """The units that each ligament joins."""
+        """Lists the units that each ligament joins."""
         for unit in range(self.n_units):
             if (unit + 1) % self.columns:
                 yield unit, unit + 1
@@ -122,11 +123,32 @@ class Quads(_Grid):
                 yield unit, unit + self.columns
 
     def network(self) -> Network:
-        """The lattice for sim/."""
+        """Builds the lattice for sim/."""
         return quads(self.columns, self.rows, self.spacing, self.ligament_length, self.bias_angle)
 
 
-class Kagome(_Grid):
+class _WithNetwork(Section):
+    """Takes sites and bonds from the network for sim/."""
+
+    def network(self) -> Network:
+        """Builds the lattice for sim/."""
+        raise NotImplementedError
+
+    def sites(self) -> Iterator[tuple[int, float, float]]:
+        """Lists every unit's id with the x and y of its site in mm, in the order of the ids."""
+        return iter([(unit, x, y) for unit, (x, y) in enumerate(_network(self).site.tolist())])
+
+    def bonds(self) -> Iterator[tuple[int, int]]:
+        """Lists the units that each ligament joins."""
+        return iter([(one, other) for one, other in _network(self).ligament_units.tolist()])
+
+
+@lru_cache(maxsize=8)
+def _network(lattice: _WithNetwork) -> Network:
+    return lattice.network()
+
+
+class Kagome(_WithNetwork, _Grid):
     """Two triangles in every cell, (2 i, j) and (2 i + 1, j), joined at three corners.
 
     Attributes:
@@ -146,32 +168,19 @@ class Kagome(_Grid):
 
     @property
     def centre_site(self) -> Point:
-        """The middle of the cells, in mm."""
+        """Returns the middle of the cells, in mm."""
         up = self.rows * self.spacing / 2
         along = self.columns * self.spacing / 2
         return along + up * math.cos(self.cell_angle), up * math.sin(self.cell_angle)
 
-    def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
-        return _sites(self)
-
-    def bonds(self) -> Iterator[tuple[int, int]]:
-        """The units that each ligament joins."""
-        return _bonds(self)
-
     def network(self) -> Network:
-        """The lattice for sim/."""
+        """Builds the lattice for sim/."""
         return kagome(
-            self.columns,
-            self.rows,
-            self.spacing,
-            self.ligament_length,
-            self.bias,
-            self.cell_angle,
+            self.columns, self.rows, self.spacing, self.ligament_length, self.bias, self.cell_angle
         )
 
 
-class ListedNetwork(Section):
+class ListedNetwork(_WithNetwork):
     """Polygons and ligaments from a file: CSV, netCDF, or closed polylines and lines of a DXF.
 
     Units are numbered in the order of the file and listed as [number, 0].
@@ -202,8 +211,8 @@ class ListedNetwork(Section):
             polygons, ligaments = read_network(Path(folder) / self.file)
             made = self.model_copy(update={"polygons": polygons, "ligaments": ligaments})
             made.network()
-        except NetworkError as error:
-            raise fault(error.what, error.remedy, "file") from error
+        except UserError as error:
+            raise fault(error.what, str(error.remedy), "file") from error
         except ValueError as error:
             remedy = "end every ligament at a corner of a unit"
             raise fault(str(error), remedy, "file") from error
@@ -216,7 +225,7 @@ class ListedNetwork(Section):
 
     @property
     def rows(self) -> int:
-        """One: the units are listed one after the other."""
+        """Returns one: the units are listed one after the other."""
         return 1
 
     @property
@@ -232,11 +241,11 @@ class ListedNetwork(Section):
 
     @property
     def extent(self) -> str:
-        """How far the indices run, in words."""
+        """Tells the range of the indices, in words."""
         return f"i runs to {self.n_units - 1} and j is 0"
 
     def unit(self, i: int, j: int) -> int:
-        """The id of unit (i, 0).
+        """Returns the id of unit (i, 0).
 
         Raises:
             IndexError: it is not in the lattice.
@@ -246,11 +255,11 @@ class ListedNetwork(Section):
         return i
 
     def name(self, unit: int) -> str:
-        """A unit by its number."""
+        """Names a unit by its number."""
         return f"[{unit}, 0]"
 
     def side(self, name: str) -> tuple[int, ...]:
-        """The units within half a spacing of a side's outermost site, or both ways at corners."""
+        """Lists units within half a spacing of a side's outermost site, or both ways at corners."""
         every = list(self.sites())
         x, y = [x for _, x, _ in every], [y for _, _, y in every]
         near = self.spacing / 2
@@ -265,38 +274,17 @@ class ListedNetwork(Section):
 
     @property
     def centre_site(self) -> Point:
-        """The middle of the box around the sites, in mm."""
+        """Returns the middle of the box around the sites, in mm."""
         _, x, y = zip(*self.sites(), strict=True)
         return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
 
-    def sites(self) -> Iterator[tuple[int, float, float]]:
-        """Every unit's id with the x and y of its site in mm, in the order of the ids."""
-        return _sites(self)
-
-    def bonds(self) -> Iterator[tuple[int, int]]:
-        """The units that each ligament joins."""
-        return _bonds(self)
-
     def network(self) -> Network:
-        """The lattice for sim/.
+        """Builds the lattice for sim/.
 
         Raises:
             ValueError: a polygon without area, or a ligament that does not join two units.
         """
         return listed(self.polygons or (), self.ligaments or (), self.spacing)
-
-
-@lru_cache(maxsize=8)
-def _network(lattice: Kagome | ListedNetwork) -> Network:
-    return lattice.network()
-
-
-def _sites(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, float, float]]:
-    return iter([(unit, x, y) for unit, (x, y) in enumerate(_network(lattice).site.tolist())])
-
-
-def _bonds(lattice: Kagome | ListedNetwork) -> Iterator[tuple[int, int]]:
-    return iter([(one, other) for one, other in _network(lattice).ligament_units.tolist()])
 
 
 def _kind(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Constants of a specimen: its units, its ligaments, its damping, the contact of its units."""
+"""Describes a specimen's constants: units, ligaments, damping, contact."""
 
 from __future__ import annotations
 
@@ -61,7 +61,11 @@ class MaterialConstants(Section):
     damping: DampingLaw
 
     def damping_coefficients(self, spacing: float) -> tuple[float, float]:
-        """Returns the translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit."""
+        """Computes translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.
+
+        The ratio is that of a single-ligament oscillator with the mass and inertia of a square
+        that is not rotated, whatever the design (the authors' formula).
+        """
         law = self.damping
         if law.ratio is None:
             assert law.translation is not None

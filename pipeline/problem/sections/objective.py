@@ -1,4 +1,4 @@
-"""What a design is to do, and what else it is to hold against."""
+"""Describes the target of a design, and the loads and copies that it holds against."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Load(Section):
 
 
 class Robust(Section):
-    """What a design is to hold against besides the drive.
+    """Loads and imperfections that a design is to hold against besides the drive.
 
     Attributes:
         loads: that are simulated besides, along all of the drive's directions.
@@ -45,7 +45,7 @@ class Robust(Section):
 
 
 class Objective(Section):
-    """What the surroundings or a region should do.
+    """Target of the surroundings or of a region.
 
     Attributes:
         kind: what is compared: displacements and rotations, or the strain energy.

@@ -1,4 +1,4 @@
-"""How a design is looked for."""
+"""Describes the search for a design."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ class Methods(Section):
 
     @property
     def chosen(self) -> dict[str, Method]:
-        """The methods asked for, by name."""
+        """Returns the methods asked for, by name."""
         pairs = {"sqp": self.sqp, "mma": self.mma}
         return {name: method for name, method in pairs.items() if method is not None}
 
 
 class Optimiser(Section):
-    """How to look for the design; lengths are shifts of vertices.
+    """Search for the design; lengths are shifts of vertices.
 
     Attributes:
         methods: one or both.

@@ -1,4 +1,4 @@
-"""The section `prediction` of a problem: how far specimens and constants may be off."""
+"""Describes tolerances of specimens and constants: the section `prediction`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.problem.fields import Angle, Gap, Ratio, Samples, Section
 
 
 class Assembly(Section):
-    """How far units are off their place once they are joined, at rest and without force.
+    """Deviation of units from their place once they are joined, at rest and without force.
 
     Attributes:
         shift: standard deviation along x and along y.
@@ -23,7 +23,7 @@ class Assembly(Section):
 
 
 class Tolerances(Section):
-    """By how much a specimen differs from its design, and the constants from the true ones.
+    """Deviations of a specimen from its design, and of the constants from the true ones.
 
     Attributes:
         geometry: largest shift of a vertex along x and y, either way and evenly spread, as a share
@@ -74,6 +74,6 @@ class Prediction(Section):
 
     @property
     def given(self) -> dict[str, Any]:
-        """The sizes that are given, by name."""
+        """Returns the sizes that are given, by name."""
         sizes = {name: getattr(self, name) for name in Tolerances.model_fields}
         return {name: size for name, size in sizes.items() if size is not None}

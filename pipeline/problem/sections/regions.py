@@ -1,4 +1,4 @@
-"""Regions of the specimen, and what lies in them.
+"""Describes regions of the specimen.
 
 A region is a set of points of the specimen frame (mm); a unit belongs to it if its site does.
 """
@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from pipeline.problem.fields import Length, Section, exactly_one
-from pipeline.problem.outlines import Outline, Point, inside
+from pipeline.problem.outlines import Outline, Point, find_inside
 from pipeline.problem.sections.shapes import (
     Centre,
     Curve,
@@ -20,7 +20,7 @@ from pipeline.problem.sections.shapes import (
     Image,
     PolygonShape,
     RingShape,
-    at,
+    resolve_centre,
 )
 
 HAIR = 1e-9  # relative; keeps points that lie on a rim on its inner side
@@ -65,30 +65,30 @@ class Region(Section):
         return None
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """Closed outlines, mm; a point within an odd number of them lies in the region.
+        """Draws closed outlines, mm; a point within an odd number of them lies in the region.
 
         Args:
             middle: of the lattice, for shapes that are centred there.
         """
         if self.bounds is not None:
             centre, _, radius = self.bounds
-            x, y = at(centre, middle)
+            x, y = resolve_centre(centre, middle)
             steps = (2 * math.pi * k / ROUND for k in range(ROUND))
             return (tuple((x + radius * math.cos(a), y + radius * math.sin(a)) for a in steps),)
         shape = self.polygon or self.curve or self.image
         return () if shape is None else shape.outlines(middle)
 
     def holds(self, points: Sequence[Point], middle: Point, hair: float) -> list[bool]:
-        """Which points (mm) lie in the region, or within `hair` of its outer rim."""
+        """Tells which points (mm) lie in the region, or within `hair` of its outer rim."""
         if self.bounds is not None:
             named, inner, outer = self.bounds
-            centre = at(named, middle)
+            centre = resolve_centre(named, middle)
             return [inner + hair < math.dist(point, centre) <= outer + hair for point in points]
-        return inside(points, self.outlines(middle), hair)
+        return find_inside(points, self.outlines(middle), hair)
 
 
 class VoidRegion(Region):
-    """What is cut out.
+    """Region that is cut out.
 
     Attributes:
         loose: what to do where units are cut off from the rest: refuse, or remove them as well.
@@ -108,7 +108,7 @@ class Around(Section):
 
 
 class CloakRegion(Region):
-    """Where units may be redesigned: a region, or all around something.
+    """Units that may be redesigned: those of a region, or all around something.
 
     Attributes:
         around: all near the void, the inclusion, or the region of interest.

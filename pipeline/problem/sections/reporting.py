@@ -1,4 +1,4 @@
-"""Sections of a problem that no design depends on: how robust it is, and what the report tells."""
+"""Describes sections that no design depends on: robustness and report."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Robustness(Section):
 
 
 class Paper(Section):
-    """What a publication tells of this study, to stand beside the numbers computed here.
+    """Values of a publication on this study, to stand beside the numbers computed here.
 
     Attributes:
         figure: its figure.

@@ -1,4 +1,4 @@
-"""Which units a selector or a region means, by arithmetic on the lattice sites."""
+"""Selects units by name, list or region, by arithmetic on the lattice sites."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag
 
 from pipeline.problem.fields import Section
-from pipeline.problem.outlines import inside
+from pipeline.problem.outlines import find_inside
 from pipeline.problem.sections.lattices import Lattice, Quads
 from pipeline.problem.sections.regions import HAIR, Region
 
@@ -39,7 +39,7 @@ Selector = Annotated[
 
 @lru_cache(maxsize=64)
 def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
-    """The ids of the units whose site lies in the region, ascending."""
+    """Lists the ids of the units whose site lies in the region, ascending."""
     units, points = zip(*((unit, (x, y)) for unit, x, y in lattice.sites()), strict=True)
     held = region.holds(points, lattice.centre_site, HAIR * lattice.spacing)
     return tuple(unit for unit, within in zip(units, held, strict=True) if within)
@@ -47,16 +47,16 @@ def units_within(region: Region, lattice: Lattice) -> tuple[int, ...]:
 
 @lru_cache(maxsize=64)
 def units_near(region: Region, distance: float, lattice: Lattice) -> tuple[int, ...]:
-    """The ids of the units in the region or within `distance` (mm) of its outline, ascending."""
+    """Lists the ids of units in the region or within `distance` (mm) of its outline, ascending."""
     units, points = zip(*((unit, (x, y)) for unit, x, y in lattice.sites()), strict=True)
     reach = distance + HAIR * lattice.spacing
-    held = inside(points, region.outlines(lattice.centre_site), reach)
+    held = find_inside(points, region.outlines(lattice.centre_site), reach)
     return tuple(unit for unit, near in zip(units, held, strict=True) if near)
 
 
 @lru_cache(maxsize=16)
 def loose_units(lattice: Lattice, removed: frozenset[int]) -> tuple[int, ...]:
-    """The ids of the units that are cut off from the largest part, ascending."""
+    """Lists the ids of the units that are cut off from the largest part, ascending."""
     neighbours: dict[int, list[int]] = {
         unit: [] for unit, _, _ in lattice.sites() if unit not in removed
     }
@@ -73,7 +73,7 @@ def loose_units(lattice: Lattice, removed: frozenset[int]) -> tuple[int, ...]:
 
 
 def _joined_to(start: int, neighbours: dict[int, list[int]]) -> set[int]:
-    """The units that ligaments join to `start`, at any distance."""
+    """Finds the units that ligaments join to `start`, at any distance."""
     found, waiting = {start}, [start]
     while waiting:
         new = set(neighbours[waiting.pop()]) - found
@@ -83,7 +83,7 @@ def _joined_to(start: int, neighbours: dict[int, list[int]]) -> set[int]:
 
 
 def selected_units(selector: Selector, lattice: Lattice) -> tuple[int, ...]:
-    """The ids that a selector means, ascending; listed units must lie in the lattice.
+    """Lists the ids that a selector means, ascending; listed units must lie in the lattice.
 
     Raises:
         IndexError: a listed unit is not in the lattice, or there is no one centre unit.

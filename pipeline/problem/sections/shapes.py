@@ -1,4 +1,4 @@
-"""Shapes that a problem file may name: discs, rings, polygons, curves and images."""
+"""Describes shapes of a problem file: discs, rings, polygons, curves and images."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from pipeline.problem.fields import (
     fault,
 )
 from pipeline.problem.outlines import (
-    ImageError,
+    FormulaError,
     Outline,
     Point,
     box_middle,
+    compile_formula,
     extents,
-    formula,
-    placed,
+    place_outline,
     read_outlines,
-    turned,
+    turn_outline,
 )
+from pipeline.runtime import UserError
 
 
 def _centre_tag(value: object) -> str:
@@ -45,8 +46,8 @@ Centre = Annotated[
 ]
 
 
-def at(centre: Centre, middle: Point) -> Point:
-    """A centre by its coordinates, mm."""
+def resolve_centre(centre: Centre, middle: Point) -> Point:
+    """Returns a centre by its coordinates, mm."""
     return middle if isinstance(centre, str) else centre
 
 
@@ -88,10 +89,10 @@ class PolygonShape(Section):
     orientation: Angle = 0.0
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The polygon in the specimen frame, mm."""
+        """Draws the polygon in the specimen frame, mm."""
         del middle
         centre = box_middle(self.vertices)
-        return (turned(self.vertices, self.orientation, centre),)
+        return (turn_outline(self.vertices, self.orientation, centre),)
 
 
 class Heart(Section):
@@ -112,10 +113,14 @@ class Heart(Section):
     points: Annotated[int, Field(ge=8, le=1000, strict=True)] = 50
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The curve in the specimen frame, mm."""
+        """Draws the curve in the specimen frame, mm."""
         turns = [2 * math.pi * k / (self.points - 1) for k in range(self.points)]
         curve = tuple((16 * math.sin(t) ** 3, _heart_height(t)) for t in turns)
-        return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
+        return (
+            place_outline(
+                curve, self.size, (0.0, 0.0), resolve_centre(self.centre, middle), self.orientation
+            ),
+        )
 
 
 def _heart_height(t: float) -> float:
@@ -144,7 +149,7 @@ class Smile(Section):
     orientation: Angle = 0.0
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The crescent in the specimen frame, mm."""
+        """Draws the crescent in the specimen frame, mm."""
         step = 2 * math.pi / 40
         inner = [_on_circle(self.inner_radius, math.pi + k * step) for k in range(1, 20)]
         outer = [_on_circle(self.outer_radius, -k * step) for k in range(21)]
@@ -152,9 +157,9 @@ class Smile(Section):
             *((x, y + self.inner_rise) for x, y in inner),
             *((x, y + self.outer_rise) for x, y in outer),
         )
-        x0, y0 = at(self.centre, middle)
+        x0, y0 = resolve_centre(self.centre, middle)
         moved = tuple((x0 + x, y0 + y) for x, y in curve)
-        return (turned(moved, self.orientation, (x0, y0)),)
+        return (turn_outline(moved, self.orientation, (x0, y0)),)
 
 
 def _on_circle(radius: float, angle: float) -> Point:
@@ -187,27 +192,31 @@ class Formula(Section):
         for name in ("x", "y"):
             try:
                 values = self._along(getattr(self, name))
-            except formula.FormulaError as error:
+            except FormulaError as error:
                 raise fault(str(error), 'write e.g. "16 * sin(t)^3"', name) from error
             if max(values) == min(values):
                 raise fault("the curve has no extent", "let the formula depend on t", name)
         return self
 
     def _along(self, text: str) -> list[float]:
-        function = formula.compiled(text)
+        function = compile_formula(text)
         return [function(2 * math.pi * k / self.points) for k in range(self.points)]
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The curve in the specimen frame, mm."""
+        """Draws the curve in the specimen frame, mm."""
         curve = tuple(zip(self._along(self.x), self._along(self.y), strict=True))
-        return (placed(curve, self.size, (0.0, 0.0), at(self.centre, middle), self.orientation),)
+        return (
+            place_outline(
+                curve, self.size, (0.0, 0.0), resolve_centre(self.centre, middle), self.orientation
+            ),
+        )
 
 
 Curve = Annotated[Heart | Smile | Formula, Field(discriminator="kind")]
 
 
 class Image(Section):
-    """What is dark in a binary image (PNG, JPG) or filled in an SVG, upright as one sees it.
+    """Dark part of a binary image (PNG, JPG) or fill of an SVG, upright as one sees it.
 
     The outline is read from the file when the problem is.
 
@@ -237,18 +246,18 @@ class Image(Section):
         folder = (info.context or {}).get(FOLDER, ".")
         try:
             outlines = read_outlines(Path(folder) / self.file)
-        except ImageError as error:
-            raise fault(error.what, error.remedy, "file") from error
+        except UserError as error:
+            raise fault(error.what, str(error.remedy), "file") from error
         return self.model_copy(update={"read": outlines})
 
     def outlines(self, middle: Point) -> tuple[Outline, ...]:
-        """The shape's outlines in the specimen frame, mm."""
+        """Draws the shape's outlines in the specimen frame, mm."""
         assert self.read is not None
         whole = tuple(point for outline in self.read for point in outline)
         width, height = extents(whole)
         size = self.size or (self.width or width, height * (self.width or width) / width)
-        origin, centre = box_middle(whole), at(self.centre, middle)
-        scaled = placed(whole, size, origin, centre, self.orientation)
+        origin, centre = box_middle(whole), resolve_centre(self.centre, middle)
+        scaled = place_outline(whole, size, origin, centre, self.orientation)
         ends = accumulate(len(outline) for outline in self.read)
         return tuple(
             scaled[end - len(outline) : end] for outline, end in zip(self.read, ends, strict=True)

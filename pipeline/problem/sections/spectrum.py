@@ -1,4 +1,4 @@
-"""The section `spectrum` of a problem: what is asked about small vibrations of its structures."""
+"""Describes the analysis of small vibrations: the section `spectrum`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The section `sweep:`: which parameters of a problem take which values, and in what combinations.
+"""Describes values of parameters and their combinations: the section `sweep:`.
 
 A parameter is named by its keys, joined by dots: `drive.frequency`, `material.bending_stiffness`.
 Its values are written as they would be at that key, with their unit.
@@ -24,30 +24,30 @@ from pydantic import (
 
 from pipeline.problem.fields import Count, Section, exactly_one, fault, units
 
-Word = StrictStr | StrictBool | StrictInt | StrictFloat
+SettingValue = StrictStr | StrictBool | StrictInt | StrictFloat
 """A value as a problem file has it."""
 
 
-def in_words(number: float, unit: str) -> Word:
-    """A number and its unit ("" for none) as a problem file has them, every digit kept."""
+def write_quantity(number: float, unit: str) -> SettingValue:
+    """Writes a number and its unit ("" for none) as a problem file has them, exactly."""
     return f"{number!r} {unit}" if unit else number
 
 
-def taken_apart(word: Word) -> tuple[float, str] | None:
-    """Number and unit ("" for none) of a value; None if it is no number."""
-    return None if isinstance(word, bool) else units.take_apart(str(word))
+def split_value(word: SettingValue) -> tuple[float, str] | None:
+    """Splits a value into number and unit ("" for none); None if it is no number."""
+    return None if isinstance(word, bool) else units.split_quantity(str(word))
 
 
-def _in_one_unit(words: tuple[Word, ...]) -> tuple[Word, ...]:
-    found = [taken_apart(word) for word in words]
+def _in_one_unit(words: tuple[SettingValue, ...]) -> tuple[SettingValue, ...]:
+    found = [split_value(word) for word in words]
     if len({parts and parts[1] for parts in found}) > 1:
         raise fault("the values are given in several units", "give all of them in the same unit")
     return words
 
 
-def _numbers(first: Word, second: Word) -> tuple[float, float, str]:
-    """Two quantities in the unit that both are given in."""
-    one, two = taken_apart(first), taken_apart(second)
+def _numbers(first: SettingValue, second: SettingValue) -> tuple[float, float, str]:
+    """Splits two quantities in the unit that both are given in."""
+    one, two = split_value(first), split_value(second)
     if one is None or two is None:
         raise fault("numbers are wanted here", 'give numbers with their unit, e.g. "2 Hz"')
     _in_one_unit((first, second))
@@ -63,8 +63,8 @@ class Range(Section):
         points: number of values, both ends included.
     """
 
-    start: Word = Field(alias="from")
-    stop: Word = Field(alias="to")
+    start: SettingValue = Field(alias="from")
+    stop: SettingValue = Field(alias="to")
     points: Count
 
     @model_validator(mode="after")
@@ -75,11 +75,11 @@ class Range(Section):
         return self
 
     @property
-    def words(self) -> tuple[Word, ...]:
-        """The values."""
+    def words(self) -> tuple[SettingValue, ...]:
+        """Returns the values."""
         first, last, unit = _numbers(self.start, self.stop)
         return tuple(
-            in_words(float(value), unit) for value in np.linspace(first, last, self.points)
+            write_quantity(float(value), unit) for value in np.linspace(first, last, self.points)
         )
 
 
@@ -91,8 +91,8 @@ class Between(Section):
         stop: the greatest value, in the same unit.
     """
 
-    start: Word = Field(alias="from")
-    stop: Word = Field(alias="to")
+    start: SettingValue = Field(alias="from")
+    stop: SettingValue = Field(alias="to")
 
     @model_validator(mode="after")
     def _ascends(self) -> Self:
@@ -101,10 +101,10 @@ class Between(Section):
             raise fault("no value lies between them", "end above `from`", "to")
         return self
 
-    def drawn(self, random: np.random.Generator) -> Word:
-        """One value."""
+    def drawn(self, random: np.random.Generator) -> SettingValue:
+        """Draws one value."""
         first, last, unit = _numbers(self.start, self.stop)
-        return in_words(float(random.uniform(first, last)), unit)
+        return write_quantity(float(random.uniform(first, last)), unit)
 
 
 class Normal(Section):
@@ -115,28 +115,28 @@ class Normal(Section):
         deviation: their standard deviation, in the same unit.
     """
 
-    mean: Word
-    deviation: Word
+    mean: SettingValue
+    deviation: SettingValue
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
         _numbers(self.mean, self.deviation)
         return self
 
-    def drawn(self, random: np.random.Generator) -> Word:
-        """One value."""
+    def drawn(self, random: np.random.Generator) -> SettingValue:
+        """Draws one value."""
         mean, deviation, unit = _numbers(self.mean, self.deviation)
-        return in_words(float(random.normal(mean, abs(deviation))), unit)
+        return write_quantity(float(random.normal(mean, abs(deviation))), unit)
 
 
 def _form(value: object) -> str:
-    """Which of the forms of a parameter's values is meant."""
+    """Tells the form of a parameter's values."""
     if not isinstance(value, Mapping | Section):
         return "values"
     return "normal" if {"mean", "deviation"} & set(dict(value)) else "between"
 
 
-Values = Annotated[tuple[Word, ...], Field(min_length=1), AfterValidator(_in_one_unit)]
+Values = Annotated[tuple[SettingValue, ...], Field(min_length=1), AfterValidator(_in_one_unit)]
 Axis = Annotated[
     Annotated[Range, Tag("between")] | Annotated[Values, Tag("values")],
     Discriminator(lambda value: _form(value).replace("normal", "between")),
@@ -179,18 +179,18 @@ class Sweep(Section):
 
     @property
     def form(self) -> str:
-        """The key below which the parameters are."""
+        """Returns the key below which the parameters are."""
         return next(name for name in ("grid", "list", "random") if getattr(self, name) is not None)
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """The names of the parameters."""
+        """Returns the names of the parameters."""
         named: Mapping[str, object] = getattr(self, self.form)
         return tuple(named)
 
     @property
-    def values(self) -> dict[str, tuple[Word, ...]]:
-        """The values that each parameter takes on a grid or in a list."""
+    def values(self) -> dict[str, tuple[SettingValue, ...]]:
+        """Returns the values that each parameter takes on a grid or in a list."""
         named = self.grid or self.list or {}
         return {
             key: value.words if isinstance(value, Range) else value for key, value in named.items()

@@ -1,4 +1,4 @@
-"""The cases of a sweep, and what each sets."""
+"""Lists the cases of a sweep with their settings."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.problem.sections.sweep import Sweep, Word, taken_apart
+from pipeline.problem.sections.sweep import SettingValue, Sweep, split_value
 
-Setting = Mapping[str, Word | list[Word]]
+Setting = Mapping[str, SettingValue | list[SettingValue]]
 """Values by the dotted keys that they are set at."""
 
 DIRECTIONS = "drive.directions"
 
 
 def case_count(sweep: Sweep) -> int:
-    """Number of cases."""
+    """Counts the cases."""
     if sweep.samples is not None:
         return sweep.samples
     sizes = [len(values) for values in sweep.values.values()]
     return math.prod(sizes) if sweep.grid is not None else sizes[0]
 
 
-def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
-    """What each case sets, one after the other."""
+def list_settings(sweep: Sweep) -> Iterator[dict[str, SettingValue]]:
+    """Lists the settings of the cases, one after the other."""
     if sweep.random is not None:
         yield from (_drawn(sweep, number) for number in range(case_count(sweep)))
     elif sweep.list is not None:
@@ -39,8 +39,8 @@ def settings(sweep: Sweep) -> Iterator[dict[str, Word]]:
             yield dict(zip(sweep.keys, reversed(values), strict=True))
 
 
-def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
-    """A random case: the same whatever other cases there are."""
+def _drawn(sweep: Sweep, number: int) -> dict[str, SettingValue]:
+    """Draws a random case: the same whatever other cases there are."""
     assert sweep.random is not None
     random = np.random.default_rng((sweep.seed, number))
     return {key: spread.drawn(random) for key, spread in sweep.random.items()}
@@ -48,16 +48,16 @@ def _drawn(sweep: Sweep, number: int) -> dict[str, Word]:
 
 @dataclass(frozen=True)
 class DirectionGroup:
-    """Cases one after the other that differ by the direction of their drive alone.
+    """Groups cases one after the other that differ by the direction of their drive alone.
 
     They are load cases of one scene: what is a copy of another, turned, is not simulated.
     """
 
     numbers: range
-    settings: tuple[dict[str, Word], ...]
+    settings: tuple[dict[str, SettingValue], ...]
 
     @property
-    def cases(self) -> list[tuple[int, dict[str, Word]]]:
+    def cases(self) -> list[tuple[int, dict[str, SettingValue]]]:
         """Number and setting of each."""
         return list(zip(self.numbers, self.settings, strict=True))
 
@@ -71,35 +71,35 @@ class DirectionGroup:
 
 
 def group_size(sweep: Sweep) -> int:
-    """Cases in each group: directions are grouped where a grid names them first."""
+    """Counts cases in each group: directions are grouped where a grid names them first."""
     grouped = sweep.grid is not None and sweep.keys[0] == DIRECTIONS
     return len(sweep.values[DIRECTIONS]) if grouped else 1
 
 
 def group_count(sweep: Sweep) -> int:
-    """Number of groups of cases."""
+    """Counts the groups of cases."""
     return case_count(sweep) // group_size(sweep)
 
 
-def part(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
-    """The groups of one of several parts of a sweep, none of which is empty or much larger."""
+def select_groups(sweep: Sweep, number: int, parts: int) -> list[DirectionGroup]:
+    """Selects the groups of one of several parts of a sweep, none empty or much larger."""
     size, total = group_size(sweep), group_count(sweep)
     first, last = (size * (total * (number + edge) // parts) for edge in (0, 1))
-    cases = islice(settings(sweep), first, last)
+    cases = islice(list_settings(sweep), first, last)
     return [
         DirectionGroup(range(start, start + size), tuple(islice(cases, size)))
         for start in range(first, last, size)
     ]
 
 
-def unit_of(sweep: Sweep, key: str) -> str:
-    """The unit in which a parameter's values are given; "1" for plain numbers and for words."""
-    first = taken_apart(next(islice(settings(sweep), 1))[key])
+def parameter_unit(sweep: Sweep, key: str) -> str:
+    """Finds the unit of a parameter's values; "1" for plain numbers and for words."""
+    first = split_value(next(islice(list_settings(sweep), 1))[key])
     return (first and first[1]) or "1"
 
 
-def laid(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
-    """The content of a problem file with a setting laid over it.
+def apply_setting(data: Mapping[str, Any], setting: Setting) -> dict[str, Any]:
+    """Lays a setting over the content of a problem file.
 
     A single value at a key that holds a list is a list of one; new directions weigh equally.
     """

@@ -18,13 +18,13 @@ from pipeline.problem.fields import (
     Section,
 )
 from pipeline.problem.sections.fabrication import Markers
-from pipeline.problem.sections.virtual_specimen import Making, Weighing
+from pipeline.problem.sections.virtual_specimen import SpecimenFaults, VirtualLoadCell
 
 Shade = Annotated[float, Field(ge=0.0, le=1.0)]
 Size = Annotated[int, Field(ge=64, le=8192, strict=True)]
 
 
-class Viewing(Section):
+class CameraView(Section):
     """The camera.
 
     Attributes:
@@ -148,17 +148,17 @@ class VirtualRecording(Section):
         seed: of noise and speckle.
     """
 
-    specimen: Making | None = None
+    specimen: SpecimenFaults | None = None
 
     rate: Frequency = 100.0
     still: Delay = 0.1
     start: Delay = 0.0
     end: Duration | None = None
     duration: Duration | None = None
-    camera: Viewing = Viewing()
+    camera: CameraView = CameraView()
     look: UnitAppearance = UnitAppearance()
     light: Lighting = Lighting()
     sensor: Sensor = Sensor()
     codec: Codec = Codec()
-    load_cell: Weighing | None = None
+    load_cell: VirtualLoadCell | None = None
     seed: int = 0

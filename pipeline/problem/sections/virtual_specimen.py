@@ -10,7 +10,7 @@ from pipeline.problem.fields import Angle, Coordinate, Delay, Force, Frequency, 
 from pipeline.problem.sections.prediction import Tolerances
 
 
-class Shaking(Section):
+class DriveFaults(Section):
     """In what the drive differs from the one that was asked for.
 
     Attributes:
@@ -31,7 +31,7 @@ class Shaking(Section):
     delay: Delay = 0.0
 
 
-class Making(Tolerances):
+class SpecimenFaults(Tolerances):
     """A specimen that is drawn within tolerances, and driven as labs do.
 
     Attributes:
@@ -40,12 +40,12 @@ class Making(Tolerances):
         seed: of the draws.
     """
 
-    drive: Shaking = Shaking()
+    drive: DriveFaults = DriveFaults()
     unload: bool = False
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
-class Weighing(Section):
+class VirtualLoadCell(Section):
     """A load cell at the drive, which logs what pushes along the drive's direction.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""The units in a first frame: blobs, their ids by one-to-one matching, and the camera."""
+"""Detects a specimen in a frame: blobs, their ids by one-to-one matching, camera, markings."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import orientation
-from pipeline.tracking.geometry import Camera, SpecimenOutlines
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, rotation_matrix
 from pipeline.tracking.geometry import camera as cameras
 from sim.core import Floats, Image, Ints
 
@@ -27,11 +26,17 @@ _AREA = 3.0
 _BLOB_SIGMA = 0.2
 _DOT = 0.25
 """Width of a median that a mark on a face does not survive, pitches."""
+_TURNS = [np.array([[c, -s], [s, c]], float) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
+_FLAT = 0.5
+"""Sides of the box, of the lattice or of the blobs, may differ by so much between the two."""
+_BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
+_MARKED = 0.02  # of a face
+_DOTS = 4
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """The specimen as it was found.
+class LatticeDetection:
+    """Holds units of a specimen, matched with blobs of a frame.
 
     Attributes:
         camera: what sees the blobs where they are.
@@ -48,23 +53,23 @@ class Sighting:
     bright: bool
 
 
-def lies(camera: Camera) -> tuple[float, bool]:
-    """How far the specimen is turned in the image, counter-clockwise, and if seen from behind."""
+def specimen_orientation(camera: Camera) -> tuple[float, bool]:
+    """Returns the counter-clockwise turn in the image, rad, and whether it is seen from behind."""
     upward = camera.homography[:2, 1]
     turn = float(np.arctan2(-upward[0], -upward[1]))
     return turn, bool(np.linalg.det(camera.homography[:2, :2]) > 0)
 
 
-def placed(camera: Camera) -> str:
-    """The same in words: upright, turned, seen from behind."""
-    turn, behind = lies(camera)
+def orientation_text(camera: Camera) -> str:
+    """Describes the orientation: upright, turned, seen from behind."""
+    turn, behind = specimen_orientation(camera)
     degrees = round(float(np.rad2deg(turn)))
     words = f"turned by {degrees} deg" if abs(degrees) > _UPRIGHT else "upright"
     return f"{words} and mirrored, as from behind" if behind else words
 
 
-def told(found: Sighting, specimen: SpecimenOutlines) -> str:
-    """How many units were found, and where."""
+def detection_summary(found: LatticeDetection, specimen: SpecimenOutlines) -> str:
+    """Describes how many units were found, and where."""
     seen = f"{found.blobs} units found, {len(found.unit)} of {specimen.count} in their places"
     if not len(found.unit):
         return seen
@@ -72,7 +77,9 @@ def told(found: Sighting, specimen: SpecimenOutlines) -> str:
     return f"{seen}, from ({low[0]:.0f}, {low[1]:.0f}) to ({high[0]:.0f}, {high[1]:.0f}) px"
 
 
-def sight(image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None) -> list[Sighting]:
+def detect_lattice(
+    image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None
+) -> list[LatticeDetection]:
     """Finds the specimen, of either polarity, whichever way it is turned, mirrored or not.
 
     Args:
@@ -84,58 +91,52 @@ def sight(image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None) -
         All ways of seeing it that match nearly as many units as the best: a lattice may look the
         same turned. Upright comes first, mirrored last. Their cameras are without distortion.
     """
-    scales = [px_per_mm] if px_per_mm else _likely_scales(image, specimen)
-    found = _best(image, specimen, scales)
-    if _most(found) < _NEARLY * specimen.count:
-        plain = [(scale, _unmarked(image, specimen.pitch * scale)) for scale in scales]
-        found = max(found, *(_best(shown, specimen, [scale]) for scale, shown in plain), key=_most)
-    return [one for one in found if len(one.unit) >= _NEARLY * _most(found)]
+    extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
+    most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
+    shares = (0.95, 0.8, 0.67, 0.56)
+    scales = [px_per_mm] if px_per_mm else [float(most * share) for share in shares]
+    pairs = [(scale, bright) for scale in scales for bright in (True, False)]
+    found = max((_detections(image, specimen, *pair) for pair in pairs), key=_matches)
+    if _matches(found) < _NEARLY * specimen.count:
+        plain = {scale: _unmarked(image, specimen.pitch * scale) for scale in scales}
+        tried = [_detections(plain[pair[0]], specimen, *pair) for pair in pairs]
+        found = max(found, *tried, key=_matches)
+    return [one for one in found if len(one.unit) >= _NEARLY * _matches(found)]
 
 
-def _best(image: Picture, specimen: SpecimenOutlines, scales: list[float]) -> list[Sighting]:
-    """The ways to see it at the scale, and of the polarity, that match the most units."""
-    ways = [_ways(image, specimen, scale, bright) for scale in scales for bright in (True, False)]
-    return max(ways, key=_most)
+def _matches(ways: list[LatticeDetection]) -> int:
+    return max(len(one.unit) for one in ways)
 
 
 def _unmarked(image: Picture, pitch: float) -> Image:
-    """The image without dots and speckle, which may stand out more than the faces themselves."""
+    """Removes dots and speckle, which may stand out more than the faces themselves."""
     width = int(_DOT * pitch) | 1
     return np.asarray(cv2.medianBlur(np.clip(image, 0, 255).astype(np.uint8), width), np.uint8)
 
 
-def _ways(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> list[Sighting]:
-    centroids = blobs(image, specimen, scale, bright)
+def _detections(
+    image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
+) -> list[LatticeDetection]:
+    centroids = find_blobs(image, specimen, scale, bright)
     size = (image.shape[1], image.shape[0])
     camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
-    nothing = Sighting(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
+    nothing = LatticeDetection(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
     found = [
         _matched(specimen, centroids, matrix, scale, nothing)
-        for matrix in orientation.starts(specimen.centre, centroids)
+        for matrix in _initial_homographies(specimen.centre, centroids)
     ]
     return found or [nothing]
 
 
-def _most(ways: list[Sighting]) -> int:
-    return max(len(one.unit) for one in ways)
+def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> LatticeDetection:
+    """Refits the camera of a detection with distortion."""
+    seen = specimen.centre[detection.unit]
+    camera = cameras.fit_camera(seen, detection.blob, detection.camera.size, _BLOB_SIGMA)
+    return replace(detection, camera=camera)
 
 
-def refined(specimen: SpecimenOutlines, sighting: Sighting) -> Sighting:
-    """The same with distortion in its camera."""
-    first = sighting.camera
-    seen = specimen.centre[sighting.unit]
-    camera = cameras.fit(seen, sighting.blob, first.size, _BLOB_SIGMA)
-    return replace(sighting, camera=camera)
-
-
-def _likely_scales(image: Picture, specimen: SpecimenOutlines) -> list[float]:
-    extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
-    most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
-    return [float(most * share) for share in (0.95, 0.8, 0.67, 0.56)]
-
-
-def blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
-    """Centroids (n, 2) in px of patches of a unit's size."""
+def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
+    """Returns centroids (n, 2) in px of patches of a unit's size."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
@@ -151,33 +152,64 @@ def blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
     opened = cv2.morphologyEx(filled, cv2.MORPH_OPEN, kernel)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(opened, connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA] / scale**2
-    smallest, largest = 0.4 * specimen.area.min(), 1.8 * specimen.area.max()
-    good = (areas > smallest) & (areas < largest)
+    good = (areas > 0.4 * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
     return np.asarray(centroids[1:][good], np.float64)
 
 
 def _filled(mask: Image, largest: float) -> Image:
-    """The mask with its holes smaller than ``largest`` px filled: dots and speckle."""
+    """Fills holes of the mask smaller than ``largest`` px: dots and speckle."""
     _, labels, stats, _ = cv2.connectedComponentsWithStats(1 - mask, connectivity=4)
     small = stats[:, cv2.CC_STAT_AREA] < largest
     small[0] = False
     return np.where(small[labels], np.uint8(1), mask)
 
 
+def _initial_homographies(points: Floats, pixels: Floats) -> list[Floats]:
+    """Lays the points' box over that of the pixels, without perspective.
+
+    The upright one comes first, then turned, then mirrored; lists none if there are few pixels.
+    """
+    if len(pixels) < _LEAST:
+        return []
+    angle = np.deg2rad(cv2.minAreaRect(pixels.astype(np.float32))[2])
+    lean = rotation_matrix(angle - np.round(angle / (np.pi / 2)) * np.pi / 2)
+    aligned = pixels @ lean
+    low, high = aligned.min(axis=0), aligned.max(axis=0)
+    out = []
+    for side in (1.0, -1.0):
+        for quarter in _TURNS:
+            turn = quarter @ np.diag([side, -1.0])
+            turned = points @ turn.T
+            first = turned.min(axis=0)
+            gain = (high - low) / (turned.max(axis=0) - first)
+            if abs(np.log(gain[0] / gain[1])) < _FLAT:
+                matrix = np.eye(3)
+                matrix[:2, :2] = gain[:, None] * turn
+                matrix[:2, 2] = low - gain * first
+                matrix[:2] = lean @ matrix[:2]
+                out.append(matrix)
+    return out
+
+
 def _matched(
-    specimen: SpecimenOutlines, centroids: Floats, matrix: Floats, scale: float, nothing: Sighting
-) -> Sighting:
-    """One to one, from a first guess of the homography, by turns with a better one."""
+    specimen: SpecimenOutlines,
+    centroids: Floats,
+    matrix: Floats,
+    scale: float,
+    nothing: LatticeDetection,
+) -> LatticeDetection:
+    """Alternates one-to-one matching and a better homography, from a first guess of it."""
+    pitch = specimen.pitch * scale
     for turn in range(_ROUNDS):
-        gate = specimen.pitch * scale * (0.5 if turn else 0.8)
-        unit, place = one_to_one(_seen(matrix, specimen.centre), centroids, gate)
+        gate = pitch * (0.5 if turn else 0.8)
+        expected = cameras.apply_homography(matrix, specimen.centre)
+        unit, place = match_one_to_one(expected, centroids, gate)
         if len(unit) < _LEAST:
             return nothing
-        found = _affine if turn < _AFFINE_ROUNDS else cameras.homography
-        matrix = found(specimen.centre[unit], centroids[place])
-    unit, place = one_to_one(
-        _seen(matrix, specimen.centre), centroids, _GATE * specimen.pitch * scale
-    )
+        fit = _fit_affine if turn < _AFFINE_ROUNDS else cameras.fit_homography
+        matrix = fit(specimen.centre[unit], centroids[place])
+    expected = cameras.apply_homography(matrix, specimen.centre)
+    unit, place = match_one_to_one(expected, centroids, _GATE * pitch)
     camera = replace(nothing.camera, homography=matrix / matrix[2, 2])
     areas = np.abs(np.linalg.det(camera.jacobian(specimen.centre))) / scale**2
     if not (areas.min() > 1 / _AREA and areas.max() < _AREA):
@@ -185,20 +217,54 @@ def _matched(
     return replace(nothing, camera=camera, unit=unit, blob=centroids[place])
 
 
-def _affine(points: Floats, pixels: Floats) -> Floats:
+def _fit_affine(points: Floats, pixels: Floats) -> Floats:
     rows = np.column_stack([points, np.ones(len(points))])
     found = np.linalg.lstsq(rows, pixels, rcond=None)[0].T
     return np.vstack([found, [0, 0, 1.0]])
 
 
-def _seen(matrix: Floats, points: Floats) -> Floats:
-    mapped = points @ matrix[:2, :2].T + matrix[:2, 2]
-    return mapped / (points @ matrix[2, :2] + matrix[2, 2])[:, None]
-
-
-def one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
-    """The assignment of least total distance (capped at ``gate``), pairs beyond it left out."""
+def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
+    """Assigns with least total distance (capped at ``gate``), pairs beyond it left out."""
     distance = cdist(expected, found)
     rows, columns = linear_sum_assignment(np.minimum(distance, gate))
     near = distance[rows, columns] < gate
     return rows[near], columns[near]
+
+
+def classify_markings(
+    image: Picture, specimen: SpecimenOutlines, detection: LatticeDetection, px_per_mm: float
+) -> str:
+    """Classifies what most faces bear: dots, speckle, or nothing ("bare").
+
+    The number of patches on them tells that differ from their own shade.
+    """
+    contrast = float(np.subtract(*np.percentile(image, [95, 5])))
+    counts = [_marks(image, specimen, detection, unit, contrast) for unit in detection.unit]
+    usual = float(np.median(counts))
+    if usual < 1:
+        return "bare"
+    small = px_per_mm * specimen.pitch < 3 * _DOTS  # px: no dots can be told apart
+    return "speckle" if usual > _DOTS or small else "dots"
+
+
+def _marks(
+    image: Picture,
+    specimen: SpecimenOutlines,
+    detection: LatticeDetection,
+    unit: int,
+    contrast: float,
+) -> int:
+    """Counts patches on a face, its rim left out."""
+    shrunk = specimen.centre[unit] + 0.75 * specimen.polygon(unit)
+    polygon = np.round(detection.camera.project(shrunk)).astype(np.int32)
+    left, top, wide, high = cv2.boundingRect(polygon)
+    area = image[max(top, 0) : top + high, max(left, 0) : left + wide].astype(float)
+    if area.size == 0:
+        return 0
+    mask = np.zeros(area.shape, np.uint8)
+    cv2.fillPoly(mask, [polygon - [max(left, 0), max(top, 0)]], 1)
+    face = np.median(area[mask > 0]) if mask.any() else 0.0
+    differs = ((np.abs(area - face) > _BLANK * contrast) & (mask > 0)).astype(np.uint8)
+    if differs.sum() < _MARKED * mask.sum():
+        return 0
+    return int(cv2.connectedComponents(differs, connectivity=8)[0]) - 1

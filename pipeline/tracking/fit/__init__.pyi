@@ -1,8 +1,8 @@
-from .frame_fit import Fitter as Fitter
-from .patch_correlation import Fits as Fits
+from .frame_fit import PoseFitter as PoseFitter
+from .patch_correlation import PoseFits as PoseFits
 from .patch_correlation import Templates as Templates
-from .side_walls import Walls as Walls
-from .template import Learner as Learner
+from .side_walls import SideWalls as SideWalls
 from .template import TemplateGrid as TemplateGrid
-from .template import outlines as outlines
-from .template import plane_of as plane_of
+from .template import learn_templates as learn_templates
+from .template import outline_templates as outline_templates
+from .template import pixel_plane as pixel_plane

@@ -6,17 +6,17 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
-from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, room
-from pipeline.tracking.fit.patch_correlation import Fits, FitStart, Templates
-from pipeline.tracking.fit.template import plane_of
+from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, workspace
+from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
+from pipeline.tracking.fit.template import pixel_plane
 from pipeline.tracking.geometry import Camera
 from sim.core import Floats, Mask, Singles
 
 FULL_STEPS = 8
 
 
-class Fitter:
-    """A camera and what it should see.
+class PoseFitter:
+    """Fits poses of units to frames of a camera.
 
     Attributes:
         camera: the camera.
@@ -26,11 +26,11 @@ class Fitter:
 
     def __init__(self, camera: Camera, templates: Templates, plane: Singles | None = None) -> None:
         self.camera, self.templates = camera, templates
-        self.plane = plane_of(camera) if plane is None else plane
+        self.plane = pixel_plane(camera) if plane is None else plane
         self.full = np.zeros(len(templates.centre))
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
-        """Pose and photometry to start from: at rest, all with the same gain."""
+        """Returns pose and photometry to start from: at rest, all with the same gain."""
         units = len(self.templates.centre)
         return np.zeros((units, 3)), np.tile([gain, 0.0, 0.0, 0.0], (units, 1))
 
@@ -42,8 +42,8 @@ class Fitter:
         chosen: Mask | None = None,
         tight: Floats | None = None,
         noise: Floats | None = None,
-    ) -> Fits:
-        """Poses of the chosen units, NaN for the others and for those that cannot be fitted.
+    ) -> PoseFits:
+        """Fits the chosen units; NaN for the others and for those that cannot be fitted.
 
         Args:
             image: the frame.
@@ -55,8 +55,8 @@ class Fitter:
             noise: (units,) residuals to expect, over the gain, where the pose is nearly known.
         """
         units, place = len(pose), self.templates.centre + pose[:, :2]
-        jacobian = self.camera.jacobian(place)
-        scale = np.sqrt(np.abs(_determinant(jacobian)))
+        j = self.camera.jacobian(place)
+        scale = np.sqrt(np.abs(j[..., 0, 0] * j[..., 1, 1] - j[..., 0, 1] * j[..., 1, 0]))
         start = FitStart(
             np.concatenate([pose, photometry], axis=1),
             self.camera.project(place),
@@ -71,18 +71,10 @@ class Fitter:
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
             across = int(2 * start.radius[wanted].max()) // SIZE + 3
-            scene = FramePixels(self._padded(image), self.plane)
-            patch_correlation.fit(
-                scene, self.templates, start, wanted, FULL_STEPS, room(across**2), out
+            padded = np.zeros(self.plane.shape[:2], np.float32)  # to whole blocks
+            padded[: image.shape[0], : image.shape[1]] = image
+            scene = FramePixels(padded, self.plane)
+            patch_correlation.fit_patches(
+                scene, self.templates, start, wanted, FULL_STEPS, workspace(across**2), out
             )
         return patch_correlation.unpack(out)
-
-    def _padded(self, image: Picture) -> Singles:
-        """The image on whole blocks."""
-        out = np.zeros(self.plane.shape[:2], np.float32)
-        out[: image.shape[0], : image.shape[1]] = image
-        return out
-
-
-def _determinant(matrices: Floats) -> Floats:
-    return matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]

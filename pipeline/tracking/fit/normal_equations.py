@@ -1,4 +1,4 @@
-"""Normal equations of one unit against a frame, gathered block by block of 8 x 8 pixels.
+"""Gathers the normal equations of one unit against a frame, by blocks of 8 x 8 pixels.
 
 A block is what a codec quantises at once, so errors are alike within; and what a processor's cache
 holds, so pixels are sampled first and summed after, many at a time.
@@ -25,7 +25,7 @@ _COUNT = np.array([[0.0] * _PIXELS, _FEW, [1.0] * _PIXELS], np.float32)
 
 
 class FramePixels(NamedTuple):
-    """A frame, and the place in the specimen's plane of each of its pixels.
+    """Holds a frame, and the place in the specimen's plane of each of its pixels.
 
     Attributes:
         image: (rows, columns) brightness.
@@ -37,7 +37,7 @@ class FramePixels(NamedTuple):
 
 
 class TemplateArrays(NamedTuple):
-    """The template of one unit, as `unfold` makes its nodes, its cells, and its place at rest.
+    """Holds the template of one unit: nodes as `unfold` makes them, cells, place at rest.
 
     Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it.
     """
@@ -51,7 +51,7 @@ class TemplateArrays(NamedTuple):
     reach: float
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Arrays that the sums are made in.
 
     Attributes:
@@ -77,9 +77,9 @@ class Room(NamedTuple):
     sums: Floats
 
 
-def room(blocks: int) -> Room:
-    """Room for units of at most so many blocks."""
-    return Room(
+def workspace(blocks: int) -> Workspace:
+    """Allocates room for units of at most so many blocks."""
+    return Workspace(
         np.zeros((UNKNOWNS, _PIXELS), np.float32),
         np.zeros(_PIXELS, np.float32),
         np.zeros(_PIXELS, np.float32),
@@ -94,7 +94,7 @@ def room(blocks: int) -> Room:
 
 @inlined
 def _place(
-    scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: Room
+    scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: Workspace
 ) -> None:
     """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
     plane, x, y = scene.plane, room.x, room.y
@@ -111,7 +111,7 @@ def _place(
 
 
 @inlined
-def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room: Room) -> int:
+def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room: Workspace) -> int:
     """Reads the template where pixels are to be compared; returns their number.
 
     Fills weight, residual with the frame's brightness, and rows 0, 1, 3 with slopes and value of
@@ -157,7 +157,7 @@ def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room:
 
 
 @inlined
-def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Room) -> None:
+def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Workspace) -> None:
     """Turns slopes and value of the template into derivatives and residual of the frame."""
     rows, residual = room.rows, room.residual
     cos, sin = np.float32(math.cos(state[2])), np.float32(math.sin(state[2]))
@@ -179,8 +179,8 @@ def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Room) -> Non
 
 
 @inlined
-def _weigh(room: Room, tight: float, pixels: int) -> None:
-    """Robust weights of Geman and McClure, and the sums."""
+def _weigh(room: Workspace, tight: float, pixels: int) -> None:
+    """Applies robust weights of Geman and McClure, and adds to the sums."""
     rows, residual, weight = room.rows, room.residual, room.weight
     full = left = curved = total = squares = np.float32(0)
     narrow = np.float32(tight)
@@ -204,7 +204,7 @@ def _weigh(room: Room, tight: float, pixels: int) -> None:
 
 
 @inlined
-def _add(room: Room, scores: Floats, pixels: int) -> None:
+def _add(room: Workspace, scores: Floats, pixels: int) -> None:
     """Adds a block to the matrix and fills its scores."""
     rows, residual, weight, matrix = room.rows, room.residual, room.weight, room.matrix
     scaled = room.weighted
@@ -228,14 +228,14 @@ def _within(scene: FramePixels, look: TemplateArrays, state: Floats, top: int, l
 
 
 @inlined
-def gather(
+def gather_equations(
     scene: FramePixels,
     look: TemplateArrays,
     state: Floats,
     box: Floats,
     every: int,
     tight: float,
-    room: Room,
+    room: Workspace,
 ) -> int:
     """Fills matrix, scores and sums; returns the number of blocks.
 
@@ -265,3 +265,46 @@ def gather(
                 _add(room, room.scores[count], pixels)
                 count += 1
     return count
+
+
+@inlined
+def _factor(matrix: Floats, factor: Floats) -> bool:
+    """Factors by Cholesky from the lower triangle; returns False if it is singular."""
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i != j:
+                factor[i, j] = total / factor[j, j]
+            elif total > 1e-10 * matrix[i, i]:
+                factor[i, i] = math.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@inlined
+def invert(matrix: Floats, factor: Floats, inverse: Floats) -> bool:
+    """Fills the inverse of a symmetric positive definite matrix; False if it is singular.
+
+    Args:
+        matrix: (n, n); its lower triangle is read.
+        factor: (n, n) room for the Cholesky factor.
+        inverse: (n, n) filled.
+    """
+    size = len(matrix)
+    if not _factor(matrix, factor):
+        return False
+    for column in range(size):
+        for i in range(size):
+            total = 1.0 if i == column else 0.0
+            for k in range(i):
+                total -= factor[i, k] * inverse[k, column]
+            inverse[i, column] = total / factor[i, i]
+        for i in range(size - 1, -1, -1):
+            total = inverse[i, column]
+            for k in range(i + 1, size):
+                total -= factor[k, i] * inverse[k, column]
+            inverse[i, column] = total / factor[i, i]
+    return True

@@ -1,4 +1,4 @@
-"""Rigid-patch image correlation: Gauss-Newton on the pose of each unit in the specimen's plane.
+"""Correlates rigid patches: Gauss-Newton on the pose of each unit in the specimen's plane.
 
 The raw pixels of a frame are compared with the template of a unit, seen through the camera: no
 frame is interpolated, so its noise is not either. Four photometric unknowns (gain, offset and its
@@ -18,11 +18,11 @@ from pipeline.tracking.fit.normal_equations import (
     SIZE,
     UNKNOWNS,
     FramePixels,
-    Room,
     TemplateArrays,
-    gather,
+    Workspace,
+    gather_equations,
+    invert,
 )
-from pipeline.tracking.fit.small_cholesky import invert
 from pipeline.tracking.fit.template_cells import TemplateCells, unfold
 from sim.core import Floats, Mask, Singles
 
@@ -39,7 +39,7 @@ _UNKNOWN = 1e6
 
 
 class Templates(NamedTuple):
-    """What the units look like in their own frames, and where they rest.
+    """Holds the looks of the units in their own frames, and where they rest.
 
     Attributes:
         brightness: (units, rows, columns) at the nodes, y up.
@@ -63,7 +63,7 @@ class Templates(NamedTuple):
 
 
 class FitStart(NamedTuple):
-    """Where the fits of a frame start, and what is known before.
+    """Holds where the fits of a frame start, and what is known before.
 
     Attributes:
         state: (units, 7) pose and photometry.
@@ -85,8 +85,8 @@ class FitStart(NamedTuple):
     tight: Floats
 
 
-class Aim(NamedTuple):
-    """One unit of a `FitStart`, with its contrast and the largest number of full steps."""
+class FitTarget(NamedTuple):
+    """Holds one unit of a `FitStart`, with its contrast and the largest number of full steps."""
 
     contrast: float
     scale: float
@@ -96,8 +96,8 @@ class Aim(NamedTuple):
     most: int
 
 
-class Fits(NamedTuple):
-    """Poses found in a frame.
+class PoseFits(NamedTuple):
+    """Holds poses found in a frame.
 
     Attributes:
         pose: (units, 3) displacement in mm and rotation in rad.
@@ -122,6 +122,15 @@ class Fits(NamedTuple):
     last: Floats
     information: Floats
 
+    def copy(self) -> PoseFits:
+        """Copies all arrays."""
+        return PoseFits(*(values.copy() for values in self))
+
+    def take(self, other: PoseFits, chosen: Mask) -> None:
+        """Replaces the chosen units (units,) by those of another fit."""
+        for values, new in zip(self, other, strict=True):
+            values[chosen] = new[chosen]
+
 
 @inlined
 def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> None:
@@ -134,7 +143,7 @@ def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> 
 
 @inlined
 def _stepped(inverse: Floats, scores: Floats, first: int, step: Floats) -> None:
-    """The Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
+    """Fills the Gauss-Newton step of the unknowns from ``first`` on, zero for the others."""
     step[:] = 0.0
     for j in range(first, UNKNOWNS):
         total = 0.0
@@ -154,8 +163,8 @@ def _hold_pose(matrix: Floats) -> None:
 
 
 @inlined
-def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -> float:
-    """The scale of the robust weights: wide until the unit has found its place."""
+def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: Workspace) -> float:
+    """Returns the scale of the robust weights: wide until the unit has found its place."""
     if aim.tight > 0.0:
         return max(0.5 * scale, aim.tight)
     least = _FLOOR * aim.contrast * gain
@@ -166,7 +175,7 @@ def _next_scale(scale: float, moved: float, gain: float, aim: Aim, room: Room) -
 
 @inlined
 def _stride(sums: Floats) -> float:
-    """By how much a step of fixed robust weights is too short, for they change with it."""
+    """Returns the factor by which steps of fixed robust weights are too short."""
     return min(sums[1] / max(sums[2], 1e-9), _STRIDE)
 
 
@@ -174,11 +183,11 @@ def _stride(sums: Floats) -> float:
 def _descend(
     scene: FramePixels,
     look: TemplateArrays,
-    aim: Aim,
+    aim: FitTarget,
     box: Floats,
     state: Floats,
     inverse: Floats,
-    room: Room,
+    room: Workspace,
 ) -> tuple[float, int]:
     """Improves the state of one unit.
 
@@ -191,7 +200,7 @@ def _descend(
     scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
     for turn in range(0 if new else 1, aim.most + 1):
         every = 4 if turn == 0 else (2 if turn == 1 and blind else 1)
-        count = gather(scene, look, state, box, every, 1 / (scale * scale), room)
+        count = gather_equations(scene, look, state, box, every, 1 / (scale * scale), room)
         if turn == 0:
             _hold_pose(room.matrix)
         if not (room.sums[3] > 20 / every and invert(room.matrix, factor, inverse)):
@@ -209,7 +218,13 @@ def _descend(
 
 @inlined
 def _summarise(
-    state: Floats, inverse: Floats, room: Room, count: int, full: float, moved: float, out: Floats
+    state: Floats,
+    inverse: Floats,
+    room: Workspace,
+    count: int,
+    full: float,
+    moved: float,
+    out: Floats,
 ) -> None:
     """Writes a unit's row as `unpack` reads it."""
     out[:] = 0.0
@@ -235,13 +250,13 @@ def _summarise(
 
 
 @compiled
-def fit(
+def fit_patches(
     scene: FramePixels,
     templates: Templates,
     start: FitStart,
     chosen: Mask,
     most: int,
-    room: Room,
+    room: Workspace,
     out: Floats,
 ) -> None:
     """Fits all chosen units; fills out (units, 30) in the order of `unpack`.
@@ -277,7 +292,7 @@ def fit(
             templates.reach[unit] + 0.71 * SIZE / start.scale[unit],
         )
         state[:] = start.state[unit]
-        aim = Aim(
+        aim = FitTarget(
             templates.contrast[unit],
             start.scale[unit],
             start.radius[unit],
@@ -290,9 +305,9 @@ def fit(
             _summarise(state, inverse, room, count, start.full[unit], moved, out[unit])
 
 
-def unpack(out: Floats) -> Fits:
-    """The columns of `fit`'s output by name."""
-    return Fits(
+def unpack(out: Floats) -> PoseFits:
+    """Names the columns of `fit_patches`' output."""
+    return PoseFits(
         out[:, :POSE],
         out[:, POSE:UNKNOWNS],
         out[:, UNKNOWNS : UNKNOWNS + 9].reshape(-1, 3, 3),

@@ -1,11 +1,11 @@
-"""Templates of thick units follow their side walls, which do not turn with the faces."""
+"""Redraws templates of thick units for their side walls, which do not turn with the faces."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from pipeline.tracking.fit.patch_correlation import Templates
-from pipeline.tracking.fit.template import TemplateGrid, blurred, shown
+from pipeline.tracking.fit.template import TemplateGrid, blurred_silhouette, template_weight
 from pipeline.tracking.fit.template_cells import classify
 from pipeline.tracking.geometry import Depth, SpecimenOutlines
 from sim.core import Floats, Singles
@@ -14,7 +14,7 @@ _MOVED = 0.04
 """How far a back may move against its face before its silhouette is drawn again, px."""
 
 
-class Walls:
+class SideWalls:
     """Redraws the silhouettes of units in their templates, in place.
 
     What a template shows of the board, where the walls then are, gets the shade of the face's rim.
@@ -42,20 +42,20 @@ class Walls:
         self._specimen, self._depth, self._grid = specimen, depth, grid
         self._blur, self._pixel, self._kind, self._templates = blur, pixel, kind, templates
         self._offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
-        rest = np.stack([blurred(grid, inside, blur) for inside in grid.inside])
+        rest = np.stack([blurred_silhouette(grid, inside, blur) for inside in grid.inside])
         self._contrast = _contrasts(rest, templates)
         self._board = templates.brightness - self._contrast[:, None, None] * rest
 
-    def follow(self, pose: Floats) -> None:
+    def redraw(self, pose: Floats) -> None:
         """Draws the silhouettes of units (units, 3) whose backs have moved against the faces."""
         offset = self._depth.offset(self._specimen.centre, pose)
         moved = np.linalg.norm(offset - self._offset, axis=1) > _MOVED * self._pixel
         for unit in np.nonzero(moved)[0].tolist():
             outline = self._depth.silhouette(self._specimen.polygon(unit), offset[unit])
             inside = self._grid.signed_distance(outline)
-            drawn = self._contrast[unit] * blurred(self._grid, inside, self._blur)
+            drawn = self._contrast[unit] * blurred_silhouette(self._grid, inside, self._blur)
             self._templates.brightness[unit] = self._board[unit] + drawn
-            self._templates.weight[unit] = shown(
+            self._templates.weight[unit] = template_weight(
                 inside, self._grid.joint[unit], self._blur, self._pixel, self._kind
             )
             classify(

@@ -1,4 +1,4 @@
-"""Templates of the units: from their outlines alone, or learned from frames of the video.
+"""Makes templates of the units: from their outlines alone, or learned from a frame.
 
 An outline blurred as the camera blurs it finds units whose faces are unknown; what the frames show
 then takes its place, whatever it is: dots, speckle, or the bare edge.
@@ -10,12 +10,12 @@ from copy import copy
 
 import cv2
 import numpy as np
+from scipy.ndimage import spline_filter
 
-from pipeline.runtime import Picture
+from pipeline.runtime import Picture, compiled, inlined
 from pipeline.tracking.fit.normal_equations import SIZE
 from pipeline.tracking.fit.patch_correlation import Templates
-from pipeline.tracking.fit.spline import coefficients, sample
-from pipeline.tracking.fit.template_cells import cells_of
+from pipeline.tracking.fit.template_cells import classify_templates
 from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines
 from sim.core import Floats, Ints, Singles
 
@@ -25,6 +25,7 @@ _REACH = 2.5
 
 
 _FAR = 1e6
+_TAPS = 4
 
 
 class TemplateGrid:
@@ -64,25 +65,21 @@ class TemplateGrid:
             if depth is not None and back is not None:
                 shown = depth.silhouette(polygon, back[unit])
             self.inside[unit] = self.signed_distance(shown)
-            ends = polygon[specimen.joined[unit, : len(polygon)]]
-            self.joint[unit] = self._distance(ends)
+            far = np.full(self.x.shape, np.inf)
+            for x, y in polygon[specimen.joined[unit, : len(polygon)]]:
+                far = np.minimum(far, np.hypot(self.x - x, self.y - y))
+            self.joint[unit] = far
         self.centre = specimen.centre
 
     def of(self, units: Ints) -> TemplateGrid:
-        """The same for some of the units."""
+        """Returns the grid of some of the units."""
         made = copy(self)
         made.inside, made.joint = self.inside[units], self.joint[units]
         made.centre = self.centre[units]
         return made
 
-    def _distance(self, points: Floats) -> Floats:
-        far = np.full(self.x.shape, np.inf)
-        for x, y in points:
-            far = np.minimum(far, np.hypot(self.x - x, self.y - y))
-        return far
-
     def signed_distance(self, polygon: Floats) -> Singles:
-        """From the nodes (nodes, nodes) to a polygon about the centroid, positive inside, mm."""
+        """Measures from the nodes to a polygon about the centroid, positive inside, mm."""
         far = np.full(self.x.shape, np.inf)
         odd = np.zeros(self.x.shape, dtype=bool)
         for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
@@ -102,26 +99,28 @@ def _smooth(value: Singles, low: float, high: float) -> Singles:
 
 
 def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Templates:
-    """Templates with the contrast that each has within its weight."""
+    """Makes templates with the contrast that each has within its weight."""
     total = weight.sum(axis=(1, 2))
     mean = (brightness * weight).sum(axis=(1, 2)) / total
     square = ((brightness - mean[:, None, None]) ** 2 * weight).sum(axis=(1, 2)) / total
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max() for mask in weight])
     contrast = np.sqrt(square)
-    cells = cells_of(brightness, weight, contrast)
+    cells = classify_templates(brightness, weight, contrast)
     return Templates(brightness, weight, grid.half, grid.step, grid.centre, contrast, reach, cells)
 
 
-def blurred(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
-    """What is inside, one, against what is not, zero, as the camera blurs it."""
+def blurred_silhouette(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
+    """Blurs a silhouette, one inside and zero outside, as the camera does."""
     sharp = np.clip(inside / grid.step + 0.5, 0, 1).astype(np.float32)
     spread = np.sqrt(max(blur**2 - grid.step**2 / 12, 0)) / grid.step
     return np.asarray(cv2.GaussianBlur(sharp, (0, 0), float(spread)), np.float32)
 
 
-def shown(inside: Singles, joint: Singles, blur: float, pixel: float, kind: str) -> Singles:
-    """Weight of nodes in templates that are learned: what is inside, and the blurred edge.
+def template_weight(
+    inside: Singles, joint: Singles, blur: float, pixel: float, kind: str
+) -> Singles:
+    """Weighs nodes in templates that are learned: what is inside, and the blurred edge.
 
     Outside, what is near a joint moves otherwise. Bare units are followed by their edges alone,
     dots and speckle without them, where the specimen's kind is not left open ("auto").
@@ -137,15 +136,15 @@ def shown(inside: Singles, joint: Singles, blur: float, pixel: float, kind: str)
     return np.asarray(weight, np.float32)
 
 
-def outlines(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
-    """Bright outlines on a dark ground, blurred; only a band about the edges has weight.
+def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
+    """Draws bright outlines on a dark ground, blurred; only a band about the edges has weight.
 
     Args:
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
     """
-    faces = np.stack([blurred(grid, inside, blur) for inside in grid.inside])
+    faces = np.stack([blurred_silhouette(grid, inside, blur) for inside in grid.inside])
     outside = _REACH * blur + 0.5 * pixel
     weight = _smooth(grid.inside, -outside - pixel, -outside)
     weight *= 1 - _smooth(grid.inside, outside, outside + pixel)
@@ -153,67 +152,40 @@ def outlines(grid: TemplateGrid, blur: float, pixel: float) -> Templates:
     return _templates(grid, faces, weight.astype(np.float32))
 
 
-class Learner:
-    """Averages what frames show of the units, each seen from the unit's own frame.
+def learn_templates(
+    image: Picture, camera: Camera, grid: TemplateGrid, blur: float, pixel: float, kind: str
+) -> Templates:
+    """Learns the templates of units at rest from what a frame shows of them.
 
     Args:
+        image: the frame.
+        camera: the camera.
         grid: the nodes.
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
         kind: auto, dots, speckle or bare.
     """
-
-    def __init__(self, grid: TemplateGrid, blur: float, pixel: float, kind: str) -> None:
-        self._grid = grid
-        self._weight = shown(grid.inside, grid.joint, blur, pixel, kind)
-        outside = _REACH * blur + 0.5 * pixel
-        self._wanted = [
-            np.nonzero(grid.inside[u] > -outside - 4 * pixel) for u in range(len(grid.centre))
-        ]
-        self._sum = np.zeros(grid.inside.shape)
-        self._count = np.zeros(grid.inside.shape)
-
-    def add(
-        self, image: Picture, camera: Camera, pose: Floats, photometry: Floats, share: Floats
-    ) -> None:
-        """Adds a frame.
-
-        Args:
-            image: the frame.
-            camera: the camera.
-            pose: (units, 3) where the units are; NaN for those to leave out.
-            photometry: (units, 4) gain, offset and slopes that the frame has over the template.
-            share: (units,) weight of the units.
-        """
-        coefs = coefficients(image.astype(np.float64))
-        grid = self._grid
-        for unit in np.nonzero(np.isfinite(pose[:, 0]) & (share > 0))[0]:
-            rows, columns = self._wanted[unit]
-            x, y = grid.x[rows, columns], grid.y[rows, columns]
-            cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
-            place = grid.centre[unit] + pose[unit, :2]
-            points = place + np.stack([cos * x - sin * y, sin * x + cos * y], axis=1)
-            seen = camera.project(points)
-            value = np.empty(len(x))
-            sample(coefs, np.ascontiguousarray(seen[:, 0]), np.ascontiguousarray(seen[:, 1]), value)
-            gain, offset, sx, sy = photometry[unit]
-            value = (value - offset - (sx * x + sy * y) / grid.half) / gain
-            good = np.isfinite(value)
-            self._sum[unit, rows[good], columns[good]] += share[unit] * value[good]
-            self._count[unit, rows[good], columns[good]] += share[unit]
-
-    def templates(self) -> Templates:
-        """The mean of what was added."""
-        seen = self._count > 0
-        face = np.divide(self._sum, self._count, out=np.zeros_like(self._sum), where=seen)
-        weight = np.where(seen, self._weight, np.float32(0))
-        level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
-        face = np.where(seen, face, level[:, None, None])
-        return _templates(self._grid, face.astype(np.float32), weight)
+    coefs = spline_coefficients(image.astype(np.float64))
+    wanted = grid.inside > -(_REACH * blur + 0.5 * pixel) - 4 * pixel
+    face = np.full(grid.inside.shape, np.nan)
+    for unit in range(len(grid.centre)):
+        points = grid.centre[unit] + np.stack([grid.x[wanted[unit]], grid.y[wanted[unit]]], axis=1)
+        x, y = camera.project(points).T
+        value = np.empty(len(points))
+        sample_spline(coefs, np.ascontiguousarray(x), np.ascontiguousarray(y), value)
+        face[unit, wanted[unit]] = value
+    seen = np.isfinite(face)
+    weight = np.where(
+        seen, template_weight(grid.inside, grid.joint, blur, pixel, kind), np.float32(0)
+    )
+    face[~seen] = 0.0
+    level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
+    face = np.where(seen, face, level[:, None, None])
+    return _templates(grid, face.astype(np.float32), weight)
 
 
-def plane_of(camera: Camera) -> Singles:
-    """Place (rows, columns, 2) in the specimen's plane of every pixel, mm.
+def pixel_plane(camera: Camera) -> Singles:
+    """Maps every pixel to its place (rows, columns, 2) in the specimen's plane, mm.
 
     Rows and columns are filled up to whole blocks, with places far from everything.
     """
@@ -224,3 +196,44 @@ def plane_of(camera: Camera) -> Singles:
         strip = slice(row, min(row + 64, rows))
         out[strip, :columns] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
     return out
+
+
+def spline_coefficients(values: Floats) -> Singles:
+    """Fits the cubic B-spline (Unser, 1999) through an image or grid (rows, columns)."""
+    return np.asarray(spline_filter(values, order=3, mode="mirror", output=np.float64), np.float32)
+
+
+@inlined
+def spline_weights(offset: float, value: Floats, slope: Floats) -> None:
+    """Fills the four basis values and slopes at ``offset`` in [0, 1) behind the second knot."""
+    rest = 1.0 - offset
+    square, rest_square = offset * offset, rest * rest
+    value[0] = rest_square * rest / 6
+    value[1] = 2 / 3 - 0.5 * square * (2 - offset)
+    value[2] = 2 / 3 - 0.5 * rest_square * (2 - rest)
+    value[3] = square * offset / 6
+    slope[0] = -0.5 * rest_square
+    slope[1] = 1.5 * square - 2 * offset
+    slope[2] = 2 * rest - 1.5 * rest_square
+    slope[3] = 0.5 * square
+
+
+@compiled
+def sample_spline(coefs: Singles, x: Floats, y: Floats, out: Floats) -> None:
+    """Samples at points (column ``x``, row ``y``); NaN where the four by four knots do not fit."""
+    rows, columns = coefs.shape
+    wx, wy, slope = np.empty(_TAPS), np.empty(_TAPS), np.empty(_TAPS)
+    for k in range(x.size):
+        column, row = int(np.floor(x[k])), int(np.floor(y[k]))
+        if column < 1 or row < 1 or column > columns - 3 or row > rows - 3:
+            out[k] = np.nan
+            continue
+        spline_weights(x[k] - column, wx, slope)
+        spline_weights(y[k] - row, wy, slope)
+        total = 0.0
+        for a in range(_TAPS):
+            line = 0.0
+            for b in range(_TAPS):
+                line += wx[b] * coefs[row - 1 + a, column - 1 + b]
+            total += wy[a] * line
+        out[k] = total

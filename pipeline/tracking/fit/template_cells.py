@@ -1,4 +1,4 @@
-"""The cells of a template's nodes: which of them pixels are compared in, and what is read there.
+"""Classifies the cells of a template's nodes: pixels are compared in some, and what is read there.
 
 Where the template is flat, a pixel tells of the brightness alone: one of four is enough.
 """
@@ -17,7 +17,7 @@ EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
 _STEEP = 0.04
 """Change from node to node in a cell that tells of the place, in contrasts of the unit."""
 
-Places = NDArray[np.int32]
+NodeSpans = NDArray[np.int32]
 
 
 class TemplateCells(NamedTuple):
@@ -30,11 +30,11 @@ class TemplateCells(NamedTuple):
     """
 
     kind: Image
-    span: Places
+    span: NodeSpans
 
 
-def cells_of(brightness: Singles, weight: Singles, contrast: Floats) -> TemplateCells:
-    """The cells of templates (units, rows, columns)."""
+def classify_templates(brightness: Singles, weight: Singles, contrast: Floats) -> TemplateCells:
+    """Classifies the cells of templates (units, rows, columns)."""
     made = TemplateCells(
         np.empty(weight.shape, np.uint8), np.empty((*weight.shape[:2], 2), np.int32)
     )
@@ -45,7 +45,7 @@ def cells_of(brightness: Singles, weight: Singles, contrast: Floats) -> Template
 
 @compiled
 def classify(
-    brightness: Singles, weight: Singles, contrast: float, kind: Image, span: Places
+    brightness: Singles, weight: Singles, contrast: float, kind: Image, span: NodeSpans
 ) -> None:
     """Fills kind (rows, columns) and span (rows, 2) of one template; cells at the rim are empty.
 
@@ -81,7 +81,7 @@ def classify(
 
 
 @inlined
-def unfold(brightness: Singles, weight: Singles, span: Places, nodes: Singles) -> None:
+def unfold(brightness: Singles, weight: Singles, span: NodeSpans, nodes: Singles) -> None:
     """Fills nodes (rows, columns, 4) in the spans: brightness, its slopes in x and y, and weight.
 
     The slopes are differences of fourth order, per node. One unit's nodes at a time fit a

@@ -1,4 +1,4 @@
-"""YAML files that describe test videos, to a recording and a design dataset of this project."""
+"""Converts YAML descriptions of test videos to a recording and a design dataset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pipeline.problem.reading import told, yaml_file
+from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
 
@@ -17,7 +17,7 @@ _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
 
 
 class _Described(BaseModel):
-    """What is taken from a description; the rest of it is of no concern here."""
+    """Checks what is taken from a description; ignores the rest."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
 
@@ -35,12 +35,12 @@ VIDEOS = (".mp4", ".mkv", ".avi", ".mov")
 
 
 def description(path: Path) -> dict[str, Any]:
-    """The description of a video.
+    """Reads the description of a video.
 
     Raises:
         UserError: not such a description.
     """
-    document = yaml_file.read(path)
+    document = yaml_file.read_yaml(path)
     data = document.data
     missing = sorted(_WANTED - data.keys())
     if missing:
@@ -52,12 +52,12 @@ def description(path: Path) -> dict[str, Any]:
     try:
         _Described.model_validate(data)
     except ValidationError as error:
-        raise told(error, document, data, None) from error
+        raise explain_error(error, document, data, None) from error
     return data
 
 
 def video_of(path: Path) -> Path:
-    """The video beside its description, or the folder of pictures of that name.
+    """Finds the video beside its description, or the folder of pictures of that name.
 
     Raises:
         UserError: there is none.
@@ -69,7 +69,7 @@ def video_of(path: Path) -> Path:
 
 
 def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
-    """The recording's YAML."""
+    """Writes the recording's YAML."""
     lines = [
         f"title: {described.get('kind', described['name'])!r}",
         f"video: {str(video)!r}",
@@ -84,7 +84,7 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
 
 
 def design(described: dict[str, Any]) -> xr.Dataset:
-    """The specimen as a design without history.
+    """Makes the specimen a design without history.
 
     Units are turned by +bias where i + j is even: the mirror image of the lattices of this
     project. Ids count i + columns j and the origin is unit (0, 0), as everywhere here.
@@ -143,7 +143,7 @@ def _no_history() -> dict[str, tuple[tuple[str, ...], Any]]:
 
 
 def _ligaments(columns: int, rows: int) -> tuple[Ints, Ints]:
-    """Units and vertices (right, top, left, bottom) that the ligaments join."""
+    """Lists units and vertices (right, top, left, bottom) that the ligaments join."""
     unit = np.arange(columns * rows).reshape(rows, columns)
     along = np.stack([unit[:, :-1].ravel(), unit[:, 1:].ravel()], axis=1)
     up = np.stack([unit[:-1].ravel(), unit[1:].ravel()], axis=1)

@@ -1,4 +1,4 @@
-"""Forces that were logged beside a video, at the times of its frames."""
+"""Samples forces that were logged beside a video at the times of its frames."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import csv_columns
 from pipeline.tracking.frames.recording import LoadCellLog
 from sim.core import Floats
 
 
-class Log(NamedTuple):
-    """A load cell's log on the clock of the video's file: times (lines,) in s, forces in N."""
+class ForceLog(NamedTuple):
+    """Holds times (lines,) on the clock of the video's file, s, and forces of a load cell, N."""
 
     clock: Floats
     force: Floats
 
 
-def read(path: Path, cell: LoadCellLog) -> Log:
-    """The log of a load cell.
+def read(path: Path, cell: LoadCellLog) -> ForceLog:
+    """Reads the log of a load cell.
 
     Args:
         path: the file.
@@ -30,15 +30,15 @@ def read(path: Path, cell: LoadCellLog) -> Log:
     Raises:
         UserError: it cannot be read, or runs backwards.
     """
-    clock, force = csv_columns.read(path, (cell.time, cell.force)).T
+    clock, force = csv_columns.read_columns(path, (cell.time, cell.force)).T
     if (np.diff(clock) <= 0).any():
         remedy = "sort it by time, each time once"
         raise UserError("the log's time does not ascend", file=path, key=cell.time, remedy=remedy)
-    return Log(clock - cell.offset, force)
+    return ForceLog(clock - cell.offset, force)
 
 
-def forces(log: Log, time: Floats) -> Floats:
-    """The force (frames,) in N at the frames, linear between the log's lines, NaN beyond them.
+def forces(log: ForceLog, time: Floats) -> Floats:
+    """Returns the force (frames,) in N, linear between the log's lines, NaN beyond them.
 
     Where the log is finer than the video, it is averaged over the frame's interval first, so that
     no noise of the load cell is folded into the frames.
@@ -51,7 +51,7 @@ def forces(log: Log, time: Floats) -> Floats:
     return np.where(inside, _smooth(log.clock, log.force, time), np.nan)
 
 
-def check(log: Log, time: Floats, path: Path, cell: LoadCellLog) -> None:
+def check(log: ForceLog, time: Floats, path: Path, cell: LoadCellLog) -> None:
     """Refuses a log that holds nothing of the video.
 
     Raises:
@@ -70,7 +70,7 @@ def check(log: Log, time: Floats, path: Path, cell: LoadCellLog) -> None:
 
 
 def _smooth(clock: Floats, force: Floats, time: Floats) -> Floats:
-    """Means over an interval of a frame about each, or plain values where the log is coarser."""
+    """Averages over an interval of a frame about each, or interpolates where the log is coarser."""
     interval = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     if interval <= 2 * float(np.median(np.diff(clock))):
         return np.interp(time, clock, force)

@@ -1,4 +1,4 @@
-"""The YAML file of a recording: which video shows which design, and how to read it."""
+"""Defines the YAML file of a recording: a video, the design that it shows, how to read it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pipeline.problem.fields import (
     exactly_one,
     fault,
 )
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.problem.sections import VirtualRecording
 
 
@@ -109,17 +109,17 @@ class Recording(Section):
         return self
 
 
-def load(path: Path) -> Recording:
-    """The recording in a YAML file.
+def load_recording(path: Path) -> Recording:
+    """Loads the recording in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Recording)
+    return load_section(path, Recording)
 
 
-def text(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
-    """The YAML of a recording, after lines of comment.
+def recording_yaml(values: dict[str, Any], comments: tuple[str, ...] = ()) -> str:
+    """Writes the YAML of a recording, after lines of comment.
 
     Args:
         values: keys and their values, as they stand in the file; those that are None are left out.

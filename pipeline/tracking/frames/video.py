@@ -1,19 +1,23 @@
-"""Frames of a video, or of a folder of pictures, one after the other, with their times."""
+"""Reads frames of a video, or of a folder of numbered pictures (PNG, TIFF), with their times."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
 import av
+import cv2
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.frames.image_folder import brightness, images, pictures
 from sim.core import Floats
+
+SYNTHETIC_LABEL = "SYNTHETIC"
+"""Stands in the title or comment of a video that was rendered."""
 
 _READY = {"gray", "yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuvj444p", "nv12"}
 """Formats whose first plane is the brightness in 8 bit, as it is."""
@@ -27,6 +31,8 @@ _ALONE = {
 }
 """Kinds of files that hold what they show: playlists name others, and may wait for more."""
 
+_SUFFIXES = {".png", ".tif", ".tiff"}
+_WHITE = 255.0
 _LARGEST = 1 << 27
 """Pixels of a frame."""
 
@@ -35,11 +41,11 @@ _ALL = 0.95
 
 
 class BrokenOffError(UserError):
-    """A video that ends too early: the frames before are whole, and their track is kept."""
+    """Tells of a video that ends too early: the frames before are whole, their track is kept."""
 
 
 def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
-    """A file that holds no more than so many frames, the last one at a time in s."""
+    """Reports a file that holds no more than so many frames, the last one at a time in s."""
     until = math.floor(1000 * time) / 1000
     return BrokenOffError(
         f"the video breaks off after {count} frames, which are tracked: {why}",
@@ -51,7 +57,7 @@ def broken_off(path: Path, why: str, count: int, time: float) -> BrokenOffError:
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture of the video.
+    """Holds a picture of the video.
 
     Attributes:
         index: from zero.
@@ -64,7 +70,7 @@ class Frame:
     image: Picture
 
 
-def frames(
+def read_frames(
     path: Path, start: float = 0.0, end: float = float("inf"), rate: float | None = None
 ) -> Iterator[Frame]:
     """Decodes the video once, in sequence; nothing but the present frame is held.
@@ -89,8 +95,8 @@ def frames(
     yield from _even(path, (frame for frame in shown if start <= frame.time <= end))
 
 
-def length(path: Path) -> int:
-    """Number of frames as the file has it, at least one; the window and faults may make it less."""
+def frame_count(path: Path) -> int:
+    """Counts frames as the file has it, at least one; the window and faults may make it less."""
     if path.is_dir():
         return len(pictures(path))
     try:
@@ -101,14 +107,14 @@ def length(path: Path) -> int:
         return 1
 
 
-def uneven(time: Floats) -> bool:
-    """Whether frames (frames,) s come at intervals that differ by more than stamps are rounded."""
+def has_uneven_intervals(time: Floats) -> bool:
+    """Tells intervals of frames (frames,) s that differ by more than stamps are rounded."""
     interval = np.diff(time)
     return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
 
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
-    """The frames as long as they are of one size."""
+    """Yields the frames as long as they are of one size."""
     size, time = None, 0.0
     for frame in shown:
         size = frame.image.shape if size is None else size
@@ -143,7 +149,7 @@ def _filmed(path: Path, start: float, end: float) -> Iterator[Frame]:
 
 
 def _opened(path: Path) -> av.container.InputContainer:
-    """The file itself: neither an address that its name may be, nor others that it may name."""
+    """Opens the file itself: neither an address that its name may be, nor others that it names."""
     if path.exists() and not path.is_file():
         raise UserError("not a plain file", file=path, key="video", remedy="give a video file")
     return av.open(f"file:{path}", options=_ALONE)
@@ -173,7 +179,7 @@ def _decoded(
             if index < _ALL * _promised(container, stream, index / max(time, 1e-9)):
                 raise broken_off(path, "the file should go on", index, time)
             return
-        stamp = _nominal(stream, index) if frame.pts is None else float(frame.time)
+        stamp = index / float(stream.average_rate or 1) if frame.pts is None else float(frame.time)
         first = stamp if first is None else first
         time = stamp - first
         if time > end:
@@ -184,18 +190,14 @@ def _decoded(
 
 
 def _promised(container: av.container.InputContainer, stream: av.VideoStream, rate: float) -> float:
-    """How many frames there are as the file has it; zero where it does not tell."""
+    """Returns the number of frames as the file has it; zero where it does not tell."""
     if stream.frames or len(container.streams) > 1 or not container.duration:
         return float(stream.frames)
     return rate * container.duration / av.time_base - 1
 
 
-def _nominal(stream: av.VideoStream, index: int) -> float:
-    return index / float(stream.average_rate or 1)
-
-
 def _upright(frame: av.VideoFrame) -> Picture:
-    """The brightness as players show it: a phone tells how it was held."""
+    """Turns the brightness as players show it: a phone tells how it was held."""
     image, quarters = _brightness(frame), round(frame.rotation / 90)
     return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
 
@@ -208,3 +210,62 @@ def _brightness(frame: av.VideoFrame) -> Picture:
     plane = frame.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
     return np.ascontiguousarray(rows[:, : plane.width])
+
+
+def pictures(folder: Path) -> list[Path]:
+    """Lists the folder's pictures in the order of the numbers in their names.
+
+    Raises:
+        UserError: there are none.
+    """
+    found = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES]
+    if not found:
+        remedy = "give a video file, or a folder of numbered .png or .tif files"
+        raise UserError("the folder holds no pictures", file=folder, remedy=remedy)
+    return sorted(found, key=_numbers)
+
+
+def _numbers(path: Path) -> tuple[list[int], str]:
+    return [int(digits) for digits in re.findall(r"\d+", path.stem)], path.name
+
+
+def images(folder: Path) -> Iterator[Picture]:
+    """Reads their brightness, one after the other.
+
+    Raises:
+        UserError: one cannot be read.
+    """
+    for path in pictures(folder):
+        if (image := _read(path)) is None:
+            raise UserError("not a readable picture", file=path, remedy="write the file again")
+        yield image
+
+
+def _read(path: Path) -> Picture | None:
+    try:
+        values = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    except cv2.error:  # too many pixels, among others
+        return None
+    return None if values is None else brightness(np.asarray(values))
+
+
+def brightness(values: np.ndarray) -> Picture:
+    """Brightness from 0 to 255, (rows, columns): 8 bit as they are, finer steps as fractions."""
+    if values.dtype == np.uint8:
+        return values
+    top = np.iinfo(values.dtype).max if values.dtype.kind == "u" else 1.0
+    return np.asarray(values * (_WHITE / top), np.float32)
+
+
+def rendered(video: Path) -> bool:
+    """Reads whether the file's metadata call it synthetic; a folder of pictures has none.
+
+    A file that cannot be read counts as filmed: reading its frames tells what is wrong.
+    """
+    if not video.is_file():
+        return False
+    try:
+        with av.open(str(video)) as container:
+            return any(SYNTHETIC_LABEL in text for text in container.metadata.values())
+    except av.FFmpegError:
+        return False

@@ -1,10 +1,12 @@
 from . import camera as camera
 from .camera import Camera as Camera
+from .camera import fit_camera as fit_camera
 from .depth import Depth as Depth
-from .depth import depth_of as depth_of
+from .depth import estimate_depth as estimate_depth
+from .rigid_fit import arm_swing as arm_swing
 from .rigid_fit import rigid_motion as rigid_motion
 from .rigid_fit import robust_motion as robust_motion
-from .rigid_fit import swung as swung
+from .rigid_fit import rotation_matrix as rotation_matrix
 from .specimen_outlines import SpecimenOutlines as SpecimenOutlines
 from .specimen_outlines import as_built as as_built
-from .specimen_outlines import of_design as of_design
+from .specimen_outlines import outlines_of_design as outlines_of_design

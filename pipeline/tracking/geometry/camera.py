@@ -1,4 +1,4 @@
-"""From the specimen's plane to pixels and back: a homography and radial distortion about a centre.
+"""Maps the specimen's plane to pixels and back: homography and radial distortion about a centre.
 
 For a flat specimen this is the pinhole camera with radial distortion, whatever its pose and focal
 length (Zhang, IEEE TPAMI 22 (2000) 1330). Pixels count from the centre of the top left one.
@@ -21,7 +21,7 @@ _DISTORTION_PRIOR = 0.3
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera that looks at a plane.
+    """Models a camera that looks at a plane.
 
     Attributes:
         homography: (3, 3) from mm in the plane to pixels without distortion, last entry one.
@@ -37,11 +37,11 @@ class Camera:
 
     @property
     def scale(self) -> float:
-        """The unit of the radius, px."""
+        """Returns the unit of the radius, px."""
         return max(self.size) / 2
 
     def project(self, points: Floats) -> Floats:
-        """Pixels (..., 2) of points (..., 2) of the plane in mm."""
+        """Maps points (..., 2) of the plane in mm to pixels (..., 2)."""
         h = self.homography
         flat = points @ h[:2, :2].T + h[:2, 2]
         flat /= (points @ h[2, :2] + h[2, 2])[..., None]
@@ -50,7 +50,7 @@ class Camera:
         return self.centre + offset * (1 + square * (self.radial[0] + square * self.radial[1]))
 
     def unproject(self, pixels: Floats) -> Floats:
-        """Points (..., 2) of the plane in mm that are seen at the pixels (..., 2)."""
+        """Maps pixels (..., 2) to points (..., 2) of the plane in mm."""
         offset = (pixels - self.centre) * self._undistorting(pixels)[..., None]
         inverse = np.linalg.inv(self.homography)
         flat = offset + self.centre
@@ -58,7 +58,7 @@ class Camera:
         return points / (flat @ inverse[2, :2] + inverse[2, 2])[..., None]
 
     def _undistorting(self, pixels: Floats) -> Floats:
-        """Radius (...) without distortion over that with it, by Newton's method."""
+        """Solves for the radius (...) without distortion over that with it, by Newton's method."""
         first, second = self.radial
         seen = np.maximum(np.linalg.norm((pixels - self.centre) / self.scale, axis=-1), 1e-12)
         radius = seen
@@ -68,12 +68,8 @@ class Camera:
             radius = radius - excess / (1 + square * (3 * first + square * 5 * second))
         return radius / seen
 
-    def beside(self, points: Floats, pixels: Floats) -> Floats:
-        """Points (..., 2) that are seen ``pixels`` (..., 2) away from others, mm."""
-        return self.unproject(self.project(points) + pixels)
-
     def jacobian(self, points: Floats) -> Floats:
-        """Derivative (..., 2, 2) of the pixels after the points, px/mm."""
+        """Differentiates (..., 2, 2) the pixels after the points, px/mm."""
         step = 1e-3
         ends = [
             (self.project(points + shift) - self.project(points - shift)) / (2 * step)
@@ -81,11 +77,15 @@ class Camera:
         ]
         return np.stack(ends, axis=-1)
 
+    def px_per_mm(self, points: Floats) -> Floats:
+        """Returns the scale (...) at points (..., 2), px/mm."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.jacobian(points)))))
 
-def fit(
+
+def fit_camera(
     points: Floats, pixels: Floats, size: tuple[int, int], sigma: float, start: Camera | None = None
 ) -> Camera:
-    """The camera that sees the points at the pixels, by robust least squares.
+    """Fits the camera that sees the points at the pixels, by robust least squares.
 
     Args:
         points: (n, 2) mm, at least four, not on a line.
@@ -96,7 +96,7 @@ def fit(
         start: a camera near the solution; by default the best homography.
     """
     if start is None:
-        start = Camera(homography(points, pixels), (np.array(size) - 1) / 2, np.zeros(2), size)
+        start = Camera(fit_homography(points, pixels), (np.array(size) - 1) / 2, np.zeros(2), size)
     span = np.abs(points - points.mean(axis=0)).max()
     scaling = np.array([1, 1, span, 1, 1, span, 1 / span, 1 / span]) / span
     unit = np.concatenate([scaling * start.scale, np.full(2, start.scale), np.ones(2)])
@@ -120,11 +120,11 @@ def fit(
     return camera(found.x)
 
 
-def homography(points: Floats, pixels: Floats) -> Floats:
-    """The homography (3, 3) between points and pixels (n, 2), n >= 4, linear least squares."""
+def fit_homography(points: Floats, pixels: Floats) -> Floats:
+    """Fits the homography (3, 3) of points to pixels (n, 2), n >= 4, linear least squares."""
     to_points, to_pixels = _normaliser(points), _normaliser(pixels)
-    x, y = _apply(to_points, points).T
-    u, v = _apply(to_pixels, pixels).T
+    x, y = apply_homography(to_points, points).T
+    u, v = apply_homography(to_pixels, pixels).T
     one, zero = np.ones_like(x), np.zeros_like(x)
     rows = np.concatenate(
         [
@@ -143,6 +143,7 @@ def _normaliser(points: Floats) -> Floats:
     return np.array([[scale, 0, -scale * middle[0]], [0, scale, -scale * middle[1]], [0, 0, 1.0]])
 
 
-def _apply(matrix: Floats, points: Floats) -> Floats:
+def apply_homography(matrix: Floats, points: Floats) -> Floats:
+    """Maps points (n, 2) to pixels (n, 2) without distortion."""
     mapped = points @ matrix[:2, :2].T + matrix[:2, 2]
     return mapped / (points @ matrix[2, :2] + matrix[2, 2])[:, None]

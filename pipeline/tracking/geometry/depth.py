@@ -1,4 +1,4 @@
-"""Side walls of thick units: where the backs are seen, and what the walls hide of the board.
+"""Projects the side walls of thick units: backs, and silhouettes that hide the board.
 
 A point behind the faces' plane is seen nearer to the camera's foot, by its depth over its distance.
 So a silhouette is the face with what is swept on the way to the back: it does not turn with the
@@ -19,7 +19,7 @@ _ROUNDS = 4
 
 
 class Depth(NamedTuple):
-    """How thick the units are, and where they are looked at from.
+    """Holds the thickness of the units and the place of the camera.
 
     Attributes:
         thickness: mm.
@@ -33,11 +33,11 @@ class Depth(NamedTuple):
 
     @property
     def shrink(self) -> float:
-        """Size of a back against its face."""
+        """Returns the size of a back against its face."""
         return self.height / (self.height + self.thickness)
 
     def offset(self, centre: Floats, pose: Floats) -> Floats:
-        """From a face's centroid to that of its back as seen, (units, 2), in the unit's frame, mm.
+        """Returns the way (units, 2) from face to back centroid as seen, in the unit's frame, mm.
 
         Args:
             centre: (units, 2) at rest.
@@ -49,7 +49,7 @@ class Depth(NamedTuple):
         return np.stack([cos * x + sin * y, cos * y - sin * x], axis=1)
 
     def silhouette(self, polygon: Floats, offset: Floats) -> Floats:
-        """Outline (n, 2) of a unit with its walls, counter-clockwise.
+        """Outlines (n, 2) a unit with its walls, counter-clockwise.
 
         Args:
             polygon: (vertices, 2) of the face about its centroid.
@@ -63,13 +63,13 @@ class Depth(NamedTuple):
         return np.asarray(ring[:-1])
 
 
-def depth_of(camera: Camera, middle: Floats, thickness: float, distance: float) -> Depth:
-    """Where a camera at a known distance from the middle (2,) of the specimen stands.
+def estimate_depth(camera: Camera, middle: Floats, thickness: float, distance: float) -> Depth:
+    """Estimates the place of a camera at a known distance from the specimen's middle (2,).
 
     The homography alone tells the focal length badly when the camera looks straight on; with the
     distance it tells the pose well.
     """
-    scale = float(np.sqrt(np.abs(np.linalg.det(camera.jacobian(middle[None])[0]))))
+    scale = float(camera.px_per_mm(middle[None])[0])
     axis, focal = (np.array(camera.size) - 1) / 2, scale * distance
     eye = np.array([*middle, distance])
     for _ in range(_ROUNDS):
@@ -79,7 +79,7 @@ def depth_of(camera: Camera, middle: Floats, thickness: float, distance: float) 
 
 
 def _eye(homography: Floats, axis: Floats, focal: float) -> Floats:
-    """Centre of projection (3,) of a camera with this focal length, px."""
+    """Returns the centre of projection (3,) of a camera with this focal length, px."""
     inner = np.array([[focal, 0.0, axis[0]], [0.0, focal, axis[1]], [0.0, 0.0, 1.0]])
     columns = np.linalg.inv(inner) @ homography
     columns *= 2 / (np.linalg.norm(columns[:, 0]) + np.linalg.norm(columns[:, 1]))

@@ -1,4 +1,4 @@
-"""What the tracker knows of a specimen: its units' outlines at rest and who is joined to whom."""
+"""Reads a specimen from its design: outlines of the units at rest and joined pairs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.core import Floats, Ints, Mask
 
 @dataclass(frozen=True)
 class SpecimenOutlines:
-    """The units that a video shows, in the specimen's frame.
+    """Holds the units that a video shows, in the specimen's frame.
 
     Attributes:
         ids: (units,) ids in the design; absent units are left out.
@@ -33,39 +33,33 @@ class SpecimenOutlines:
 
     @property
     def count(self) -> int:
-        """Number of units."""
+        """Counts the units."""
         return len(self.ids)
 
     @cached_property
     def area(self) -> Floats:
-        """(units,) areas of the outlines, mm^2."""
-        return np.array([_area(self.polygon(unit)) for unit in range(self.count)])
+        """Returns the areas (units,) of the outlines, mm^2."""
+        return np.array([float(np.sum(_cross(self.polygon(k))) / 2) for k in range(self.count)])
 
     @cached_property
     def radius(self) -> Floats:
-        """(units,) distance of the farthest vertex from the centroid, mm."""
+        """Returns the distance (units,) of the farthest vertex from the centroid, mm."""
         return np.nanmax(np.linalg.norm(self.outline, axis=2), axis=1)
 
     @cached_property
     def pitch(self) -> float:
-        """Median distance of joined units, mm."""
+        """Returns the median distance of joined units, mm."""
         ends = self.centre[self.joint]
         return float(np.median(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
 
-    @cached_property
-    def neighbours(self) -> list[Ints]:
-        """Units joined to each unit."""
-        pairs = np.concatenate([self.joint, self.joint[:, ::-1]])
-        return [pairs[pairs[:, 0] == unit, 1] for unit in range(self.count)]
-
     def polygon(self, unit: int) -> Floats:
-        """Vertices of a unit relative to its centroid, without padding, mm."""
+        """Returns the vertices of a unit relative to its centroid, without padding, mm."""
         outline = self.outline[unit]
         return outline[~np.isnan(outline[:, 0])]
 
 
 def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
-    """The design with the vertices of one of its structures: intact, altered or cloaked."""
+    """Gives a design the vertices of one of its structures: intact, altered or cloaked."""
     if structure == "cloaked":
         return design
     vertices = design["vertices_initial"]
@@ -75,8 +69,8 @@ def as_built(design: xr.Dataset, structure: str) -> xr.Dataset:
     return design.assign(vertices=vertices)
 
 
-def of_design(design: xr.Dataset) -> SpecimenOutlines:
-    """The specimen of a design dataset; units without vertices are absent."""
+def outlines_of_design(design: xr.Dataset) -> SpecimenOutlines:
+    """Reads the specimen of a design dataset; units without vertices are absent."""
     vertices = design["vertices"].transpose("unit", "vertex", "xy").values
     present = ~np.isnan(vertices[:, 0, 0])
     place = np.cumsum(present) - 1
@@ -94,12 +88,13 @@ def of_design(design: xr.Dataset) -> SpecimenOutlines:
     )
 
 
-def _area(polygon: Floats) -> float:
-    following = np.roll(polygon, -1, axis=0)
-    return float(np.sum(polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]) / 2)
-
-
 def _centroid(polygon: Floats) -> Floats:
+    cross = _cross(polygon)
     following = np.roll(polygon, -1, axis=0)
-    cross = polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]
     return ((polygon + following) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
+
+
+def _cross(polygon: Floats) -> Floats:
+    """Returns the cross products (n,) of vertices with those after them."""
+    following = np.roll(polygon, -1, axis=0)
+    return polygon[:, 0] * following[:, 1] - polygon[:, 1] * following[:, 0]

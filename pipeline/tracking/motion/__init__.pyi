@@ -1,2 +1,2 @@
-from .track_video import Track as Track
-from .track_video import follow as follow
+from .video_tracking import Track as Track
+from .video_tracking import track_video as track_video

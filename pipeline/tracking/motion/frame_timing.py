@@ -1,4 +1,4 @@
-"""Dropped and duplicated frames, found by the motion itself."""
+"""Finds dropped and duplicated frames by the motion itself."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
 
-def faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
-    """The timing (frames,) of every frame.
+def timing_faults(time: Floats, motion: Floats, sigma: Floats) -> Ints:
+    """Classifies the timing (frames,) of every frame.
 
     A frame that repeats the one before has no step where those about it have one. After a gap the
     motion goes on smoothly, but only if the frames from there on are later than they say. Where the
@@ -65,14 +65,14 @@ def _repeated(place: Floats, noise: Floats) -> Mask:
 
 
 def _rests(step: Floats, about: Floats) -> bool:
-    """Whether others of the steps about are none either: the specimen moves by fits and starts."""
+    """Checks for other steps about that are none either: motion by fits and starts."""
     known = np.isfinite(step).all(axis=-1) & np.isfinite(about).all(axis=(0, 2))
     length = np.sqrt(np.mean(about[:, known] ** 2, axis=(1, 2)))
     return bool((length < _STILL * np.median(length)).any())
 
 
 def _stands(step: Floats, before: Floats, after: Floats, noise: float) -> bool:
-    """Whether a step is none, although those before and after are alike and can be seen."""
+    """Checks that a step is none, although those before and after are alike and can be seen."""
     about = np.concatenate([before, after])
     known = np.isfinite(step).all(axis=-1) & np.isfinite(about).all(axis=(0, 2))
     if not known.any():
@@ -86,7 +86,7 @@ def _stands(step: Floats, before: Floats, after: Floats, noise: float) -> bool:
 
 
 def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
-    """Frames that come later than they say, by a frame or two."""
+    """Finds frames that come later than they say, by a frame or two."""
     out = np.zeros(len(place), dtype=bool)
     shown = np.nonzero(~repeated)[0]
     interval = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
@@ -108,7 +108,7 @@ def _late(time: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
 
 
 def _goes_on(motion: Floats) -> bool:
-    """Whether motions (frames, n) are about as quick in the second half as in the first."""
+    """Checks that motions (frames, n) are about as quick in the second half as in the first."""
     steps = np.sqrt(np.mean(np.diff(motion, axis=0) ** 2, axis=1))
     half = len(motion) // 2
     before, after = np.median(steps[: half - 1]), np.median(steps[half:])
@@ -116,7 +116,7 @@ def _goes_on(motion: Floats) -> bool:
 
 
 def _roughness(clock: Floats, motion: Floats) -> float:
-    """Mean square of what motions (frames, n) are off polynomials in time."""
+    """Returns the mean square of what motions (frames, n) are off polynomials in time."""
     basis = np.linalg.qr(np.vander((clock - clock.mean()) / np.ptp(clock), _DEGREE + 1))[0]
     rest = motion - basis @ (basis.T @ motion)
     return float(np.mean(rest**2))

@@ -1,4 +1,4 @@
-"""What units of a specimen do together: a few shapes, whose amplitudes change in time.
+"""Separates what units do together: a few shapes, whose amplitudes change in time.
 
 Neighbours share most of them. Those of a structure with rough motions they do not share, but then
 these stand far above what noise alone makes up.
@@ -28,8 +28,8 @@ _LITTLE_MORE = 1.3
 _JOLT = 3.0
 
 
-class Shapes(NamedTuple):
-    """Motions taken apart.
+class MotionModes(NamedTuple):
+    """Holds motions taken apart.
 
     Attributes:
         amplitude: (frames, n).
@@ -42,8 +42,8 @@ class Shapes(NamedTuple):
     rest: Floats
 
 
-def apart(motion: Floats, near: Ints, noise: float) -> Shapes:
-    """The shapes of one degree of freedom.
+def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
+    """Separates the shapes of one degree of freedom.
 
     What is missing is filled in time first, then by the shapes themselves, until it stays.
 
@@ -61,11 +61,11 @@ def apart(motion: Floats, near: Ints, noise: float) -> Shapes:
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
         full = np.where(known, motion, low)
-    return Shapes(amplitude, shape, full - low)
+    return MotionModes(amplitude, shape, full - low)
 
 
 def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
-    """How many of the first singular vectors are shapes of motion."""
+    """Counts the first singular vectors that are shapes of motion."""
     for count, (above, vector) in enumerate(zip(height, vectors, strict=False)):
         if above < _ABOVE and abs(_likeness(vector, near)) < _SMOOTH:
             return count
@@ -73,7 +73,7 @@ def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
 
 
 def _filled(motion: Floats) -> Floats:
-    """Missing values by those before and after, in time."""
+    """Fills missing values by those before and after, in time."""
     out = motion.copy()
     frames = np.arange(len(motion))
     for unit in np.nonzero(~np.isfinite(motion).all(axis=0))[0]:
@@ -83,25 +83,25 @@ def _filled(motion: Floats) -> Floats:
 
 
 def _likeness(shape: Floats, near: Ints) -> float:
-    """Correlation of a field over the units with the mean of the nearest ones."""
+    """Correlates a field over the units with the mean of the nearest ones."""
     around = shape[near].mean(axis=1)
     scale = np.sqrt((shape @ shape) * (around @ around))
     return float(shape @ around / scale) if scale > 0 else 0.0
 
 
 def leverage(columns: Floats) -> Floats:
-    """Share (n,) of each row's freedom that a fit of the columns takes."""
+    """Returns the share (n,) of each row's freedom that a fit of the columns takes."""
     return np.sum(np.linalg.qr(columns)[0] ** 2, axis=1)
 
 
-def steadiness(amplitude: Floats) -> float:
-    """Share of what stays the same in all frames that the amplitudes (frames, n) can take up."""
+def constant_share(amplitude: Floats) -> float:
+    """Returns the share of a constant that the amplitudes (frames, n) can take up."""
     basis = np.linalg.qr(amplitude)[0]
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def rough(amplitude: Floats, steady: Mask) -> Floats:
-    """What amplitudes (frames, n) are off polynomials through those beside, in one frame's noise.
+def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
+    """Measures amplitudes (frames, n) against polynomials through those beside, per frame.
 
     The order is the lowest that leaves little more than the next ones: more is motion. A jolt is
     motion too, so values are held to a few times the usual; frames at the ends are as the next.

@@ -1,11 +1,11 @@
-"""Where units are likely to be: from their own past, and from how their neighbours moved."""
+"""Predicts units from their own past, and from how their neighbours moved."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from pipeline.tracking.geometry import rigid_motion
+from pipeline.tracking.geometry import rigid_motion, rotation_matrix
 from sim.core import Floats, Mask
 
 _NEAREST = 6
@@ -21,8 +21,8 @@ class Neighbourhood:
     def __init__(self, centre: Floats) -> None:
         self._centre = centre
 
-    def carried(self, known: Floats, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Poses of the wanted units if they moved rigidly with the nearest good ones.
+    def predict_rigid(self, known: Floats, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Predicts poses of the wanted units that move rigidly with the nearest good ones.
 
         Args:
             known: (units, 3) poses that all had before.
@@ -43,15 +43,14 @@ class Neighbourhood:
         for unit in np.nonzero(wanted & np.isfinite(known[:, 0]))[0]:
             near = places[tree.query(old[unit], k=min(_NEAREST, len(places)))[1]]
             turn, shift = rigid_motion(old[near], new[near])
-            cos, sin = np.cos(turn), np.sin(turn)
-            moved = np.array([[cos, -sin], [sin, cos]]) @ old[unit] + shift
+            moved = rotation_matrix(turn) @ old[unit] + shift
             out[unit] = (*(moved - self._centre[unit]), known[unit, 2] + turn)
         return out
 
-    def stretched(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Displacements (units, 2) of the wanted units if they moved affinely with the good ones.
+    def predict_affine(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Predicts displacements (units, 2) of wanted units that move affinely with the good ones.
 
-        Other than `carried` it needs no past, and so does not drift while a unit is hidden.
+        Other than `predict_rigid` it needs no past, and so does not drift while a unit is hidden.
         """
         out = np.full((len(found), 2), np.nan)
         places = np.nonzero(good)[0]
@@ -64,8 +63,8 @@ class Neighbourhood:
             out[unit] = np.linalg.lstsq(rows, found[near, :2], rcond=None)[0][2]
         return out
 
-    def turned(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
-        """Size (units,) of the rotation of the good units about each wanted one, median, rad."""
+    def rotation_size(self, found: Floats, good: Mask, wanted: Mask) -> Floats:
+        """Returns the median rotation (units,) of the good units about each wanted one, rad."""
         out = np.full(len(found), np.nan)
         places = np.nonzero(good)[0]
         if len(places) < _NEAREST:
@@ -76,8 +75,8 @@ class Neighbourhood:
             out[unit] = np.median(np.abs(found[near, 2]))
         return out
 
-    def strayed(self, found: Floats, good: Mask, most: float) -> Mask:
-        """Which good units are farther than ``most`` (mm) from where their neighbours carry them.
+    def outliers(self, found: Floats, good: Mask, most: float) -> Mask:
+        """Finds good units farther than ``most`` (mm) from where their neighbours carry them.
 
         Only the nearest ones vote, and an affine map of them, so that strain is no stray.
         """

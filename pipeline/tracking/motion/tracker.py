@@ -1,4 +1,4 @@
-"""The units of a specimen from frame to frame: predicted, fitted, judged, and found again."""
+"""Tracks units from frame to frame: predicted, fitted, judged, and relocalised."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import Recovery
-from pipeline.tracking.fit import Fits, Fitter, Walls
+from pipeline.tracking.detect import Relocaliser
+from pipeline.tracking.fit import PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.prediction import Neighbourhood
 from sim.core import Floats, Ints, Mask
@@ -38,14 +38,14 @@ _RETRIES = 4
 
 
 class TrackedFrame(NamedTuple):
-    """A frame's outcome.
+    """Holds the outcome of a frame.
 
     Attributes:
         fits: poses and what is known of them; NaN where not found.
         quality: (units,) GOOD or the reason.
     """
 
-    fits: Fits
+    fits: PoseFits
     quality: Ints
 
 
@@ -55,21 +55,21 @@ class Tracker:
     Args:
         specimen: the units.
         fitter: the camera and the units' looks; the first frame is its reference.
-        recovery: finds the lattice where prediction fails.
+        relocaliser: finds the lattice where prediction fails.
         walls: of thick units.
     """
 
     def __init__(
         self,
         specimen: SpecimenOutlines,
-        fitter: Fitter,
-        recovery: Recovery,
-        walls: Walls | None = None,
+        fitter: PoseFitter,
+        relocaliser: Relocaliser,
+        walls: SideWalls | None = None,
     ) -> None:
-        self._fitter, self._recovery, self._walls = fitter, recovery, walls
-        self._pitch = specimen.pitch
+        self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
+        self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
-        self._centre, self._radius = specimen.centre, specimen.radius
+        self._centre = specimen.centre
         self._pose, self._photometry = fitter.start(1.0)
         self._velocity = np.zeros_like(self._pose)
         self._gain = np.empty(0)
@@ -80,27 +80,30 @@ class Tracker:
 
     def step(self, image: Picture) -> TrackedFrame:
         """Finds the units in the next frame."""
-        ahead = self._pose + self._velocity
-        if self._walls is not None:
-            self._walls.follow(ahead)
-        found = self._fitter.fit(image, ahead, self._photometry, noise=self._usual)
-        fits = Fits(*(values.copy() for values in found))
+        found = self._fitter.fit(image, self._predicted(), self._photometry, noise=self._usual)
+        fits = found.copy()
         first = not len(self._gain)
         if first:
-            self._refer(fits)
-        good = self._judged(fits, _SHARE)
-        good = self._completed(image, fits, good)
+            self._set_reference(fits)
+        good = self._complete(image, fits, self._accepted(fits, _SHARE))
         jumped = good.sum() < _FEW * self._seen
         if jumped:
-            fits, good = self._recovered(image, fits, good)
+            fits, good = self._relocalise(image, fits, good)
         self._seen = int(good.sum())
         quality = self._reasons(fits, good)
         for values in fits:
             values[~good] = np.nan
-        self._remember(fits, good, first or jumped)
+        self._update(fits, good, first or jumped)
         return TrackedFrame(fits, quality)
 
-    def _refer(self, fits: Fits) -> None:
+    def _predicted(self) -> Floats:
+        """Extrapolates the poses by their velocities, and redraws the walls there."""
+        ahead = self._pose + self._velocity
+        if self._walls is not None:
+            self._walls.redraw(ahead)
+        return ahead
+
+    def _set_reference(self, fits: PoseFits) -> None:
         """Takes the first frame as what a unit seen whole looks like."""
         gain = np.abs(fits.photometry[:, 0])
         relative = fits.noise / gain
@@ -111,7 +114,7 @@ class Tracker:
         self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
         self._fitter.full = np.nan_to_num(fits.information)
 
-    def _judged(self, fits: Fits, share: float) -> Mask:
+    def _accepted(self, fits: PoseFits, share: float) -> Mask:
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -119,97 +122,94 @@ class Tracker:
         seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
 
-    def _completed(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
         if not good.any():
             return good
-        return self._uncover(image, fits, self._spread(image, fits, good))
+        return self._retry_hidden(image, fits, self._propagate(image, fits, good))
 
-    def _recovered(self, image: Picture, fits: Fits, good: Mask) -> tuple[Fits, Mask]:
+    def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
-        again, new = Fits(*(values.copy() for values in fits)), np.zeros_like(good)
-        for guess in self._recovery.guesses(image, self._pose):
-            new = self._tried(image, again, new, (guess, self._photometry, None, _SHARE))
-        new = self._completed(image, again, new)
+        again, new = fits.copy(), np.zeros_like(good)
+        for guess in self._relocaliser.candidate_poses(image, self._pose):
+            new = self._try(image, again, new, (guess, self._photometry, None, _SHARE))
+        new = self._complete(image, again, new)
         return (again, new) if new.sum() > good.sum() else (fits, good)
 
-    def _spread(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _propagate(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries the units that were not found where their neighbours would have carried them."""
         for _ in range(_ROUNDS):
-            good &= ~self._neighbours.strayed(fits.pose, good, _STRAY * self._pitch)
-            guess = self._neighbours.carried(self._pose, fits.pose, good, ~good)
+            good &= ~self._neighbours.outliers(fits.pose, good, self._stray)
+            guess = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
             wanted = np.isfinite(guess[:, 0])
             if not wanted.any():
                 break
-            photometry = self._photometry * self._brighter(fits, good)
+            photometry = self._photometry * self._gain_change(fits, good)
             again = self._fitter.fit(image, guess, photometry, wanted)
-            new = self._judged(again, _SHARE) & wanted
+            new = self._accepted(again, _SHARE) & wanted
             if not new.any():
                 break
-            _take(fits, again, new)
+            fits.take(again, new)
             good |= new
         return good
 
-    def _uncover(self, image: Picture, fits: Fits, good: Mask) -> Mask:
+    def _retry_hidden(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries those again that may be hidden in part: place and brightness are known."""
-        photometry = self._photometry * self._brighter(fits, good)
+        photometry = self._photometry * self._gain_change(fits, good)
         tight = _TIGHT * self._noise * np.abs(photometry[:, 0])
         for _ in range(_RETRIES):
             if good.all():
                 break
             before = int(good.sum())
-            for guess in self._guesses(fits, good):
+            for guess in self._hidden_poses(fits, good):
                 for least, scale in ((_SHARE, None), (_SHARE_KNOWN, tight)):
-                    good = self._tried(image, fits, good, (guess, photometry, scale, least))
+                    good = self._try(image, fits, good, (guess, photometry, scale, least))
             if good.sum() == before:
                 break
         return good
 
-    def _tried(
+    def _try(
         self,
         image: Picture,
-        fits: Fits,
+        fits: PoseFits,
         good: Mask,
         trial: tuple[Floats, Floats, Floats | None, float],
     ) -> Mask:
-        """Fits what is not good from a guess and keeps what is judged well and has not strayed."""
+        """Fits what is not good from a guess and keeps what is accepted and has not strayed."""
         guess, photometry, tight, least = trial
         wanted = ~good & np.isfinite(guess[:, 0])
         if not wanted.any():
             return good
         again = self._fitter.fit(image, guess, photometry, wanted, tight)
-        new = self._judged(again, least) & wanted
-        both = Fits(*(values.copy() for values in fits))
-        _take(both, again, new)
-        new &= ~self._neighbours.strayed(both.pose, good | new, _STRAY * self._pitch)
-        _take(fits, again, new)
+        new = self._accepted(again, least) & wanted
+        both = fits.copy()
+        both.take(again, new)
+        new &= ~self._neighbours.outliers(both.pose, good | new, self._stray)
+        fits.take(again, new)
         return good | new
 
-    def _guesses(self, fits: Fits, good: Mask) -> Iterator[Floats]:
-        """Poses that hidden units may have: carried on, or stretched with those that are seen.
+    def _hidden_poses(self, fits: PoseFits, good: Mask) -> Iterator[Floats]:
+        """Guesses poses of hidden units: carried on, or stretched with those that are seen.
 
         Units of these lattices turn with or against their neighbours, so both are tried.
         """
-        carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
-        ahead = self._pose + self._velocity
-        if self._walls is not None:
-            self._walls.follow(ahead)
+        carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
+        ahead = self._predicted()
         yield np.where(np.isfinite(carried), carried, ahead)
         yield ahead
-        place = self._neighbours.stretched(fits.pose, good, ~good)
-        turn = self._neighbours.turned(fits.pose, good, ~good)
+        place = self._neighbours.predict_affine(fits.pose, good, ~good)
+        turn = self._neighbours.rotation_size(fits.pose, good, ~good)
         for angle in (turn, -turn, np.zeros_like(turn)):
             yield np.column_stack([place, angle])
 
-    def _brighter(self, fits: Fits, good: Mask) -> float:
-        """How much brighter the frame is than the one before."""
+    def _gain_change(self, fits: PoseFits, good: Mask) -> float:
+        """Measures how much brighter the frame is than the one before."""
         if not good.any():
             return 1.0
         return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
 
-    def _reasons(self, fits: Fits, good: Mask) -> Ints:
-        place = self._centre + self._pose[:, :2]
-        middle = self._fitter.camera.project(place)
+    def _reasons(self, fits: PoseFits, good: Mask) -> Ints:
+        middle = self._fitter.camera.project(self._centre + self._pose[:, :2])
         width, height = self._fitter.camera.size
         inside = (middle > 0).all(axis=1) & (middle < [width - 1, height - 1]).all(axis=1)
         relative = fits.photometry[:, 0] / self._gain
@@ -220,20 +220,15 @@ class Tracker:
         reasons[good] = GOOD
         return reasons
 
-    def _remember(self, fits: Fits, good: Mask, still: bool) -> None:
-        carried = self._neighbours.carried(self._pose, fits.pose, good, ~good)
+    def _update(self, fits: PoseFits, good: Mask, still: bool) -> None:
+        carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
         lost = np.where(np.isfinite(carried), carried, self._pose)
         pose = np.where(good[:, None], fits.pose, lost)
         self._velocity = np.where(good[:, None] & (not still), pose - self._pose, 0.0)
         self._photometry = np.where(
-            good[:, None], fits.photometry, self._photometry * self._brighter(fits, good)
+            good[:, None], fits.photometry, self._photometry * self._gain_change(fits, good)
         )
         relative = fits.noise / np.abs(fits.photometry[:, 0])
         if not still:
             self._usual = np.where(good, relative, self._usual)
         self._pose = pose
-
-
-def _take(fits: Fits, other: Fits, chosen: Mask) -> None:
-    for values, new in zip(fits, other, strict=True):
-        values[chosen] = new[chosen]

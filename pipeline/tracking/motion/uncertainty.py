@@ -1,4 +1,4 @@
-"""Standard uncertainties that hold: from the image, scaled by what the motions themselves show.
+"""Calibrates standard uncertainties of the image by what the motions themselves show.
 
 A codec moves whole units by errors that leave no trace in a frame's residuals. But it moves each by
 its own, while the specimen moves in a few shapes. What is left of the motions without these is
@@ -35,14 +35,14 @@ _OWN = 0.3
 
 
 def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
-    """Standard deviations (..., 3) from the covariance of blocks, corrected for what was fitted."""
+    """Returns standard errors (..., 3) of the covariance of blocks, corrected for the fit."""
     freedom = blocks / np.maximum(blocks - _PARAMETERS, 1)
     variance = np.einsum("...ii->...i", scatter) * freedom[..., None]
     return np.sqrt(variance)
 
 
-def calibrated(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
-    """The standard uncertainties, scaled so that they tell the scatter of the motions.
+def calibrate_sigma(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
+    """Scales the standard uncertainties so that they tell the scatter of the motions.
 
     Args:
         motion: (frames, units, 3) poses, NaN where missing.
@@ -65,7 +65,7 @@ def calibrated(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Rea
 
 
 def _calmed(sigma: Floats) -> Floats:
-    """The image's figures, each drawn near to what is usual for its frame and its unit.
+    """Draws the image's figures near to what is usual for frame and unit.
 
     A figure comes from some tens of blocks and scatters by a fifth, most of which says nothing.
     """
@@ -78,11 +78,11 @@ def _calmed(sigma: Floats) -> Floats:
 
 
 def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
-    """By how much (frames, units) the uncertainties of one degree of freedom are too small."""
+    """Returns factors (frames, units) by which uncertainties of one dof are too small."""
     usual = np.full(motion.shape, np.sqrt(_USUAL))
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
         return usual
-    found = motion_modes.apart(motion, near, float(np.nanmedian(sigma)))
+    found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
     ratio = _ratio(np.isfinite(motion), sigma, found, steady)
     if not np.isfinite(ratio).any():
         return usual
@@ -90,15 +90,15 @@ def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
     by_frame = _shrunk(ratio, level, 1)
     by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
     belief = (level * len(ratio) + _USUAL * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
-    reference = motion_modes.steadiness(found.amplitude)
+    reference = motion_modes.constant_share(found.amplitude)
     return np.sqrt(by_frame[:, None] * by_unit[None, :] * belief / level + reference)
 
 
-def _ratio(known: Mask, sigma: Floats, found: motion_modes.Shapes, steady: Mask) -> Floats:
-    """Squared noise over the image's variance (frames, units), NaN where there is none to see."""
+def _ratio(known: Mask, sigma: Floats, found: motion_modes.MotionModes, steady: Mask) -> Floats:
+    """Returns squared noise over the image's variance (frames, units), NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
-    jitter = motion_modes.rough(found.amplitude, steady) @ found.shape
+    jitter = motion_modes.amplitude_jitter(found.amplitude, steady) @ found.shape
     spread = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM) + jitter**2
     ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
     if not np.isfinite(ratio).any():

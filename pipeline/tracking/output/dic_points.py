@@ -1,4 +1,4 @@
-"""Points with displacements, as commercial DIC systems export them, to motions of the units."""
+"""Converts points with displacements, as DIC systems export them, to motions of the units."""
 
 from __future__ import annotations
 
@@ -11,21 +11,25 @@ import xarray as xr
 from pydantic import Field
 
 from pipeline.datasets.tables import TABLES
-from pipeline.problem.fields import Angle, Coordinate, Section
-from pipeline.problem.reading import section
+from pipeline.problem.fields import Angle, Coordinate, Section, csv_columns
+from pipeline.problem.reading import load_section
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import csv_columns as columns
-from pipeline.tracking.geometry import SpecimenOutlines, of_design, robust_motion
-from pipeline.tracking.output.track_dataset import absent, labelled, spread
+from pipeline.tracking.geometry import (
+    SpecimenOutlines,
+    outlines_of_design,
+    robust_motion,
+    rotation_matrix,
+)
+from pipeline.tracking.output.track_dataset import label_track, pose_variables
 from sim.core import Floats, Ints
 
 _FINEST = 1e-4  # mm, standard deviation of the best points
 _LEAST = 3  # points of a unit
 
-Name = Annotated[str, Field(min_length=1)]
+ColumnName = Annotated[str, Field(min_length=1)]
 
 
-class Columns(Section):
+class DicColumns(Section):
     """Names of the columns.
 
     Attributes:
@@ -36,14 +40,14 @@ class Columns(Section):
         uy: likewise.
     """
 
-    time: Name = "time"
-    x: Name = "x"
-    y: Name = "y"
-    ux: Name = "u"
-    uy: Name = "v"
+    time: ColumnName = "time"
+    x: ColumnName = "x"
+    y: ColumnName = "y"
+    ux: ColumnName = "u"
+    uy: ColumnName = "v"
 
 
-class Points(Section):
+class DicExport(Section):
     """A file of points, and how its axes lie on the specimen.
 
     Attributes:
@@ -59,18 +63,18 @@ class Points(Section):
     """
 
     title: str = ""
-    points: Name
-    columns: Columns = Columns()
+    points: ColumnName
+    columns: DicColumns = DicColumns()
     origin: tuple[Coordinate, Coordinate] = (0.0, 0.0)
     rotation: Angle = 0.0
     flipped: bool = False
-    design: Name | None = None
+    design: ColumnName | None = None
     structure: Literal["intact", "altered", "cloaked"] = "cloaked"
     synthetic: bool = False
 
 
-class Cloud(NamedTuple):
-    """Points in the specimen's frame, one row a point and time.
+class DicPoints(NamedTuple):
+    """Holds points in the specimen's frame, one row a point and time.
 
     Attributes:
         time: (rows,) s.
@@ -83,32 +87,31 @@ class Cloud(NamedTuple):
     moved: Floats
 
 
-def load(path: Path) -> Points:
-    """The description in a YAML file.
+def load(path: Path) -> DicExport:
+    """Loads the description in a YAML file.
 
     Raises:
         UserError: naming the file, the key, the value and the remedy.
     """
-    return section(path, Points)
+    return load_section(path, DicExport)
 
 
-def cloud(path: Path, asked: Points) -> Cloud:
-    """The points of a file in the specimen's frame.
+def read_points(path: Path, asked: DicExport) -> DicPoints:
+    """Reads the points of a file in the specimen's frame.
 
     Raises:
         UserError: the file cannot be read, or lacks a column.
     """
     names = asked.columns
-    table = columns.read(path, (names.time, names.x, names.y, names.ux, names.uy))
-    cos, sin = np.cos(asked.rotation), np.sin(asked.rotation)
+    table = csv_columns.read_columns(path, (names.time, names.x, names.y, names.ux, names.uy))
     upright = np.array([1.0, -1.0 if asked.flipped else 1.0])
-    turn = np.array([[cos, -sin], [sin, cos]])
+    turn = rotation_matrix(asked.rotation)
     place = (table[:, 1:3] - np.array(asked.origin)) * upright @ turn
-    return Cloud(table[:, 0], place, table[:, 3:5] * upright @ turn)
+    return DicPoints(table[:, 0], place, table[:, 3:5] * upright @ turn)
 
 
-def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
-    """The dataset ``track`` of points: a robust rigid fit for each unit and time.
+def track(design: xr.Dataset, seen: DicPoints) -> xr.Dataset:
+    """Makes the dataset ``track`` of points: a robust rigid fit for each unit and time.
 
     A unit's motion is taken from the points that lie on it at rest. Its uncertainty follows from
     how far they are from moving rigidly.
@@ -120,7 +123,7 @@ def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
     Raises:
         UserError: hardly a unit bears points.
     """
-    specimen = of_design(design)
+    specimen = outlines_of_design(design)
     unit = _bearer(specimen, seen.place)
     bearing = len(np.unique(unit[unit >= 0]))
     if bearing < max(3, specimen.count // 10):
@@ -146,7 +149,7 @@ def track(design: xr.Dataset, seen: Cloud) -> xr.Dataset:
 
 
 def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
-    """The unit (rows,) on which each point lies at rest, -1 for none."""
+    """Finds the unit (rows,) on which each point lies at rest, -1 for none."""
     faces = [
         shapely.Polygon(specimen.centre[unit] + specimen.polygon(unit))
         for unit in range(specimen.count)
@@ -158,10 +161,9 @@ def _bearer(specimen: SpecimenOutlines, place: Floats) -> Ints:
 
 
 def _fitted(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Pose and its standard uncertainty (3,), from points relative to the centroid at rest."""
+    """Fits pose and standard uncertainty (3,) to points relative to the centroid at rest."""
     turn, shift, weight = robust_motion(before, after, _FINEST)
-    cos, sin = np.cos(turn), np.sin(turn)
-    rest = after - before @ np.array([[cos, sin], [-sin, cos]]) - shift
+    rest = after - before @ rotation_matrix(-turn) - shift
     count = weight.sum()
     middle = weight @ before / count
     arm = weight @ ((before - middle) ** 2).sum(axis=1)
@@ -176,15 +178,11 @@ def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) ->
     present = np.isfinite(design["vertices"].values[:, 0, 0])
     hidden = TABLES["track"]["quality"].flags["hidden"]
     quality = np.where(np.isfinite(motion[..., 0]), 0, hidden).astype(np.int8)
-    pose, frames = ("time", "unit", "dof"), ("time",)
-    unknown = np.full(len(time), np.nan)
     variables = {
-        "displacement": (pose, spread(motion, present, np.nan)),
-        "sigma": (pose, spread(sigma, present, np.nan)),
-        "quality": (pose[:2], spread(quality, present, absent())),
-        "timing": (frames, np.zeros(len(time), np.int8)),
-        "frame": (frames, np.arange(len(time))),
-        "load_force": (frames, unknown),
+        **pose_variables(present, motion, sigma, quality),
+        "timing": (("time",), np.zeros(len(time), np.int8)),
+        "frame": (("time",), np.arange(len(time))),
+        "load_force": (("time",), np.full(len(time), np.nan)),
         "camera_homography": (("row", "column"), np.full((3, 3), np.nan)),
         "camera_centre": (("xy",), np.full(2, np.nan)),
         "camera_radial": (("power",), np.full(2, np.nan)),
@@ -192,4 +190,4 @@ def _dataset(design: xr.Dataset, time: Floats, motion: Floats, sigma: Floats) ->
         "image_size": (("xy",), np.zeros(2, int)),
         "blur": ((), np.nan),
     }
-    return labelled(design, time, variables)
+    return label_track(design, time, variables)

@@ -1,18 +1,29 @@
-"""The camera and its blur, from one frame that shows the specimen at rest."""
+"""Calibrates the camera and its blur by one frame that shows the specimen at rest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import Sighting, refined
-from pipeline.tracking.fit import Fits, Fitter, TemplateGrid, Templates, outlines, plane_of
-from pipeline.tracking.geometry import Camera, Depth, SpecimenOutlines, depth_of
-from pipeline.tracking.geometry import camera as cameras
-from sim.core import Floats, Ints
+from pipeline.tracking.detect import LatticeDetection, with_distortion
+from pipeline.tracking.fit import (
+    PoseFits,
+    PoseFitter,
+    TemplateGrid,
+    Templates,
+    outline_templates,
+    pixel_plane,
+)
+from pipeline.tracking.geometry import (
+    Camera,
+    Depth,
+    SpecimenOutlines,
+    estimate_depth,
+    fit_camera,
+)
+from sim.core import Floats
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
 """Standard deviations that are tried, px."""
@@ -29,7 +40,7 @@ _EDGE_SIGMA = 0.02
 
 
 class CameraCalibration(NamedTuple):
-    """What a reference frame tells.
+    """Holds what a reference frame tells.
 
     Attributes:
         camera: refined on the outlines of the units.
@@ -49,11 +60,11 @@ class CameraCalibration(NamedTuple):
     residual: Floats
     depth: Depth | None
     bright: bool
-    outlines: Fits
+    outlines: PoseFits
 
 
-class Setup(NamedTuple):
-    """What is known of the set-up.
+class RecordingSetup(NamedTuple):
+    """Holds what is known of the set-up.
 
     Attributes:
         thickness: of the units, mm.
@@ -70,125 +81,95 @@ class Setup(NamedTuple):
     mirrored: bool | None = None
 
 
-def calibrate(
-    image: Picture, specimen: SpecimenOutlines, sighting: Sighting, setup: Setup
+def calibrate_camera(
+    image: Picture, specimen: SpecimenOutlines, detection: LatticeDetection, setup: RecordingSetup
 ) -> CameraCalibration:
-    """Refines the camera of a sighting on the outlines of all units.
+    """Refines the camera of a detection on the outlines of all units.
 
     The specimen is taken to be at rest where the design has it; what the units deviate from it
     is their own tolerance and stays in the residual. Where the set-up tells of thick units, their
     outlines are those of faces and walls together, if that is what the frame shows.
     """
-    sighting = refined(specimen, sighting)
-    pixel, gain = _pixel(specimen, sighting.camera), _gain(image, sighting)
-    plane, some = plane_of(sighting.camera), _few(specimen)
+    camera, gain = with_distortion(specimen, detection).camera, _gain(image, detection)
+    pixel, plane = _pixel(specimen, camera), pixel_plane(camera)
+    some = np.arange(0, specimen.count, -(-specimen.count // _SOME))
 
-    def fitted(depth: Depth | None) -> tuple[float, float, TemplateGrid]:
-        reach = (3 * max(BLURS) + 2) * pixel + _furthest(specimen, depth)
+    def fit_blur(depth: Depth | None) -> tuple[float, float, TemplateGrid]:
+        """Returns misfit, blur and grid; the misfit has one minimum and is followed until it."""
+        reach = (3 * max(BLURS) + 2) * pixel
+        if depth is not None:  # and as far as a back is seen from its face
+            offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
+            reach += 1.5 * float(np.linalg.norm(offset, axis=1).max())
         grid = TemplateGrid(specimen, 1 / pixel, reach, depth)
-        few = grid.of(some)
-
-        def misfit(blur: float) -> float:
-            fitter = Fitter(sighting.camera, outlines(few, blur * pixel, pixel), plane)
-            return _misfit(image, fitter, gain)
-
-        return *_lowest(misfit, BLURS), grid
+        few, least, best = grid.of(some), np.inf, BLURS[0]
+        for blur in BLURS:
+            fitter = PoseFitter(camera, outline_templates(few, blur * pixel, pixel), plane)
+            misfit = _misfit(fitter.fit(image, *fitter.start(gain)))
+            if misfit > least:
+                break
+            least, best = misfit, blur
+        return least, best, grid
 
     depth = None
-    least, blur, grid = fitted(None)
+    least, blur, grid = fit_blur(None)
     if setup.thickness > 0:
-        middle, told = specimen.centre.mean(axis=0), setup.distance
-        for distance in _DISTANCES if told is None else (told,):
-            thick = depth_of(sighting.camera, middle, setup.thickness, distance)
-            with_walls = fitted(thick)
+        middle = specimen.centre.mean(axis=0)
+        for distance in _DISTANCES if setup.distance is None else (setup.distance,):
+            thick = estimate_depth(camera, middle, setup.thickness, distance)
+            with_walls = fit_blur(thick)
             if with_walls[0] < least:
                 depth, (least, blur, grid) = thick, with_walls
-    templates = outlines(grid, blur * pixel, pixel)
-    camera, residual, fits = _refined(image, specimen, sighting.camera, templates, gain)
+    templates = outline_templates(grid, blur * pixel, pixel)
+    for turn in range(_ROUNDS + 1):
+        fitter = PoseFitter(camera, templates)
+        fits = fitter.fit(image, *fitter.start(gain))
+        seen = camera.project(specimen.centre + fits.pose[:, :2])
+        if turn < _ROUNDS:
+            good = np.isfinite(fits.pose[:, 0])
+            places = specimen.centre[good]
+            camera = fit_camera(places, seen[good], camera.size, _EDGE_SIGMA, camera)
+    residual = seen - camera.project(specimen.centre)
     return CameraCalibration(
-        camera, grid, blur * pixel, pixel, residual, depth, sighting.bright, fits
+        camera, grid, blur * pixel, pixel, residual, depth, detection.bright, fits
     )
 
 
-def _furthest(specimen: SpecimenOutlines, depth: Depth | None) -> float:
-    """How far a back is seen from its face, at most, mm."""
-    if depth is None:
-        return 0.0
-    offset = depth.offset(specimen.centre, np.zeros((specimen.count, 3)))
-    return 1.5 * float(np.linalg.norm(offset, axis=1).max())
-
-
-def alike(image: Picture, specimen: SpecimenOutlines, sightings: list[Sighting]) -> list[Sighting]:
-    """Those of several ways to see a specimen that its outlines fit as well as any."""
-    if len(sightings) == 1:
-        return sightings
-    pixel = _pixel(specimen, sightings[0].camera)
+def best_orientations(
+    image: Picture, specimen: SpecimenOutlines, detections: list[LatticeDetection]
+) -> list[LatticeDetection]:
+    """Keeps those of several ways to see a specimen that its outlines fit as well as any."""
+    if len(detections) == 1:
+        return detections
+    pixel = _pixel(specimen, detections[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
-    templates = outlines(grid, _USUAL_BLUR * pixel, pixel)
-    wrong = [_unlikeness(image, templates, one) for one in sightings]
-    least = min(wrong)
-    return [one for one, found in zip(sightings, wrong, strict=True) if found <= _ALIKE * least]
+    templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
+    wrong = [_unlikeness(image, templates, one) for one in detections]
+    return [
+        one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
+    ]
 
 
-def _unlikeness(image: Picture, templates: Templates, sighting: Sighting) -> float:
-    """Residuals of the outlines times their rotations: outlines of others are turned to fit."""
-    fits = _outlined(image, Fitter(sighting.camera, templates), _gain(image, sighting))
+def _unlikeness(image: Picture, templates: Templates, detection: LatticeDetection) -> float:
+    """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
+    fitter = PoseFitter(detection.camera, templates)
+    fits = fitter.fit(image, *fitter.start(_gain(image, detection)))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
         return np.inf
     turned = fits.pose[found, 2]
-    return _relative(fits) * float(np.mean(np.abs(turned - np.median(turned))))
+    return _misfit(fits) * float(np.mean(np.abs(turned - np.median(turned))))
 
 
-def _few(specimen: SpecimenOutlines) -> Ints:
-    return np.arange(0, specimen.count, -(-specimen.count // _SOME))
-
-
-def _gain(image: Picture, sighting: Sighting) -> float:
+def _gain(image: Picture, detection: LatticeDetection) -> float:
     low, high = np.percentile(image, [5, 95])
-    return float(high - low) * (1 if sighting.bright else -1)
+    return float(high - low) * (1 if detection.bright else -1)
 
 
-def _misfit(image: Picture, fitter: Fitter, gain: float) -> float:
-    """Median of the residuals over the gain; infinite for units that cannot be fitted."""
-    return _relative(_outlined(image, fitter, gain))
-
-
-def _relative(fits: Fits) -> float:
+def _misfit(fits: PoseFits) -> float:
+    """Returns the median residual over the gain; infinite for units that cannot be fitted."""
     ratio = fits.noise / np.abs(fits.photometry[:, 0])
     return float(np.median(np.where(np.isfinite(ratio), ratio, np.inf)))
 
 
-def _outlined(image: Picture, fitter: Fitter, gain: float) -> Fits:
-    """Fits of all units, from where the design has them."""
-    return fitter.fit(image, *fitter.start(gain))
-
-
 def _pixel(specimen: SpecimenOutlines, camera: Camera) -> float:
-    jacobian = camera.jacobian(specimen.centre)
-    return 1 / float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
-
-
-def _refined(
-    image: Picture, specimen: SpecimenOutlines, camera: Camera, templates: Templates, gain: float
-) -> tuple[Camera, Floats, Fits]:
-    """The camera that sees the outlines where they are, what is left (units, 2), px, and fits."""
-    fits = _outlined(image, Fitter(camera, templates), gain)
-    for _ in range(_ROUNDS):
-        good = np.isfinite(fits.pose[:, 0])
-        seen = camera.project(specimen.centre + fits.pose[:, :2])
-        camera = cameras.fit(specimen.centre[good], seen[good], camera.size, _EDGE_SIGMA, camera)
-        fits = _outlined(image, Fitter(camera, templates), gain)
-    seen = camera.project(specimen.centre + fits.pose[:, :2])
-    return camera, seen - camera.project(specimen.centre), fits
-
-
-def _lowest(misfit: Callable[[float], float], values: tuple[float, ...]) -> tuple[float, float]:
-    """The least misfit, which has one minimum, and its value: stops when it rises."""
-    least, best = np.inf, values[0]
-    for value in values:
-        found = misfit(value)
-        if found > least:
-            break
-        least, best = found, value
-    return least, best
+    return 1 / float(np.median(camera.px_per_mm(specimen.centre)))

@@ -1,4 +1,4 @@
-"""A first look at a video: which units it shows, what is on them, and what it does not tell."""
+"""Proposes a recording by a first look at a video: units, markings, and what it does not tell."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ import numpy as np
 import xarray as xr
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.detect import Sighting, shown_on
-from pipeline.tracking.geometry import SpecimenOutlines, as_built, of_design
-from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, calibrate
+from pipeline.tracking.detect import LatticeDetection, classify_markings
+from pipeline.tracking.geometry import SpecimenOutlines, as_built, outlines_of_design
+from pipeline.tracking.reference_frame.camera_calibration import (
+    CameraCalibration,
+    RecordingSetup,
+    calibrate_camera,
+)
 from pipeline.tracking.reference_frame.recognition import (
-    agreeing,
-    ambiguous,
-    check,
-    inside,
-    recognised,
+    agreeing_outlines,
+    ambiguity_text,
+    check_outlines,
+    recognise,
+    units_in_frame,
 )
 from sim.core import Floats, Image
 
@@ -28,12 +32,12 @@ _GOOD, _MISSING = (60, 140, 20), (0, 123, 224)  # blue, green, red
 
 
 class Proposal(NamedTuple):
-    """What the first frame shows.
+    """Holds what the first frame shows.
 
     Attributes:
         structure: the design's structure that fits best.
         specimen: its units.
-        sighting: where they are.
+        detection: where they are.
         kind: dots, speckle or bare.
         pixel_size: mm.
         doubts: what could not be told, in words.
@@ -41,7 +45,7 @@ class Proposal(NamedTuple):
 
     structure: str
     specimen: SpecimenOutlines
-    sighting: Sighting
+    detection: LatticeDetection
     kind: str
     pixel_size: float
     doubts: tuple[str, ...]
@@ -56,82 +60,75 @@ def propose(image: Picture, design: xr.Dataset, px_per_mm: float | None = None) 
     seen, refused = [], []
     for name, specimen in _structures(design):
         try:
-            seen.append(_candidate(image, name, specimen, px_per_mm))
+            ways = recognise(image, specimen, px_per_mm, RecordingSetup())
+            calibration = calibrate_camera(image, specimen, ways[0], RecordingSetup())
+            seen.append(_Candidate(name, specimen, ways, calibration))
         except UserError as error:
             refused.append(error)
     if not seen:
         raise refused[0]
     best = max(seen, key=_share)
     specimen, calibration = best.specimen, best.calibration
-    sighting = replace(best.ways[0], camera=calibration.camera)
-    check(specimen, sighting, calibration)
+    detection = replace(best.ways[0], camera=calibration.camera)
+    check_outlines(specimen, detection, calibration)
     like = [one.name for one in seen if one != best and _share(one) > _share(best) - _CLEARLY]
-    kind = shown_on(image, specimen, sighting, 1 / calibration.pixel)
+    kind = classify_markings(image, specimen, detection, 1 / calibration.pixel)
     doubts = tuple(_doubts(best, like))
-    return Proposal(best.name, specimen, sighting, kind, calibration.pixel, doubts)
+    return Proposal(best.name, specimen, detection, kind, calibration.pixel, doubts)
 
 
 class _Candidate(NamedTuple):
-    """A structure of the design, and how it is seen."""
+    """Holds a structure of the design, and how it is seen."""
 
     name: str
     specimen: SpecimenOutlines
-    ways: list[Sighting]
+    ways: list[LatticeDetection]
     calibration: CameraCalibration
+
+    @property
+    def surplus(self) -> int:
+        """Counts patches of a unit's size that are none of the structure's units."""
+        return self.ways[0].blobs - len(self.ways[0].unit)
 
 
 def _structures(design: xr.Dataset) -> Iterator[tuple[str, SpecimenOutlines]]:
-    """Every structure of the design that differs from those before."""
+    """Yields every structure of the design that differs from those before."""
     tried: list[SpecimenOutlines] = []
     for name in ("cloaked", "altered", "intact"):
-        specimen = of_design(as_built(design, name))
+        specimen = outlines_of_design(as_built(design, name))
         if not any(
-            np.array_equal(specimen.ids, one.ids) and _alike(specimen, one) for one in tried
+            np.array_equal(specimen.ids, one.ids)
+            and np.array_equal(specimen.outline, one.outline, equal_nan=True)
+            for one in tried
         ):
             tried.append(specimen)
             yield name, specimen
 
 
-def _candidate(
-    image: Picture, name: str, specimen: SpecimenOutlines, px_per_mm: float | None
-) -> _Candidate:
-    ways = recognised(image, specimen, px_per_mm, Setup())
-    return _Candidate(name, specimen, ways, calibrate(image, specimen, ways[0], Setup()))
-
-
-def _alike(one: SpecimenOutlines, other: SpecimenOutlines) -> bool:
-    return np.array_equal(one.outline, other.outline, equal_nan=True)
-
-
 def _share(one: _Candidate) -> float:
-    """Part of the units that are as this structure has them, less what it does not have."""
-    there = inside(one.specimen, one.calibration)
-    fitting = agreeing(one.specimen, one.calibration.outlines) & there
-    return float(fitting.sum() / max(there.sum(), 1)) - _more(one) / one.specimen.count
-
-
-def _more(one: _Candidate) -> int:
-    """Patches of a unit's size that are none of the structure's units."""
-    return one.ways[0].blobs - len(one.ways[0].unit)
+    """Returns the part of the units that agree with this structure, less what it does not have."""
+    there = units_in_frame(one.specimen, one.calibration)
+    fitting = agreeing_outlines(one.specimen, one.calibration.outlines) & there
+    return float(fitting.sum() / max(there.sum(), 1)) - one.surplus / one.specimen.count
 
 
 def _doubts(best: _Candidate, like: list[str]) -> Iterator[str]:
     if like:
         yield f"structure: as many units fit {' and '.join(like)}; say which was built"
-    if more := _more(best):
+    if more := best.surplus:
         yield f"{more} patches of a unit's size that this structure does not have"
     if missing := best.specimen.count - len(best.ways[0].unit):
         yield f"{missing} units were not found at first sight (orange in the picture); tracking"
         yield "  looks for them again"
-    if doubt := ambiguous(best.ways):
+    if doubt := ambiguity_text(best.ways):
         yield f"turned, mirrored: {doubt}"
     yield "window: whether the specimen is at rest in the first frame"
     yield "case: under which load case of the study it was"
     yield "load_axis: time, or driven displacement; load_cell: none was named"
 
 
-def picture(image: Picture, found: Proposal, note: str = "") -> Image:
-    """The frame with the outlines of all units and their ids; orange where none was found.
+def draw_proposal(image: Picture, found: Proposal, note: str = "") -> Image:
+    """Draws outlines of all units and their ids on the frame; orange where none was found.
 
     Args:
         image: the frame.
@@ -142,13 +139,13 @@ def picture(image: Picture, found: Proposal, note: str = "") -> Image:
     grey = np.asarray(image, np.uint8)
     drawn = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
     drawn = cv2.cvtColor(drawn, cv2.COLOR_GRAY2BGR)
-    seen = np.isin(np.arange(found.specimen.count), found.sighting.unit)
+    seen = np.isin(np.arange(found.specimen.count), found.detection.unit)
     for unit, number in enumerate(found.specimen.ids):
         colour = _GOOD if seen[unit] else _MISSING
         corners = found.specimen.centre[unit] + found.specimen.polygon(unit)
-        outline = _at(found.sighting.camera.project(corners), scale)
+        outline = _at(found.detection.camera.project(corners), scale)
         cv2.polylines(drawn, [outline], True, colour, 2, cv2.LINE_AA)
-        x, y = _at(found.sighting.camera.project(found.specimen.centre[unit]), scale).tolist()
+        x, y = _at(found.detection.camera.project(found.specimen.centre[unit]), scale).tolist()
         _centred(drawn, str(number), (x, y), colour)
     _centred(drawn, note, (60, 16), _MISSING)
     return np.asarray(drawn, np.uint8)

@@ -1,4 +1,4 @@
-"""The specimen in a first frame: where its design has it, or refused with what is there instead."""
+"""Recognises the specimen in a first frame, or refuses it with what is there instead."""
 
 from __future__ import annotations
 
@@ -7,10 +7,20 @@ import logging
 import numpy as np
 
 from pipeline.runtime import Picture, UserError
-from pipeline.tracking.detect import Sighting, lies, placed, sight, told
-from pipeline.tracking.fit import Fits
+from pipeline.tracking.detect import (
+    LatticeDetection,
+    detect_lattice,
+    detection_summary,
+    orientation_text,
+    specimen_orientation,
+)
+from pipeline.tracking.fit import PoseFits
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.tracking.reference_frame.camera_calibration import CameraCalibration, Setup, alike
+from pipeline.tracking.reference_frame.camera_calibration import (
+    CameraCalibration,
+    RecordingSetup,
+    best_orientations,
+)
 from sim.core import Mask
 
 LOG = logging.getLogger(__name__)
@@ -31,10 +41,10 @@ _STRANGE = 0.1
 _QUARTER = np.pi / 4
 
 
-def recognised(
-    image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None, setup: Setup
-) -> list[Sighting]:
-    """The specimen in a first frame: all ways to see it that its outlines do not tell apart.
+def recognise(
+    image: Picture, specimen: SpecimenOutlines, px_per_mm: float | None, setup: RecordingSetup
+) -> list[LatticeDetection]:
+    """Finds all ways to see the specimen in a first frame that its outlines do not tell apart.
 
     Raises:
         UserError: it is not there, or not at this scale, or not as the set-up says.
@@ -45,38 +55,43 @@ def recognised(
             key="window.start",
             remedy="start where the specimen is lit",
         )
-    found = sight(image, specimen, px_per_mm)
-    if px_per_mm is not None and not _shown(found, specimen):
-        anywhere = sight(image, specimen, None)
-        if _shown(anywhere, specimen):
+    enough = _ENOUGH * specimen.count
+    found = detect_lattice(image, specimen, px_per_mm)
+    if px_per_mm is not None and len(found[0].unit) < enough:
+        anywhere = detect_lattice(image, specimen, None)
+        if len(anywhere[0].unit) >= enough:
             _check_scale(anywhere[0], specimen, px_per_mm)
             found = anywhere
-    if not _shown(found, specimen):
-        raise _another(told(found[0], specimen))
-    return _as_told(alike(image, specimen, found), setup)
+    if len(found[0].unit) < enough:
+        raise _another_design(detection_summary(found[0], specimen))
+    return _as_stated(best_orientations(image, specimen, found), setup)
 
 
-def ambiguous(ways: list[Sighting]) -> str:
-    """What to say where there are several ways to see a specimen; nothing if there is one."""
+def ambiguity_text(ways: list[LatticeDetection]) -> str:
+    """Describes several ways to see a specimen; nothing if there is one."""
     if len(ways) == 1:
         return ""
-    others = "; ".join(placed(way.camera) for way in ways[1:])
+    others = "; ".join(orientation_text(way.camera) for way in ways[1:])
     return (
-        f"the specimen is taken to be {placed(ways[0].camera)}; its lattice would look the same"
-        f" {others}: say `turned` and `mirrored` in the recording if it is"
+        f"the specimen is taken to be {orientation_text(ways[0].camera)}; its lattice would look"
+        f" the same {others}: say `turned` and `mirrored` in the recording if it is"
     )
 
 
-def check(specimen: SpecimenOutlines, sighting: Sighting, calibration: CameraCalibration) -> None:
+def check_outlines(
+    specimen: SpecimenOutlines, detection: LatticeDetection, calibration: CameraCalibration
+) -> None:
     """Refuses a first frame whose outlines are others than the design's.
 
     Raises:
         UserError: telling how many units were found, and where.
     """
-    there = inside(specimen, calibration)
-    strange = there & ~agreeing(specimen, calibration.outlines)
+    there = units_in_frame(specimen, calibration)
+    strange = there & ~agreeing_outlines(specimen, calibration.outlines)
     if strange.sum() > _STRANGE * there.sum():
-        raise _another(f"{told(sighting, specimen)}; {_named(specimen, strange)}")
+        raise _another_design(
+            f"{detection_summary(detection, specimen)}; {_named(specimen, strange)}"
+        )
     if not there.all():
         LOG.warning(
             "warning: %d units reach out of the first frame; where a whole row does, the lattice"
@@ -87,8 +102,8 @@ def check(specimen: SpecimenOutlines, sighting: Sighting, calibration: CameraCal
         LOG.warning("warning: %s in the first frame", _named(specimen, strange))
 
 
-def agreeing(specimen: SpecimenOutlines, outlines: Fits) -> Mask:
-    """Which units (units,) have the outlines that they have by design, and where it has them."""
+def agreeing_outlines(specimen: SpecimenOutlines, outlines: PoseFits) -> Mask:
+    """Marks units (units,) with the outlines of the design, where it has them."""
     ratio = outlines.noise / np.abs(outlines.photometry[:, 0])
     near = np.linalg.norm(outlines.pose[:, :2], axis=1) < _FAR * specimen.pitch
     upright = np.abs(outlines.pose[:, 2]) < _TURNED
@@ -96,8 +111,8 @@ def agreeing(specimen: SpecimenOutlines, outlines: Fits) -> Mask:
     return np.asarray(near & upright & (ratio < usual))
 
 
-def inside(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
-    """Which units (units,) lie whole in the picture."""
+def units_in_frame(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
+    """Marks units (units,) that lie whole in the picture."""
     middle = calibration.camera.project(specimen.centre)
     reach = specimen.radius[:, None] / calibration.pixel
     last = np.array(calibration.camera.size) - 1
@@ -109,7 +124,7 @@ def _named(specimen: SpecimenOutlines, strange: Mask) -> str:
     return f"{strange.sum()} units are hidden or not as the design has them ({ids})"
 
 
-def _another(seen: str) -> UserError:
+def _another_design(seen: str) -> UserError:
     return UserError(
         f"the first frame does not show this design: {seen}",
         key="design",
@@ -118,35 +133,31 @@ def _another(seen: str) -> UserError:
     )
 
 
-def _shown(found: list[Sighting], specimen: SpecimenOutlines) -> bool:
-    return len(found[0].unit) >= _ENOUGH * specimen.count
-
-
-def _as_told(found: list[Sighting], setup: Setup) -> list[Sighting]:
-    """Those of the ways to see it that are as the set-up says.
+def _as_stated(found: list[LatticeDetection], setup: RecordingSetup) -> list[LatticeDetection]:
+    """Keeps the ways to see it that are as the set-up says.
 
     Raises:
         UserError: none is.
     """
     kept = []
     for one in found:
-        turn, behind = lies(one.camera)
+        turn, behind = specimen_orientation(one.camera)
         off = 0.0 if setup.turned is None else np.angle(np.exp(1j * (turn - setup.turned)))
         if abs(off) < _QUARTER and setup.mirrored in (None, behind):
             kept.append(one)
     if not kept:
+        seen = "; ".join(orientation_text(one.camera) for one in found)
         raise UserError(
-            f"the specimen is seen otherwise: {'; '.join(placed(one.camera) for one in found)}",
+            f"the specimen is seen otherwise: {seen}",
             key="turned" if setup.turned is not None else "mirrored",
             remedy="correct it, or leave it out",
         )
     return kept
 
 
-def _check_scale(found: Sighting, specimen: SpecimenOutlines, px_per_mm: float) -> None:
+def _check_scale(found: LatticeDetection, specimen: SpecimenOutlines, px_per_mm: float) -> None:
     """Refuses a pixel size far from that which shows the specimen."""
-    jacobian = found.camera.jacobian(specimen.centre)
-    size = float(np.median(np.sqrt(np.abs(np.linalg.det(jacobian)))))
+    size = float(np.median(found.camera.px_per_mm(specimen.centre)))
     if abs(np.log(size / px_per_mm)) > _SCALE:
         raise UserError(
             f"the specimen is there, but pixels measure about {1 / size:.3g} mm on it",

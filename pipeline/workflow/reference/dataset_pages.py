@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from pipeline.datasets.tables import (
-    ATTRIBUTES,
     SCHEMA_VERSION,
-    TABLES,
-    TITLES,
+    SCHEMAS,
     Kind,
     Table,
     Variable,
@@ -48,14 +46,15 @@ Names in *italics* are coordinates.
 
 def page() -> str:
     """Writes the page, in Markdown."""
-    return HEAD + "".join(_kind(kind) for kind in TABLES)
+    return HEAD + "".join(_kind(kind) for kind in SCHEMAS)
 
 
 def _kind(kind: Kind) -> str:
-    told = table(("variable", "dimensions", "unit", "what it holds"), _rows(TABLES[kind]))
-    attributes = ", ".join(f"`{name}` ({meaning})" for name, meaning in ATTRIBUTES[kind].items())
+    schema = SCHEMAS[kind]
+    told = table(("variable", "dimensions", "unit", "what it holds"), _rows(schema.table))
+    attributes = ", ".join(f"`{name}` ({meaning})" for name, meaning in schema.attributes.items())
     more = f"\nAttributes of its own: {attributes}.\n" if attributes else ""
-    return f"\n## {kind}\n\n{TITLES[kind]}.\n\n{told}{more}"
+    return f"\n## {kind}\n\n{schema.title}.\n\n{told}{more}"
 
 
 def _rows(variables: Table) -> Iterator[tuple[str, str, str, str]]:

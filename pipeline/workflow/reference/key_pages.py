@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 from pipeline.calibration.inputs import Calibration
 from pipeline.problem import Problem
 from pipeline.problem.fields import Section, units
-from pipeline.problem.reading import Joint
+from pipeline.problem.reading import JointFigure
 from pipeline.tracking.frames import Recording
-from pipeline.tracking.output import Points
+from pipeline.tracking.output import DicExport
 from pipeline.workflow.reference.markdown import table
 
 Node = dict[str, Any]
@@ -57,11 +57,11 @@ def pages() -> dict[str, str]:
     """Writes the pages, in Markdown, by the names of their files."""
     studies = (
         File("problem.yaml", Problem, "`experiments/STUDY/problem.yaml`", PRESETS),
-        File("figure.yaml", Joint, "`experiments/FIGURE/figure.yaml`"),
+        File("figure.yaml", JointFigure, "`experiments/FIGURE/figure.yaml`"),
     )
     recordings = (
         File("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`"),
-        File("Points", Points, "In place of a video, for `python -m pipeline track points`"),
+        File("Points", DicExport, "In place of a video, for `python -m pipeline track points`"),
     )
     calibrations = (File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),)
     return {

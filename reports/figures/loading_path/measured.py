@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.comparison import reduction
+from pipeline.comparison import compute_reduction
 from reports.base import style
 from reports.facts import MEASURED, Fact, intervals, number, share
 from reports.figures.loading_path import measures
@@ -20,11 +20,7 @@ from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]
 
-_NAMES = {
-    "rotation": "mean_rotation",
-    "mismatch": "mimicking_error",
-    "contraction": "contraction",
-}
+_NAMES = {"rotation": "mean_rotation", "mismatch": "mimicking_error", "contraction": "contraction"}
 """What comparisons follow, by the key of the report's measure."""
 _ENDS = ("low", "high")
 _SIDES = ("measured", "simulated")
@@ -156,5 +152,5 @@ def _change(
     ends = []
     for side in _SIDES:
         of = {each.structure: _at_the_end(each, path, key, side) for each in study.recordings}
-        ends.append(np.sort(100 * sign * reduction(*(of[name] for name in between))[1:]))
+        ends.append(np.sort(100 * sign * compute_reduction(*(of[name] for name in between))[1:]))
     return intervals(ends[0], ends[1], " %")

@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline import problem
 from pipeline.problem import Problem
-from pipeline.problem.sections import Word, numbered, taken_apart
+from pipeline.problem.sections import SettingValue, design_name, split_value
 from pipeline.runtime import UserError
 from reports.facts import measures
 from reports.study import CLOAK, ReportScene, StudyResults
@@ -26,7 +26,7 @@ class SeriesDesign:
     """One of the designs: the value of the parameter, in words, and its study."""
 
     number: int
-    word: Word
+    word: SettingValue
     study: StudyResults
 
     @property
@@ -80,7 +80,7 @@ class DesignSeries:
     @property
     def axis(self) -> tuple[Floats, str]:
         """Values of the parameter and what they are, for an axis; a radius in spacings."""
-        found = [taken_apart(design.word) for design in self.designs]
+        found = [split_value(design.word) for design in self.designs]
         values = np.array([number for number, _ in filter(None, found)])
         unit = next((unit for _, unit in filter(None, found)), "")
         if self.key == RADIUS and unit == "mm":
@@ -107,13 +107,13 @@ def load(path: Path, preset: str | None, results: Path) -> DesignSeries:
         )
         raise UserError("the problem asks for one design", file=path, key="designs", remedy=remedy)
     ((key, words),) = asked.designs.items()
-    if any(taken_apart(word) is None for word in words):
+    if any(split_value(word) is None for word in words):
         remedy = "vary a parameter that is a number"
         raise UserError("numbers are wanted here", file=path, key=f"designs.{key}", remedy=remedy)
     name = path.resolve().parent.name
     found = []
     for number, word in enumerate(words, start=1):
-        one = numbered(preset or "", number)
+        one = design_name(preset or "", number)
         folder = results / f"{name}@{one}"
         wanted = problem.outputs(problem.load(path, one))
         files = {kind: folder / f"{kind}.nc" for kind in wanted}

@@ -16,7 +16,7 @@ from reports.page import publishing
 
 def _work(args: argparse.Namespace) -> None:
 
-    asked = joint_figure.load(args.figure)
+    asked = joint_figure.load_joint_figure(args.figure)
     shown = studies.load(args.figure, asked, args.preset, args.results)
     publishing.publish(content.parts(args.figure.resolve().parent.name, asked, shown), args.out_dir)
 

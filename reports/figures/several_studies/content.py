@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pipeline.problem import canonical_json
-from pipeline.problem.reading import Joint
+from pipeline.problem.reading import JointFigure
 from reports.base import Table, style
 from reports.facts import Fact, claims, fact_records
 from reports.figures.loading_path import (
@@ -27,7 +27,7 @@ from reports.panels import Animation, AnimationClip, payload
 from reports.study import StudyResults, from_dataset
 
 
-def parts(name: str, asked: Joint, studies: Sequence[StudyResults]) -> ReportParts:
+def parts(name: str, asked: JointFigure, studies: Sequence[StudyResults]) -> ReportParts:
     """The report of several studies."""
     known = [fact for study in studies for fact in _facts(study)]
     data = [fact_records.table(known), *(table for study in studies for table in _tables(study))]
@@ -64,7 +64,7 @@ def _tables(study: StudyResults) -> list[Table]:
 
 def page(
     name: str,
-    asked: Joint,
+    asked: JointFigure,
     studies: Sequence[StudyResults],
     known: Sequence[Fact],
     data: Sequence[Table],

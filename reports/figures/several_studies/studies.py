@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.problem.reading import Joint
+from pipeline.problem.reading import JointFigure
 from pipeline.runtime import UserError
 from reports.study import StudyResults, study_results
 
 
-def load(figure: Path, asked: Joint, preset: str | None, results: Path) -> list[StudyResults]:
+def load(figure: Path, asked: JointFigure, preset: str | None, results: Path) -> list[StudyResults]:
     """The studies in their order.
 
     Raises:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from pipeline.comparison import reduction
+from pipeline.comparison import compute_reduction
 from reports.facts import (
     ABSENT,
     MEASURED,
@@ -230,7 +230,7 @@ def recorded_facts(study: StudyResults) -> Iterator[Fact]:
         yield number(key, label, float(sides[0][0]), "mm", digits=3, note=note)
     if {"altered", "cloaked"} <= spans.keys():
         label = "u_y peak-to-peak reduced by, measured"
-        gain, predicted = map(reduction, spans["altered"], spans["cloaked"])
+        gain, predicted = map(compute_reduction, spans["altered"], spans["cloaked"])
         note = recording_facts.intervals(100 * gain[1:], 100 * predicted[1:], " %")
         yield share(f"{MEASURED}peak_to_peak_reduction", label, float(gain[0]), note=note)
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.calibration.inputs import WRITTEN
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import SYNTHETIC_LABEL
 from reports.base import style
 
 COLUMNS = 4
@@ -45,7 +45,7 @@ def draw_calibration(made: xr.Dataset) -> Figure:
         _set(drawn, made, number, (left, top + 8.0))
     _constants(drawn, made, rows * _ROW)
     if made.attrs["synthetic"] == "yes":
-        drawn.text(0.99, 0.005, WORD, ha="right", va="bottom", color=style.ALTERED)
+        drawn.text(0.99, 0.005, SYNTHETIC_LABEL, ha="right", va="bottom", color=style.ALTERED)
     return drawn
 
 

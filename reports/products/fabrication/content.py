@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.fabrication.checks import rows
-from pipeline.fabrication.papers import manifest
+from pipeline.fabrication.papers import read_bill, read_manifest
 from pipeline.fabrication.parts import THIN_WALL
 from pipeline.problem import Problem
 from reports.products.fabrication import pictures
@@ -64,7 +63,7 @@ class PackageSection:
 
 def package(folder: Path, problem: Problem) -> PackageSection:
     """What the page shows of a package, all of it read from the package's files."""
-    told = manifest.read(folder)
+    told = read_manifest(folder)
     name = folder.name
     return PackageSection(
         name,
@@ -86,7 +85,7 @@ def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str
 
 
 def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
-    bill = rows(folder / "bom.csv")
+    bill = read_bill(folder / "bom.csv")
     total = {row["id"]: row for row in bill if row["item"] == "total"}
     units, shims = total["units"], total["shims"]
     kinds = len(told["shims"])

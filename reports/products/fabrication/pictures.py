@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from pipeline.fabrication.readback import Curve, MeshBody, read, read_3mf, read_stl
+from pipeline.fabrication.readback import Curve, MeshBody, read_3mf, read_drawing, read_stl
 from reports.base import GREY, INTACT, MM_PER_INCH, PALE
 from reports.products.fabrication.renderer import Body, picture
 
@@ -34,7 +34,7 @@ _BED_HEIGHT = 1.0  # mm
 
 def sheet(path: Path) -> bytes:
     """PNG of a drawing: parts filled, layers in their colours."""
-    drawing = read(path)
+    drawing = read_drawing(path)
     points = np.concatenate([curve.points for curve in drawing.curves])
     low, high = points.min(axis=0) - _RIM, points.max(axis=0) + _RIM
     dpi = WIDTH / (high[0] - low[0]) * MM_PER_INCH

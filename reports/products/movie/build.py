@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.problem.sections import Codec
 from pipeline.runtime import cli
-from pipeline.virtual_lab import encode
+from pipeline.virtual_lab import encode_video
 from reports.figures import kinds
 from reports.products.movie.frames import RATE, images
 from reports.study import LABEL
@@ -35,7 +35,7 @@ def _work(args: argparse.Namespace) -> None:
     labels = {"title": args.out.stem, "comment": _note(studies)}
     with cli.progress(len(studies), "movie") as bar:
         frames = _frames(args.out.stem, studies, bar)
-        encode(args.out, frames, RATE, Codec(crf=26), labels)
+        encode_video(args.out, frames, RATE, Codec(crf=26), labels)
 
 
 def _frames(name: str, studies: Sequence[StudyResults], bar: cli.progress) -> Iterator[Image]:

@@ -15,8 +15,8 @@ from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import Codec
 from pipeline.runtime import UserError, cli, write_atomically
-from pipeline.tracking.frames import Frame, Recording, frames
-from pipeline.virtual_lab import encode
+from pipeline.tracking.frames import Frame, Recording, read_frames
+from pipeline.virtual_lab import encode_video
 from reports.products.tracking import overlay, page, track_quality
 from sim.core import Image
 
@@ -40,7 +40,9 @@ def _work(args: argparse.Namespace) -> None:
         labels = {"title": asked.title or args.video.stem, "comment": painted.note}
         rate = 1 / float(np.median(np.diff(track["time"].values)))
         codec = Codec(crf=20)
-        encode(args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels)
+        encode_video(
+            args.out_dir / "overlay.mp4", overlay.images(painted, shown()), rate, codec, labels
+        )
     found = track_quality.measured(track, kept, track_quality.stream_of(args.video))
 
     with write_atomically(args.out_dir / "index.html") as aside:
@@ -58,7 +60,7 @@ def _of_track(video: Path, asked: Recording, track: xr.Dataset) -> Iterator[Fram
     """The frames of the video that the track has."""
     wanted = set(track["frame"].values.tolist())
     end = np.inf if asked.window.end is None else asked.window.end
-    shown = frames(video, asked.window.start, end, asked.frame_rate)
+    shown = read_frames(video, asked.window.start, end, asked.frame_rate)
     return islice((each for each in shown if each.index in wanted), len(wanted))
 
 

@@ -9,7 +9,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import SYNTHETIC_LABEL
 from pipeline.tracking.geometry import SpecimenOutlines
 from reports.base import style
 from reports.products.tracking.overlay import of_track
@@ -29,7 +29,7 @@ def draw_quality(track: xr.Dataset, found: TrackQuality, load_axis: str) -> Figu
     """Maps above, courses below: over time, or over the displacement of the driven units."""
     drawn = style.page(132.0)
     if track.attrs["synthetic"] == "yes":
-        drawn.text(0.99, 0.005, WORD, ha="right", va="bottom", color=style.ALTERED)
+        drawn.text(0.99, 0.005, SYNTHETIC_LABEL, ha="right", va="bottom", color=style.ALTERED)
     specimen = of_track(track)
     there = np.isin(track["unit"].values, specimen.ids)
     residual = track["camera_residual"].values[there]

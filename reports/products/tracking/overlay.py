@@ -12,7 +12,7 @@ from matplotlib.colors import Colormap, to_rgb
 from numpy.typing import NDArray
 
 from pipeline.tracking.frames import Frame
-from pipeline.tracking.geometry import Camera, SpecimenOutlines, of_design
+from pipeline.tracking.geometry import Camera, SpecimenOutlines, outlines_of_design
 from reports.base import style
 from sim.core import Floats, Image
 
@@ -93,7 +93,9 @@ def of_track(track: xr.Dataset) -> SpecimenOutlines:
     """The units of a track; who is joined to whom it does not say."""
     nobody = np.empty((0, 2), int)
     ends = ("ligament", "end")
-    return of_design(track.assign(ligament_unit=(ends, nobody), ligament_vertex=(ends, nobody)))
+    return outlines_of_design(
+        track.assign(ligament_unit=(ends, nobody), ligament_vertex=(ends, nobody))
+    )
 
 
 def images(painted: Painter, frames: Iterable[Frame]) -> Iterator[Image]:

@@ -56,7 +56,7 @@ def test_points_are_a_dataset_with_units(tmp_path: Path) -> None:
     )
     made = dataset([*climbed(toy_benchmark.at_setting), failed])
     told = dict.fromkeys(("machine", "subject", "reference"), "as told")
-    origin = provenance.recorded("{}", {}, synthetic=False, role="rules")
+    origin = provenance.of_recording("{}", {}, synthetic=False, role="rules")
     datasets.write(made.assign_attrs(told), tmp_path / "points.nc", "benchmark", origin)
     read = datasets.read(tmp_path / "points.nc", "benchmark")
     assert read["cpu_time"].attrs["units"] == "s"

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.__main__ import run_stage
 from pipeline.calibration.inputs import Calibration
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 
 TRUTH = {
     "density": "6.18 kg/m^2",
@@ -75,7 +75,7 @@ def written(folder: Path, described: dict[str, Any]) -> Path:
 
 def loaded(folder: Path, described: dict[str, Any]) -> Calibration:
     """The calibration as it is read."""
-    return section(written(folder, described), Calibration)
+    return load_section(written(folder, described), Calibration)
 
 
 def synthesised(folder: Path, text: dict[str, object]) -> Path:

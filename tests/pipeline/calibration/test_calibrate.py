@@ -11,10 +11,10 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.calibration import fitted
-from pipeline.calibration.fit_uncertainty import gradient, uncertainty
+from pipeline.calibration import fit_calibration
+from pipeline.calibration.fit_uncertainty import adjoint_gradient, estimate_errors
 from pipeline.calibration.inputs import Calibration
-from pipeline.problem.reading import section
+from pipeline.problem.reading import load_section
 from pipeline.problem.sections import MaterialConstants
 from tests.pipeline.calibration.specimens import (
     STIFFNESS,
@@ -95,18 +95,18 @@ def test_the_same_files_give_the_same_bytes(made: Path, tmp_path: Path) -> None:
 
 def test_columns_of_the_jacobian_are_those_of_the_adjoint(made: Path) -> None:
     path = made / "data/calibration.yaml"
-    fit = fitted(section(path, Calibration), path)
+    fit = fit_calibration(load_section(path, Calibration), path)
     random = np.random.default_rng(4).normal(size=len(fit.residual))
     elsewhere = fit._replace(residual=random)
     columns = (fit.jacobian.T @ random)[: len(ALL)]
-    np.testing.assert_allclose(gradient(elsewhere), columns, rtol=1e-5)
-    assert uncertainty(fit).newton < 1e-3
+    np.testing.assert_allclose(adjoint_gradient(elsewhere), columns, rtol=1e-5)
+    assert estimate_errors(fit).newton < 1e-3
 
 
 def test_little_noise_makes_errors_below_one_percent(tmp_path: Path) -> None:
     sets = [*force_sets("0.0005 N"), decay_set("0.005 deg")]
     path = synthesised(tmp_path, described(sets, ALL))
-    fit = fitted(section(path, Calibration), path)
+    fit = fit_calibration(load_section(path, Calibration), path)
     constants = fit.model.constants(fit.unknowns)
     for name in fit.model.names:
         assert constants.value(name) == pytest.approx(TRUE[name], rel=0.01)

@@ -9,8 +9,7 @@ import pytest
 
 from pipeline.__main__ import run_stage
 from pipeline.calibration.experiments.experiment import MeasuredValues
-from pipeline.calibration.inputs import csv_readings
-from pipeline.problem.fields import units
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from tests.pipeline.calibration.specimens import (
     START,
@@ -29,7 +28,7 @@ def refused(text: str, folder: Path) -> UserError:
     path = folder / "readings.csv"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(UserError) as caught:
-        csv_readings.read(path, WANTED)
+        csv_columns.read_quantities(path, WANTED, least=5)
     assert caught.value.file == str(path)
     assert caught.value.remedy
     return caught.value
@@ -38,7 +37,7 @@ def refused(text: str, folder: Path) -> UserError:
 def test_units_of_columns_are_minded(tmp_path: Path) -> None:
     path = tmp_path / "readings.csv"
     path.write_text(f"# a comment\nforce [kN];displacement (cm)\n{ROWS.replace(',', ';')}\n")
-    found = csv_readings.read(path, WANTED)
+    found = csv_columns.read_quantities(path, WANTED, least=5)
     np.testing.assert_allclose(found[0], [20.0, 1000.0])
 
 
@@ -71,10 +70,7 @@ def measured_decay(lines: list[str], folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     ("change", "told"),
-    [
-        ({}, "no decaying oscillation is seen"),
-        ({20: 0.005}, "the clock does not ascend"),
-    ],
+    [({}, "no decaying oscillation is seen"), ({20: 0.005}, "the clock does not ascend")],
 )
 def test_faulty_traces(
     change: dict[int, float], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -105,10 +101,7 @@ FREE = {"translation": "2.9e-2 kg/s", "rotation": "1.2e-7 kg m^2/s"}
     ],
 )
 def test_faulty_calibrations(
-    changed: dict[str, object],
-    told: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    changed: dict[str, object], told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = written(tmp_path, described(force_sets(), STIFFNESS) | changed)
     assert run_stage("calibrate", [str(path), "--out", str(tmp_path / "found.nc")]) == 2

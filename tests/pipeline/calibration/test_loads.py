@@ -12,8 +12,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.calibration.inputs.csv_readings import read
-from pipeline.problem.fields.units import FORCE, LENGTH
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import ROOT
 from tests.pipeline.calibration.specimens import (
     TRUTH,
@@ -34,6 +33,7 @@ CONTACT = {
 }
 
 START = TRUTH | {"shear_stiffness": "1.1 N/mm", "bending_stiffness": "1.6 N mm/rad"}
+READINGS = {"displacement": units.LENGTH, "force": units.FORCE}
 WANTED = ["shear_stiffness", "bending_stiffness"]
 
 
@@ -54,7 +54,7 @@ def test_the_zero_of_a_load_cell_is_found(tmp_path: Path) -> None:
     path = synthesised(tmp_path, described(sets, WANTED, material=START))
     for each in sets:
         file = tmp_path / f"data/{each['name']}.csv"
-        along, force = read(file, {"displacement": LENGTH, "force": FORCE}).T
+        along, force = csv_columns.read_quantities(file, READINGS).T
         lines = [f"{x},{y + 0.7}" for x, y in zip(along, force, strict=True)]
         file.write_text("\n".join(["displacement (mm),force (N)", *lines]))
     found = found_from(path, tmp_path)

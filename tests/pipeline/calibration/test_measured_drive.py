@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.calibration.experiments.measured_drive import Followed, followed
+from pipeline.calibration.experiments.measured_drive import SmoothedDrive, smooth_drive
 from pipeline.posing import scene_of
 from pipeline.problem.reading import load
 from pipeline.runtime import ROOT
@@ -46,19 +46,19 @@ def tracked(random: np.random.Generator) -> xr.Dataset:
     return xr.Dataset(variables, {"unit": np.arange(12), "time": time})
 
 
-def instants(found: Followed) -> Floats:
+def instants(found: SmoothedDrive) -> Floats:
     """(n_knots,) s."""
     motion = found.held.motion
     return np.asarray(motion.step * np.arange(len(motion.value)))
 
 
-def along_x(found: Followed) -> Floats:
+def along_x(found: SmoothedDrive) -> Floats:
     """(n_knots, n_held)."""
     return np.asarray(found.held.motion.value)[..., 0]
 
 
 def test_the_motion_is_found_without_what_stays_with_a_unit(scene: Scene) -> None:
-    found = followed(tracked(np.random.default_rng(1)), scene, BIAS)
+    found = smooth_drive(tracked(np.random.default_rng(1)), scene, BIAS)
     knots = instants(found)
     assert not found.coarse
     assert along_x(found)[0].tolist() == [0.0, 0.0]
@@ -69,7 +69,7 @@ def test_changes_have_the_covariance_of_the_noise(scene: Scene) -> None:
     """Over many draws: of the mean course of both units, at a knot in the middle."""
     random, errors, told = np.random.default_rng(2), [], []
     for _ in range(60):
-        found = followed(tracked(random), scene, BIAS)
+        found = smooth_drive(tracked(random), scene, BIAS)
         middle = len(found.held.motion.value) // 2
         at = found.held.motion.step * middle
         errors.append(along_x(found)[middle] - course(np.array([at])))
@@ -81,13 +81,13 @@ def test_changes_have_the_covariance_of_the_noise(scene: Scene) -> None:
 
 def test_frames_that_are_too_few_are_told(scene: Scene) -> None:
     sparse = tracked(np.random.default_rng(3)).isel(time=slice(None, None, 5))
-    assert followed(sparse, scene, BIAS).coarse
+    assert smooth_drive(sparse, scene, BIAS).coarse
 
 
 def test_frames_without_a_unit_are_bridged(scene: Scene) -> None:
     track = tracked(np.random.default_rng(4))
     track["displacement"][20:26, 0] = np.nan
-    found = followed(track, scene, BIAS)
+    found = smooth_drive(track, scene, BIAS)
     knots = instants(found)
     spread = [each.value**2 for each in found.changes if (each.place, each.dof) == (0, 0)]
     error = np.sqrt(np.sum(spread, axis=0))

@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.comparison import nominal
+from pipeline.comparison import interpolate_response
 from pipeline.tracking.geometry import as_built
-from pipeline.tracking.output import labelled
+from pipeline.tracking.output import label_track
 
 SIGMA = np.array([0.004, 0.004, 0.0008])
 PIXEL = 0.25
@@ -31,7 +31,7 @@ def track(
         at: (frames,) time of the response that each shows, s.
     """
     shown = response.sel(structure=structure).isel(case=0)
-    true = nominal(shown, at)
+    true = interpolate_response(shown, at)
     motion = true.displacement
     random = np.random.default_rng(5)
     noise = SIGMA * random.standard_normal(motion.shape)
@@ -51,7 +51,7 @@ def track(
         "image_size": (("xy",), np.array([512, 512])),
         "blur": ((), 0.6),
     }
-    return labelled(built, time, variables)
+    return label_track(built, time, variables)
 
 
 def written(made: xr.Dataset, folder: Path, more: str = "") -> list[str]:

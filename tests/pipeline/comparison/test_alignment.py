@@ -11,10 +11,10 @@ from pipeline.comparison.alignment import (
     LOADING,
     UNLOADING,
     SampledMotion,
-    branches,
+    drive_turn,
+    find_branches,
     find_lag,
-    load_time,
-    turn,
+    find_load_time,
 )
 from pipeline.runtime import UserError
 
@@ -86,21 +86,21 @@ def test_too_few_frames_are_refused() -> None:
     with pytest.raises(UserError, match="too few frames"):
         find_lag(filmed(0.0, frames=7), NOMINAL)
     with pytest.raises(UserError, match="too few frames"):
-        load_time(np.full(20, np.nan), SampledMotion(TIMES, TIMES[:, None]))
+        find_load_time(np.full(20, np.nan), SampledMotion(TIMES, TIMES[:, None]))
 
 
 def test_equal_displacement_is_equal_load_on_both_branches() -> None:
     path = SampledMotion(TIMES, 15 * (1 + np.tanh(3 * (TIMES - 1)))[:, None])
     there = np.concatenate([np.linspace(path.value[0, 0], 20, 50), np.linspace(20, 5, 30)])
-    found = load_time(there, path)
+    found = find_load_time(there, path)
     np.testing.assert_allclose(path.at(found)[:, 0], there, atol=1e-4)
-    np.testing.assert_array_equal(branches(there)[[5, 40]], LOADING)
-    np.testing.assert_array_equal(branches(there)[[60, 75]], UNLOADING)
+    np.testing.assert_array_equal(find_branches(there)[[5, 40]], LOADING)
+    np.testing.assert_array_equal(find_branches(there)[[60, 75]], UNLOADING)
 
 
 def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
     ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
-    found = load_time(np.linspace(-0.01, 25.0, 26), ramp)
+    found = find_load_time(np.linspace(-0.01, 25.0, 26), ramp)
     assert found[0] == 0.0
     assert np.isfinite(found[:20]).all()
     assert np.isnan(found[22:]).all()
@@ -108,17 +108,17 @@ def test_loads_beyond_the_nominal_ones_have_no_time() -> None:
 
 def test_a_rest_belongs_to_the_way_before_it() -> None:
     held = np.concatenate([np.zeros(20), np.linspace(0, 9, 40), np.full(20, 9.0)])
-    assert (branches(held) == LOADING).all()
+    assert (find_branches(held) == LOADING).all()
 
 
 def test_a_drive_that_does_not_move_along_is_refused() -> None:
     ramp = SampledMotion(TIMES, 10 * TIMES[:, None])
     with pytest.raises(UserError, match="cannot be aligned"):
-        load_time(np.linspace(0.0, -15.0, 30), ramp)
+        find_load_time(np.linspace(0.0, -15.0, 30), ramp)
     with pytest.raises(UserError, match="to and fro"):
-        load_time(np.linspace(0.0, 1.0, 30), SampledMotion(TIMES, np.sin(TIMES * 4)[:, None]))
+        find_load_time(np.linspace(0.0, 1.0, 30), SampledMotion(TIMES, np.sin(TIMES * 4)[:, None]))
 
 
 def test_the_direction_of_a_drive_is_told() -> None:
     line = np.linspace(0, 5, 9)[:, None]
-    assert turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)
+    assert drive_turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)

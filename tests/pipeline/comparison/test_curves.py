@@ -6,8 +6,19 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.comparison.compared_quantities import Quantity, nearing, rotation, size
-from pipeline.comparison.curves import Sides, curve, peak_to_peak, peaks, usual_coverage
+from pipeline.comparison.compared_quantities import (
+    Quantity,
+    mean_approach,
+    mean_rotation,
+    normalised_rms,
+)
+from pipeline.comparison.curves import (
+    Sides,
+    estimate_peaks,
+    expected_coverage,
+    peak_to_peak,
+    quantity_curve,
+)
 
 FRAMES, UNITS, NOISE = 60, 40, 0.02
 TIME = np.arange(FRAMES) / 30
@@ -40,7 +51,7 @@ def test_units_that_are_seldom_seen_have_no_peaks() -> None:
 
 
 def test_intervals_of_peaks_hold_the_truth_though_noise_makes_them_larger() -> None:
-    found = peaks(sides(WAVES), np.random.default_rng(0))
+    found = estimate_peaks(sides(WAVES), np.random.default_rng(0))
     value, low, high = np.moveaxis(found[0], -1, 0)
     assert value.mean() > 2.0 + 0.5 * NOISE
     assert ((low <= 2.0) & (high >= 2.0)).mean() > 0.9
@@ -50,10 +61,12 @@ def test_intervals_of_peaks_hold_the_truth_though_noise_makes_them_larger() -> N
 
 def test_a_departure_is_that_from_the_other_motion() -> None:
     intact = WAVES
-    of = partial(size, spacing=15.0, unit=size(intact, 15.0).max())
+    of = partial(normalised_rms, spacing=15.0, unit=normalised_rms(intact, 15.0).max())
     known = Quantity(of, np.arange(0, UNITS, 2), intact)
-    found = curve(sides(1.1 * WAVES, noise=1e-4, gain=1.2), known, np.random.default_rng(0))
-    exact = 0.1 * size(intact[:, ::2], 15.0) / size(intact, 15.0).max()
+    found = quantity_curve(
+        sides(1.1 * WAVES, noise=1e-4, gain=1.2), known, np.random.default_rng(0)
+    )
+    exact = 0.1 * normalised_rms(intact[:, ::2], 15.0) / normalised_rms(intact, 15.0).max()
     np.testing.assert_allclose(found[0, :, 0], exact, atol=1e-3)
     np.testing.assert_allclose(found[1, :, 0], 2 * exact, atol=1e-9)
     assert (found[0, :, 1] <= found[0, :, 0]).all()
@@ -64,20 +77,20 @@ def test_a_departure_is_that_from_the_other_motion() -> None:
 def test_units_that_stand_for_no_others_are_not_drawn() -> None:
     """Then the interval is that of the noise alone: here of the means of two rows."""
     rows = np.arange(10)
-    apart = Quantity(partial(nearing, lower=5), rows, sampled=False)
-    found = curve(sides(WAVES), apart, np.random.default_rng(0))
+    apart = Quantity(partial(mean_approach, lower=5), rows, sampled=False)
+    found = quantity_curve(sides(WAVES), apart, np.random.default_rng(0))
     exact = WAVES[:, :5, 1].mean(axis=1) - WAVES[:, 5:10, 1].mean(axis=1)
     np.testing.assert_allclose(found[1, :, 0], exact, atol=1e-12)
     wide = (found[0, :, 2] - found[0, :, 1]).mean()
     np.testing.assert_allclose(wide, 2 * 1.96 * NOISE * np.sqrt(2 / 5), rtol=0.1)
-    drawn = curve(sides(WAVES), Quantity(rotation, rows), np.random.default_rng(0))
+    drawn = quantity_curve(sides(WAVES), Quantity(mean_rotation, rows), np.random.default_rng(0))
     assert (drawn[0, :, 2] - drawn[0, :, 1]).mean() > 0.1
 
 
 def test_copies_that_are_off_as_a_whole_leave_the_band_as_a_whole() -> None:
     seen = sides(WAVES)
-    together = usual_coverage(seen.copies, seen.within(seen.copies), 0.99)
+    together = expected_coverage(seen.copies, seen.within(seen.copies), 0.99)
     assert (together < 0.01).all()
     apart = np.random.default_rng(1).standard_normal(seen.copies.shape)
-    found = usual_coverage(apart, seen.within(apart), seen.level)
+    found = expected_coverage(apart, seen.within(apart), seen.level)
     np.testing.assert_allclose(found, 0.95, atol=0.03)

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.comparison.metrics import METRICS, Pair, block_length, bootstrap, estimates, metrics
+from pipeline.comparison.metrics import (
+    METRICS,
+    Pair,
+    block_length,
+    bootstrap,
+    compute_metrics,
+    estimate_metrics,
+)
 
 FRAMES, UNITS = 60, 30
 TIME = np.arange(FRAMES) / 60
@@ -28,7 +35,7 @@ def pair(noise: float, stated: float | None = None, lag: float = 0.0, seed: int 
 
 
 def test_pure_noise_explains_all_of_the_residual() -> None:
-    found = estimates(pair(0.05), TIME, np.random.default_rng(0))
+    found = estimate_metrics(pair(0.05), TIME, np.random.default_rng(0))
     np.testing.assert_allclose(found[0, SHARE], 1.0, atol=0.1)
     assert (found[1, SHARE] < 1).all()
     assert (found[2, SHARE] > 1).all()
@@ -37,7 +44,7 @@ def test_pure_noise_explains_all_of_the_residual() -> None:
 
 def test_noise_explains_little_of_a_wrong_simulation() -> None:
     seen = pair(0.01)
-    found = metrics(seen._replace(simulated=1.2 * seen.simulated))
+    found = compute_metrics(seen._replace(simulated=1.2 * seen.simulated))
     assert (found[SHARE] < 0.02).all()
     np.testing.assert_allclose(found[NRMSE], 0.2, rtol=0.02)
     np.testing.assert_allclose(found[CORRELATION], 1.0, atol=1e-3)
@@ -46,23 +53,23 @@ def test_noise_explains_little_of_a_wrong_simulation() -> None:
 @settings(max_examples=4, deadline=None)
 @given(st.floats(-0.04, 0.04))
 def test_a_known_shift_in_time_is_found(lag: float) -> None:
-    found = estimates(pair(0.002, lag=lag), TIME, np.random.default_rng(1))
+    found = estimate_metrics(pair(0.002, lag=lag), TIME, np.random.default_rng(1))
     np.testing.assert_allclose(found[0, SHIFT], lag, atol=3e-4)
     assert (found[1, SHIFT] <= found[0, SHIFT]).all()
 
 
 def test_a_quasi_static_pair_has_no_shift_in_time() -> None:
-    assert np.isnan(estimates(pair(0.01), None, np.random.default_rng(0))[:, SHIFT]).all()
+    assert np.isnan(estimate_metrics(pair(0.01), None, np.random.default_rng(0))[:, SHIFT]).all()
 
 
 def test_gaps_are_left_out_and_nothing_at_all_gives_no_number() -> None:
     whole = pair(0.05)
     holes = np.random.default_rng(3).random(whole.measured.shape) < 0.2
-    found = metrics(whole._replace(measured=np.where(holes, np.nan, whole.measured)))
-    np.testing.assert_allclose(found[:SHIFT], metrics(whole)[:SHIFT], rtol=0.05)
-    empty = metrics(whole._replace(measured=np.full_like(whole.measured, np.nan)))
+    found = compute_metrics(whole._replace(measured=np.where(holes, np.nan, whole.measured)))
+    np.testing.assert_allclose(found[:SHIFT], compute_metrics(whole)[:SHIFT], rtol=0.05)
+    empty = compute_metrics(whole._replace(measured=np.full_like(whole.measured, np.nan)))
     assert np.isnan(empty).all()
-    nothing = estimates(
+    nothing = estimate_metrics(
         whole.taken(np.arange(FRAMES), np.arange(0)), None, np.random.default_rng(0)
     )
     assert np.isnan(nothing).all()
@@ -75,14 +82,16 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
         random = np.random.default_rng(seed)
         seen = pair(0.02, seed=seed).taken(np.arange(15), np.arange(UNITS))
         off = random.normal(0, 0.1, (1, UNITS, 3))
-        _, low, high = bootstrap(seen._replace(measured=seen.measured + off), metrics, random)
+        _, low, high = bootstrap(
+            seen._replace(measured=seen.measured + off), compute_metrics, random
+        )
         truth = np.sqrt(0.1**2 + 0.02**2)
         held += int(((low[RMSE] <= truth) & (truth <= high[RMSE])).sum())
     assert held >= 0.85 * 120
 
 
 def test_equal_seeds_give_equal_intervals() -> None:
-    first, again = (estimates(pair(0.05), TIME, np.random.default_rng(7)) for _ in range(2))
+    first, again = (estimate_metrics(pair(0.05), TIME, np.random.default_rng(7)) for _ in range(2))
     np.testing.assert_array_equal(first, again)
 
 

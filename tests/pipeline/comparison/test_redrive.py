@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline import problem
-from pipeline.comparison.redrive import filtered, held_motion, redriven
+from pipeline.comparison.redrive import filter_held_motion, fit_spline, simulate_redriven
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.runtime import UserError
 from sim.scene import Scene, concrete_parameters, make_plan
@@ -47,13 +47,13 @@ def pressed(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
     track, motion = tracked(pressed, 1.0, 40)
-    held = held_motion(track, pressed)
+    held = filter_held_motion(track, pressed)
     assert len(held.unit) == 10
     assert held.driven.sum() == 5
     assert not held.assumed.any()
     np.testing.assert_allclose(held.noise.mean(axis=0), SIGMA, rtol=0.15)
     structure = PosedStructure(pressed, pressed.lattice.vertices)
-    made = redriven(structure, held, track["time"].values)
+    made = simulate_redriven(structure, held, track["time"].values)
     assert made.failure is None
     assert np.sqrt(np.mean((made.displacement - motion) ** 2)) < 0.5 * SIGMA[0]
     assert (made.drive_force[10:, 0] < 0).all()  # it pushes to the left
@@ -62,9 +62,9 @@ def test_a_path_of_equilibria_is_found_again(pressed: Scene) -> None:
 def test_a_motion_in_time_is_found_again() -> None:
     scene = scene_of(problem.load(FIG2 / "problem.yaml", "quick"), FIG2)
     track, motion = tracked(scene, 0.5, 61)
-    made = redriven(
+    made = simulate_redriven(
         PosedStructure(scene, scene.lattice.vertices),
-        held_motion(track, scene),
+        filter_held_motion(track, scene),
         track["time"].values,
     )
     share = np.sqrt(np.mean((made.displacement - motion) ** 2) / np.mean(motion**2))
@@ -79,7 +79,7 @@ def test_frames_that_show_nothing_are_bridged(pressed: Scene) -> None:
     measured.loc[{"unit": clamped}] = np.nan
     measured.loc[{"unit": hidden}] = np.nan
     measured.loc[{"unit": driven, "time": track["time"][15:21]}] = np.nan
-    held = held_motion(track, pressed)
+    held = filter_held_motion(track, pressed)
     ids = pressed.lattice.id[held.unit].tolist()
     place = {unit: ids.index(unit) for unit in (clamped, driven, hidden)}
     course = np.asarray(held.motion(track["time"].values))
@@ -95,14 +95,14 @@ def test_a_drive_that_nobody_saw_is_refused(pressed: Scene) -> None:
     track, _ = tracked(pressed, 1.0, 9)
     track["displacement"][:, pressed.loads.driven] = np.nan
     with pytest.raises(UserError, match="no driven unit was seen"):
-        held_motion(track, pressed)
+        filter_held_motion(track, pressed)
 
 
 def test_the_filter_departs_by_the_uncertainty_and_keeps_a_jump_of_speed() -> None:
     time = np.linspace(0, 2, 121)
     true = np.where(time > 0.2, 4.5 * np.sin(4 * np.pi * (time - 0.2)), 0.0)
     value = true + 0.005 * np.random.default_rng(1).standard_normal(121)
-    made = filtered(time, value, np.full(121, 0.005))(time)
+    made = fit_spline(time, value, np.full(121, 0.005))(time)
     assert np.sqrt(np.mean((made - value) ** 2)) == pytest.approx(0.005, rel=0.01)
     assert np.abs(made - true)[20:].max() < 0.02
 
@@ -113,7 +113,7 @@ def test_a_path_that_cannot_be_followed_is_kept_so_far(pressed: Scene) -> None:
         0, 3, 20
     )  # into its neighbour
     structure = PosedStructure(pressed, pressed.lattice.vertices)
-    made = redriven(structure, held_motion(track, pressed), track["time"].values)
+    made = simulate_redriven(structure, filter_held_motion(track, pressed), track["time"].values)
     assert "no equilibrium" in (made.failure or "")
     there = np.isfinite(made.displacement).all(axis=(1, 2))
     assert 0 < there.sum() < 20

@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.comparison import measurement, pixel_size
+from pipeline.comparison import pixel_size, prepare_measurement
 from tests.pipeline.comparison.recorded import FORCE, PIXEL, SIGMA, track, written
 
 Change = Callable[[xr.Dataset], xr.Dataset]
@@ -143,10 +143,9 @@ def test_a_turned_camera_is_told_and_taken_out_and_a_scale_is_left_in(
     middle = np.nanmean(centre, axis=0)
     missed = (scale * (centre - middle) @ matrix + middle - centre) / PIXEL
     tilted = film.assign(
-        displacement=(film["displacement"].dims, motion),
-        camera_residual=(("unit", "xy"), missed),
+        displacement=(film["displacement"].dims, motion), camera_residual=(("unit", "xy"), missed)
     )
-    found = measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
+    found = prepare_measurement(tilted, datasets.read(study[study.index("--design") + 1], "design"))
     assert found.registration.rotation == pytest.approx(turn, abs=1e-4)
     assert found.registration.scale == pytest.approx(scale, abs=1e-4)
     assert pixel_size(tilted, middle) == pytest.approx(PIXEL)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline import problem
-from pipeline.comparison.tolerance_band import Samples, limits, sampled, widened
+from pipeline.comparison.tolerance_band import Specimens, band_limits, sample_specimens, widen_band
 from pipeline.posing import PosedStructure, scene_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import Tolerances
@@ -20,12 +20,12 @@ SIZES = "geometry: 0.03, ligaments: 0.1, stiffness: 0.05"
 TIMES = np.array([0.4, 0.7, 1.0])
 
 
-def draws(study: tuple[Problem, Path], **changes: object) -> Samples:
+def draws(study: tuple[Problem, Path], **changes: object) -> Specimens:
     asked, folder = study
     changed = asked.prediction.model_copy(update=changes)
     scene = scene_of(asked, folder)
     structure = PosedStructure(scene, scene.lattice.vertices)
-    return sampled(asked.model_copy(update={"prediction": changed}), structure, TIMES)
+    return sample_specimens(asked.model_copy(update={"prediction": changed}), structure, TIMES)
 
 
 @pytest.fixture(scope="module")
@@ -36,21 +36,21 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Problem, Path]:
 
 
 @pytest.fixture(scope="module")
-def samples(study: tuple[Problem, Path]) -> Samples:
+def samples(study: tuple[Problem, Path]) -> Specimens:
     return draws(study)
 
 
-def test_the_band_holds_the_next_specimens(study: tuple[Problem, Path], samples: Samples) -> None:
+def test_the_band_holds_the_next_specimens(study: tuple[Problem, Path], samples: Specimens) -> None:
     """95 % of what a tracker measures of 40 others, drawn alike, at their free units."""
     others = draws(study, seed=1, samples=40)
     noise = SIGMA * np.random.default_rng(2).standard_normal(others.displacement.shape)
     measured = others.displacement + noise
-    low, _, high = widened(limits(samples.displacement, 0.95), SIGMA, 0.95)
+    low, _, high = widen_band(band_limits(samples.displacement, 0.95), SIGMA, 0.95)
     free = np.ptp(samples.displacement[:, -1, :, 0], axis=0) > 0
     inside = ((measured >= low) & (measured <= high))[:, :, free].mean(axis=(1, 2))
     assert free.sum() == 14
     np.testing.assert_allclose(inside.mean(axis=0), 0.95, atol=0.03)
-    forces = limits(samples.drive_force[..., 0], 0.95)
+    forces = band_limits(samples.drive_force[..., 0], 0.95)
     held = (others.drive_force[..., 0] >= forces[0]) & (others.drive_force[..., 0] <= forces[2])
     assert held.mean() == pytest.approx(0.95, abs=0.06)
 
@@ -85,7 +85,7 @@ def test_specimens_are_assembled_off_their_places(study: tuple[Problem, Path]) -
 def test_limits_hold_the_next_draw() -> None:
     """Over many bands of 64 draws, a 65th is inside as often as stated."""
     drawn = np.random.default_rng(4).standard_normal((65, 20_000))
-    low, middle, high = limits(drawn[:64], 0.95)
+    low, middle, high = band_limits(drawn[:64], 0.95)
     assert np.mean((drawn[64] > low) & (drawn[64] < high)) == pytest.approx(0.95, abs=0.005)
     assert abs(middle.mean()) < 0.01
 

@@ -25,7 +25,7 @@ CALENDAR = "check_spatiotemporal_dims_have_coordinate_vars"
 
 def written(kind: Kind, folder: Path) -> Path:
     path = folder / f"{kind}.nc"
-    origin = provenance.recorded("{}", {}, synthetic=True)
+    origin = provenance.of_recording("{}", {}, synthetic=True)
     datasets.write(sample(kind), path, kind, origin)
     return path
 

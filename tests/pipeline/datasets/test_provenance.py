@@ -12,7 +12,7 @@ from pipeline.problem.reading import load
 
 def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
     problem = load(fig2)
-    told = provenance.attributes(
+    told = provenance.of_study(
         problem, "simulate", parents={"design": fig2}, plan={"skipped": ["reference"]}
     )
     assert all(isinstance(value, str) for value in told.values())
@@ -21,11 +21,11 @@ def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
     assert json.loads(told["parents"]) == {"design": provenance.file_hash(fig2)}
     assert json.loads(told["plan"]) == {"skipped": ["reference"]}
     assert json.loads(told["packages"])["numpy"]
-    assert provenance.attributes(problem, "simulate")["plan"] == "{}"
+    assert provenance.of_study(problem, "simulate")["plan"] == "{}"
 
 
 def test_a_method_stores_its_own_part(fig2: Path) -> None:
-    told = provenance.attributes(load(fig2), "design", method="mma")
+    told = provenance.of_study(load(fig2), "design", method="mma")
     assert list(from_canonical(told["problem"]).optimiser.methods.chosen) == ["mma"]
 
 

@@ -32,7 +32,7 @@ def test_no_byte_of_a_dataset_can_be_another(sweep: Path) -> None:
 def test_what_other_software_changed_is_taken_where_it_says_so(sweep: Path) -> None:
     with netCDF4.Dataset(sweep, "a") as raw:
         raw["loss"][0] = 7.0
-    assert seal.state(sweep) == "absent"
+    assert seal.check_seal(sweep) == "absent"
     with pytest.raises(UserError, match="its seal is missing"):
         read(sweep, "sweep")
     with netCDF4.Dataset(sweep, "a") as raw:

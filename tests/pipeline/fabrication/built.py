@@ -9,11 +9,9 @@ import numpy as np
 import xarray as xr
 
 from pipeline import problem
-from pipeline.fabrication import papers
-from pipeline.fabrication.files import package_folder
-from pipeline.fabrication.papers import bill_of_materials, manifest
-from pipeline.fabrication.parts import BuiltSpecimen
-from pipeline.fabrication.units import network, specimen_units
+from pipeline.fabrication.files import PackageFolder
+from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.units import build_specimen, network
 from pipeline.problem import Problem
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
@@ -51,12 +49,6 @@ def _flags(values: np.ndarray, meanings: str) -> tuple[str, np.ndarray, dict[str
     return ("unit", values, {"flag_values": numbers, "flag_meanings": meanings})
 
 
-def specimen(asked: Problem) -> BuiltSpecimen:
-    """The six squares as the exporters cut them."""
-    net = network(design(), "cloaked")
-    return specimen_units.specimen(net, asked.fabrication, ("toy", "cloaked"), Path("design.nc"))
-
-
 def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Problem:
     """Write the package into a new folder; returns the problem that it was made with.
 
@@ -64,14 +56,14 @@ def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Probl
         folder: of the package.
         parameters: of fabrication, where they are not the defaults.
     """
-    wanted = Fabrication.model_validate(parameters or {}, context=SIM_UNITS)
-    asked = problem.load(PROBLEM).model_copy(update={"fabrication": wanted})
-    made = specimen(asked)
+    settings = Fabrication.model_validate(parameters or {}, context=SIM_UNITS)
+    posed = problem.load(PROBLEM).model_copy(update={"fabrication": settings})
+    net = network(design(), "cloaked")
+    specimen = build_specimen(net, settings, ("toy", "cloaked"), Path("design.nc"))
     folder.mkdir(parents=True)
-    filled = package_folder.PackageFolder(folder, made, asked, str(PROBLEM))
-    package_folder.write(filled)
-    papers.write(folder / "assembly.pdf", made, asked.fabrication)
-    density = asked.material.density
-    bill_of_materials.write(folder / "bom.csv", made, asked.fabrication, density, filled.contents)
-    manifest.write(folder, made, asked, PROBLEM)
-    return asked
+    package = PackageFolder(folder, specimen, posed, str(PROBLEM))
+    package.write()
+    write_assembly_sheet(folder / "assembly.pdf", specimen, settings)
+    write_bill(folder / "bom.csv", specimen, settings, posed.material.density, package.contents)
+    write_manifest(folder, specimen, posed, PROBLEM)
+    return posed

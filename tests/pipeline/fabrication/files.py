@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from ezdxf.filemanagement import new
+from trimesh import Trimesh
 
 from pipeline.fabrication.readback import Curve
 from sim.core import Floats, Ints
@@ -100,10 +101,7 @@ def write_svg(
 
 def write_stl(path: Path, vertices: Floats, triangles: Ints) -> Path:
     """A binary STL."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    rows = np.zeros(len(triangles), dtype=record)
-    rows["corners"] = vertices[triangles]
-    path.write_bytes(bytes(80) + np.uint32(len(triangles)).tobytes() + rows.tobytes())
+    Trimesh(vertices, triangles, process=False).export(path)
     return path
 
 

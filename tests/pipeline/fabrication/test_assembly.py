@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import hashlib
 import json
@@ -11,12 +10,11 @@ from pathlib import Path
 import pytest
 
 from pipeline import problem
-from pipeline.fabrication import papers
-from pipeline.fabrication.papers import bill_of_materials, manifest
-from pipeline.fabrication.papers.page_tiles import OVERLAP, tiles
+from pipeline.fabrication.checks.package_check import page_words
+from pipeline.fabrication.papers import read_bill, write_assembly_sheet, write_bill, write_manifest
+from pipeline.fabrication.papers.assembly_plan import OVERLAP, tiles
 from pipeline.fabrication.papers.pdf_paper import SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
-from pipeline.fabrication.readback import read_pages
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.handmade import ASKED
 
@@ -26,26 +24,21 @@ PROBLEM = Path(__file__).parents[3] / "experiments/fig2/problem.yaml"
 
 def written(folder: Path, specimen: BuiltSpecimen | None = None) -> Path:
     path = folder / "assembly.pdf"
-    papers.write(path, specimen or handmade.specimen(), ASKED)
+    write_assembly_sheet(path, specimen or handmade.specimen(), ASKED)
     return path
 
 
-def test_the_plan_names_every_unit_row_and_column(tmp_path: Path) -> None:
-    (plan,) = (page for page in read_pages.words(written(tmp_path)) if "1:1" in page[0])
-    for name in ("A1", "B1", "C1", "A2", "B2", "C2", "A", "B", "C", "1", "2"):
-        assert name in plan
-
-
-def test_all_pages_carry_a_check_bar_and_a_number(tmp_path: Path) -> None:
-    for number, page in enumerate(read_pages.words(written(tmp_path)), 1):
+def test_the_pages_name_every_unit_shim_and_fixture(tmp_path: Path) -> None:
+    pages = page_words(written(tmp_path))
+    for number, page in enumerate(pages, 1):
         assert page[1] == str(number)
         assert page[2].startswith("100 mm: measure")
-
-
-def test_the_shim_list_counts_spares(tmp_path: Path) -> None:
-    (shims,) = (page for page in read_pages.words(written(tmp_path)) if "shims" in page[0])
+    (plan,) = (page for page in pages if "1:1" in page[0])
+    assert {"A1", "B1", "C1", "A2", "B2", "C2", "A", "B", "C", "1", "2"} <= set(plan)
+    (shims,) = (page for page in pages if "shims" in page[0])
     assert "shims: 8 pieces of 1 lengths" in shims[0]
     assert {"S8.25", "8.25 mm", "8.10 mm", "7", "1", "8"} <= set(shims)
+    assert "Set the clamped units into their pads or grips: A1, C2." in " ".join(pages[0])
 
 
 def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
@@ -53,15 +46,10 @@ def test_two_kinds_of_shims_are_told_apart_by_ligament(tmp_path: Path) -> None:
     (kind,) = one.shims
     other = dataclasses.replace(kind, id="S9.00", length=9.0, ligaments=(6,))
     kinds = (dataclasses.replace(kind, ligaments=tuple(range(6))), other)
-    found = read_pages.words(written(tmp_path, dataclasses.replace(one, shims=kinds)))
+    found = page_words(written(tmp_path, dataclasses.replace(one, shims=kinds)))
     assert "units that are not joined by shim S8.25" in found[-1][0]
     last = found[-1].index("B2 - C2")
     assert found[-1][last + 1 : last + 3] == ["2", "S9.00"]
-
-
-def test_fixtures_are_named_in_the_order_of_work(tmp_path: Path) -> None:
-    first = " ".join(read_pages.words(written(tmp_path))[0])
-    assert "Set the clamped units into their pads or grips: A1, C2." in first
 
 
 @pytest.mark.parametrize("paper", ["A4", "Letter"])
@@ -88,28 +76,20 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     assert mine[1] == pytest.approx(other[1])
 
 
-def test_a_page_without_a_unit_is_caught(tmp_path: Path) -> None:
-    (fault,) = read_pages.check(written(tmp_path), ["A1", "Z9"])
-    assert fault.part == "unit Z9"
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     specimen = handmade.specimen()
     contents = {
         "laser/units_01_nominal.dxf": [unit.label for unit in specimen.units],
         "print/plate_01.3mf": ["A1", "B1"],
     }
-    bill_of_materials.write(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents)
-    found = rows(tmp_path / "bom.csv")
+    write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents)
+    found = read_bill(tmp_path / "bom.csv")
     assert [row["id"] for row in found if row["item"] == "unit"] == [
         unit.label for unit in specimen.units
     ]
     first = found[0]
+    assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm (thin)"
+    assert specimen.thin == {unit.label: 1.0 for unit in specimen.units}
     assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
     area = specimen.units[0].design.area
     assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2
@@ -132,7 +112,7 @@ def test_the_manifest_holds_parameters_and_hashes(tmp_path: Path) -> None:
     (package / "laser").mkdir(parents=True)
     (package / "laser/a.dxf").write_bytes(b"drawing")
     for _ in range(2):  # a manifest does not count itself
-        manifest.write(package, handmade.specimen(), asked, design)
+        write_manifest(package, handmade.specimen(), asked, design)
     told = json.loads((package / "manifest.json").read_text())
     assert told["files"] == {"laser/a.dxf": hashlib.sha256(b"drawing").hexdigest()}
     assert told["design_sha256"] == hashlib.sha256(b"a design").hexdigest()
@@ -140,27 +120,8 @@ def test_the_manifest_holds_parameters_and_hashes(tmp_path: Path) -> None:
     assert told["units"] == ["A1", "B1", "C1", "A2", "B2", "C2"]
 
 
-def test_the_same_specimen_gives_the_same_bytes(tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        written(tmp_path / name)
-        bill_of_materials.write(
-            tmp_path / name / "bom.csv", handmade.specimen(), ASKED, DENSITY, {}
-        )
-    for name in ("assembly.pdf", "bom.csv"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
-
-
 @pytest.mark.parametrize(("paper", "width"), [("A4", b"595.27"), ("Letter", b"612 ")])
 def test_pages_have_the_size_that_is_asked_for(tmp_path: Path, paper: str, width: bytes) -> None:
     path = tmp_path / "assembly.pdf"
-    papers.write(path, handmade.specimen(), ASKED.model_copy(update={"paper": paper}))
+    write_assembly_sheet(path, handmade.specimen(), ASKED.model_copy(update={"paper": paper}))
     assert b"/MediaBox [ 0 0 " + width in path.read_bytes()
-
-
-def test_the_bill_tells_of_slots_and_of_thin_walls(tmp_path: Path) -> None:
-    specimen = handmade.specimen()
-    bill_of_materials.write(tmp_path / "bom.csv", specimen, ASKED, DENSITY, {})
-    first = rows(tmp_path / "bom.csv")[0]
-    assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm (thin)"
-    assert specimen.thin == {unit.label: 1.0 for unit in specimen.units}

@@ -11,6 +11,7 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.datasets.tables import Kind
 from tests.pipeline.fabrication import built
 
 Edit = Callable[[Path], None]
@@ -86,7 +87,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     built.design().to_netcdf(tmp_path / "design.nc")
     whole = datasets.read
 
-    def read(path: Path, kind: datasets.Kind) -> xr.Dataset:
+    def read(path: Path, kind: Kind) -> xr.Dataset:
         """The small design lacks what only the optimiser writes."""
         try:
             return xr.load_dataset(path)

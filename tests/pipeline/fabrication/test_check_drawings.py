@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.fabrication.checks import curve_checks, sheet_checks
-from pipeline.fabrication.readback import Curve, Drawing, read_drawings
+from pipeline.fabrication.checks.sheet_checks import check_compensation, check_curves, check_sheet
+from pipeline.fabrication.readback import Curve, Drawing, read_drawing
 from pipeline.problem.sections import Laser
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication.files import rectangle, sheet, stroke, write_dxf, write_svg
@@ -25,7 +25,7 @@ Damage = Callable[[list[Curve]], list[Curve]]
 
 
 def found(drawing: Drawing) -> list[str]:
-    faults = [*curve_checks.check(drawing), *sheet_checks.check(drawing, LASER, THICKNESS, {})]
+    faults = [*check_curves(drawing), *check_sheet(drawing, LASER, THICKNESS)]
     return [f"{fault.part}: {fault.what}" for fault in faults]
 
 
@@ -41,16 +41,8 @@ def moved(place: int, x: float, y: float = 0.0) -> Damage:
     return lambda kept: changed(place, points=np.add(kept[place].points, [x, y]))(kept)
 
 
-def added(curve: Curve) -> Damage:
-    return lambda kept: [*kept, curve]
-
-
-def bow_tie(kept: list[Curve]) -> list[Curve]:
-    return changed(OUTER, points=kept[OUTER].points[[0, 2, 1, 3]])(kept)
-
-
-def stutter(kept: list[Curve]) -> list[Curve]:
-    return changed(OUTER, points=kept[OUTER].points[[0, 0, 1, 2, 3]])(kept)
+def reordered(*order: int) -> Damage:
+    return lambda kept: changed(OUTER, points=kept[OUTER].points[list(order)])(kept)
 
 
 def outer_first(kept: list[Curve]) -> list[Curve]:
@@ -69,8 +61,8 @@ def shrunk(place: int, factor: float) -> Damage:
 
 DAMAGES: dict[str, tuple[Damage, str]] = {
     "open": (changed(OUTER, closed=False), "part A1: an open curve on layer CUT_OUTER"),
-    "bow tie": (bow_tie, "part A1: a cut that crosses or repeats itself"),
-    "zero length": (stutter, "part A1: a segment of no length"),
+    "bow tie": (reordered(0, 2, 1, 3), "part A1: a cut that crosses or repeats itself"),
+    "zero length": (reordered(0, 0, 1, 2, 3), "part A1: a segment of no length"),
     "spline": (changed(OUTER, kind="SPLINE"), "part A1: a SPLINE on layer CUT_OUTER"),
     "text": (changed(LETTER, kind="TEXT"), "part A1: a TEXT on layer ENGRAVE"),
     "layer 0": (changed(OUTER, layer="0"), "a layer of name '0'"),
@@ -92,7 +84,7 @@ DAMAGES: dict[str, tuple[Damage, str]] = {
     ),
     "letters outside": (moved(LETTER, -3.0), "part A1: engraving beyond its outline"),
     "line twice": (
-        added(stroke([(12.0, 15.0), (12.0, 17.0)], "A1")),
+        lambda kept: [*kept, stroke([(12.0, 15.0), (12.0, 17.0)], "A1")],
         "a line twice on layer ENGRAVE",
     ),
 }
@@ -105,8 +97,8 @@ def test_a_right_drawing_passes(tmp_path: Path, suffix: str) -> None:
 
 def drawn(path: Path, kept: list[Curve]) -> Drawing:
     if path.suffix == ".svg":
-        return read_drawings.read(write_svg(path, kept, SIZE))
-    return read_drawings.read(write_dxf(path, kept))
+        return read_drawing(write_svg(path, kept, SIZE))
+    return read_drawing(write_dxf(path, kept))
 
 
 @pytest.mark.parametrize("name", DAMAGES)
@@ -129,17 +121,31 @@ def test_a_damaged_svg_is_caught(tmp_path: Path, name: str) -> None:
 def test_text_in_an_svg_is_caught(tmp_path: Path) -> None:
     path = write_svg(tmp_path / "sheet.svg", sheet(), SIZE)
     path.write_text(path.read_text().replace("</svg>", '<text x="3" y="9">A1</text></svg>'))
-    assert any("a TEXT on layer" in words for words in found(read_drawings.read(path)))
+    assert any("a TEXT on layer" in words for words in found(read_drawing(path)))
+
+
+def test_a_unit_without_its_own_id_is_caught(tmp_path: Path) -> None:
+    bare = [curve for curve in sheet() if curve.layer != "ENGRAVE"]
+    assert found(drawn(tmp_path / "units_1.dxf", bare)) == [
+        "part A1: no id is engraved on it",
+        "part B1: no id is engraved on it",
+    ]
+    swapped = {"A1": "B1", "B1": "A1"}
+    other = [replace(c, part=swapped[c.part]) if c.layer == "ENGRAVE" else c for c in sheet()]
+    assert found(drawn(tmp_path / "units_2.dxf", other)) == [
+        "part B1: engraving beyond its outline",
+        "part A1: engraving beyond its outline",
+    ]
 
 
 def test_wrong_units_are_caught(tmp_path: Path) -> None:
-    drawing = read_drawings.read(write_dxf(tmp_path / "sheet.dxf", sheet(), units=1))
+    drawing = read_drawing(write_dxf(tmp_path / "sheet.dxf", sheet(), units=1))
     assert found(drawing) == ["the drawing: $INSUNITS is 1, not 4 (millimetres)"]
 
 
 def test_two_layers_of_one_colour_are_caught(tmp_path: Path) -> None:
     path = write_dxf(tmp_path / "sheet.dxf", sheet(), colours={"CUT_INNER": 1})
-    assert "layers CUT_INNER and CUT_OUTER have one colour" in found(read_drawings.read(path))[0]
+    assert "layers CUT_INNER and CUT_OUTER have one colour" in found(read_drawing(path))[0]
 
 
 @pytest.mark.parametrize(
@@ -151,14 +157,14 @@ def test_two_layers_of_one_colour_are_caught(tmp_path: Path) -> None:
     ],
 )
 def test_an_svg_of_another_scale_is_caught(tmp_path: Path, head: str) -> None:
-    drawing = read_drawings.read(write_svg(tmp_path / "sheet.svg", sheet(), SIZE, head))
+    drawing = read_drawing(write_svg(tmp_path / "sheet.svg", sheet(), SIZE, head))
     assert any("the page does not say" in words for words in found(drawing))
 
 
 def test_the_old_format_holds_the_same_curves(tmp_path: Path) -> None:
     old = [replace(c, kind="POLYLINE") for c in sheet()]
-    first = read_drawings.read(write_dxf(tmp_path / "new.dxf", sheet()))
-    second = read_drawings.read(write_dxf(tmp_path / "old.dxf", old, version="R12"))
+    first = read_drawing(write_dxf(tmp_path / "new.dxf", sheet()))
+    second = read_drawing(write_dxf(tmp_path / "old.dxf", old, version="R12"))
     assert second.version == "AC1009"
     for mine, other in zip(first.curves, second.curves, strict=True):
         assert (mine.part, mine.layer, mine.closed) == (other.part, other.layer, other.closed)
@@ -176,7 +182,7 @@ def grown(curve: Curve, kerf: float) -> Curve:
 def test_compensation_for_the_kerf_is_measured(tmp_path: Path, kerf: float, faults: int) -> None:
     nominal = drawn(tmp_path / "nominal.dxf", sheet())
     cut = drawn(tmp_path / "cut.dxf", [grown(curve, kerf) for curve in sheet()])
-    told = [fault.what for fault in sheet_checks.compensation([cut], [nominal], 0.2)]
+    told = [fault.what for fault in check_compensation([cut], [nominal], 0.2)]
     assert len(told) == faults
     assert all(words.endswith("of the nominal cut") for words in told)
 
@@ -184,7 +190,7 @@ def test_compensation_for_the_kerf_is_measured(tmp_path: Path, kerf: float, faul
 def test_a_part_missing_from_the_compensated_sheet_is_caught(tmp_path: Path) -> None:
     nominal = drawn(tmp_path / "nominal.dxf", sheet())
     cut = drawn(tmp_path / "cut.dxf", sheet()[:-1])
-    (fault,) = sheet_checks.compensation([cut], [nominal], 0.2)
+    (fault,) = check_compensation([cut], [nominal], 0.2)
     assert "other parts than at nominal size" in fault.what
 
 
@@ -197,4 +203,4 @@ def test_what_is_no_drawing_is_refused(tmp_path: Path, name: str, content: bytes
         content = path.read_bytes()[: path.stat().st_size // 2]
     path.write_bytes(content)
     with pytest.raises(UserError, match="cannot be read back"):
-        read_drawings.read(path)
+        read_drawing(path)

@@ -10,11 +10,10 @@ import pytest
 import trimesh
 from shapely import Polygon
 
-from pipeline.fabrication.checks import plate_checks
-from pipeline.fabrication.checks import slot_checks as corners
-from pipeline.fabrication.checks.slot_checks import MadeOutline
+from pipeline.fabrication.checks.print_folder import check_plate
+from pipeline.fabrication.checks.slot_checks import UnitSection, check_section
 from pipeline.fabrication.parts import Unit
-from pipeline.fabrication.readback import read_meshes
+from pipeline.fabrication.readback import check_solid, check_volume, read_3mf, read_stl
 from pipeline.problem.sections import Print
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints
@@ -35,54 +34,41 @@ def unit() -> Unit:
     return handmade.specimen().units[1]
 
 
-def without_a_face(mesh: Mesh) -> Mesh:
-    return mesh[0], mesh[1][:-1]
-
-
-def one_face_turned(mesh: Mesh) -> Mesh:
-    faces = mesh[1].copy()
-    faces[5] = faces[5, ::-1]
-    return mesh[0], faces
-
-
-def inside_out(mesh: Mesh) -> Mesh:
-    return mesh[0], mesh[1][:, ::-1]
-
-
-def a_face_twice(mesh: Mesh) -> Mesh:
-    return mesh[0], np.vstack([mesh[1], mesh[1][:1]])
-
-
-def not_a_number(mesh: Mesh) -> Mesh:
+def changed_point(mesh: Mesh) -> Mesh:
     points = mesh[0].copy()
     points[3, 1] = np.nan
     return points, mesh[1]
 
 
-def raised(mesh: Mesh) -> Mesh:
-    return np.add(mesh[0], [0.0, 0.0, 0.3]), mesh[1]
-
-
 def two_bodies(mesh: Mesh) -> Mesh:
     points, faces = mesh
-    return np.vstack([points, np.add(points, [40.0, 0.0, 0.0])]), np.vstack(
-        [faces, faces + len(points)]
-    )
+    beside = np.add(points, [40.0, 0.0, 0.0])
+    return np.vstack([points, beside]), np.vstack([faces, faces + len(points)])
+
+
+def without_a_face(mesh: Mesh) -> Mesh:
+    return mesh[0], mesh[1][:-1]
 
 
 DAMAGES: dict[str, tuple[Callable[[Mesh], Mesh], str]] = {
     "a hole": (without_a_face, "its surface has holes"),
-    "winding": (one_face_turned, "its triangles are not wound all the same way"),
-    "inside out": (inside_out, "it is inside out"),
-    "face twice": (a_face_twice, "its surface has holes"),
-    "not a number": (not_a_number, "vertices that are no numbers"),
-    "raised": (raised, "it starts at z = 0.300 mm"),
+    "winding": (
+        lambda mesh: (mesh[0], np.vstack([mesh[1][:1, ::-1], mesh[1][1:]])),
+        "its triangles are not wound all the same way",
+    ),
+    "inside out": (lambda mesh: (mesh[0], mesh[1][:, ::-1]), "it is inside out"),
+    "face twice": (
+        lambda mesh: (mesh[0], np.vstack([mesh[1], mesh[1][:1]])),
+        "its surface has holes",
+    ),
+    "not a number": (changed_point, "vertices that are no numbers"),
+    "raised": (lambda mesh: (mesh[0] + [0.0, 0.0, 0.3], mesh[1]), "it starts at z = 0.300 mm"),
     "two bodies": (two_bodies, "it falls into 2 pieces"),
 }
 
 
 def told(mesh: Mesh, path: Path) -> list[str]:
-    return [fault.what for fault in read_meshes.check(read_meshes.read_stl(write_stl(path, *mesh)))]
+    return [fault.what for fault in check_solid(read_stl(write_stl(path, *mesh)))]
 
 
 def test_a_right_mesh_passes(tmp_path: Path) -> None:
@@ -101,14 +87,14 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path, content: bytes | None) -> No
     path = write_stl(tmp_path / "B1.stl", *prism(unit().outline))
     path.write_bytes(path.read_bytes()[:999] if content is None else content)
     with pytest.raises(UserError, match="cannot be read back"):
-        read_meshes.read_stl(path)
+        read_stl(path)
 
 
 def test_volume_is_area_times_height(tmp_path: Path) -> None:
-    solid = read_meshes.read_stl(write_stl(tmp_path / "B1.stl", *prism(unit().outline)))
-    assert list(read_meshes.volume(solid, [0.0, 4.0, 8.1])) == []
+    solid = read_stl(write_stl(tmp_path / "B1.stl", *prism(unit().outline)))
+    assert list(check_volume(solid, [0.0, 4.0, 8.1])) == []
     assert solid.mesh.volume == pytest.approx(unit().outline.area * 8.1, rel=1e-5)
-    (fault,) = read_meshes.volume(solid, [0.0, 8.0])
+    (fault,) = check_volume(solid, [0.0, 8.0])
     assert "area times height" in fault.what
 
 
@@ -170,8 +156,8 @@ OUTLINES: dict[str, tuple[Callable[[Polygon], Polygon], str]] = {
 def faults_of(made: Polygon) -> list[str]:
     one = unit()
     ligaments = sorted(slot.vertex for slot in one.slots)
-    shape = MadeOutline(one.label, Path("B1.stl"), one.design, made, ligaments)
-    return [f"{fault.part}: {fault.what}" for fault in corners.check(shape, ASKED)]
+    shape = UnitSection(one.label, Path("B1.stl"), one.design, made, ligaments)
+    return [f"{fault.part}: {fault.what}" for fault in check_section(shape, ASKED)]
 
 
 def test_a_right_outline_passes() -> None:
@@ -192,10 +178,7 @@ def plate() -> tuple[dict[str, Mesh], dict[str, tuple[float, float]]]:
 
 
 def plate_faults(path: Path) -> list[str]:
-    return [
-        f"{fault.part}: {fault.what}"
-        for fault in plate_checks.check_plate(read_meshes.read_3mf(path), PRINT)
-    ]
+    return [f"{fault.part}: {fault.what}" for fault in check_plate(read_3mf(path), PRINT)]
 
 
 def test_a_right_plate_passes(tmp_path: Path) -> None:
@@ -234,11 +217,11 @@ def test_a_broken_object_is_caught_on_its_plate(tmp_path: Path) -> None:
 def test_other_units_than_millimetres_are_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate(), unit="inch")
     with pytest.raises(UserError, match="not millimeter"):
-        read_meshes.read_3mf(path)
+        read_3mf(path)
 
 
 def test_half_a_3mf_is_refused(tmp_path: Path) -> None:
     path = write_3mf(tmp_path / "plate.3mf", *plate())
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(UserError, match="cannot be read back"):
-        read_meshes.read_3mf(path)
+        read_3mf(path)

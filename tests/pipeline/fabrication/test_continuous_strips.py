@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.fabrication.fixtures import strip_parts
-from pipeline.fabrication.fixtures.continuous_strips import strips
+from pipeline.fabrication.fixtures.flat_fixtures import strips
 from pipeline.fabrication.parts import BuiltSpecimen
 from tests.pipeline.fabrication import handmade
 

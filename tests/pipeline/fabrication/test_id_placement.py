@@ -5,8 +5,7 @@ import pytest
 import shapely
 from shapely import LineString, Polygon, box
 
-from pipeline.fabrication.engraving import extent, fitted, text
-from pipeline.fabrication.engraving.orientation_mark import mark
+from pipeline.fabrication.engraving import orientation_mark, place_id, text_extent, text_strokes
 from pipeline.fabrication.parts import column_letters, labels
 from pipeline.fabrication.units.tracking_dots import dots
 from pipeline.problem.sections import Labels, Markers
@@ -16,14 +15,14 @@ BAND = box(0.0, 0.0, 1.5, 25.0)
 
 
 def test_text_fills_the_extent_that_it_claims() -> None:
-    drawn = shapely.total_bounds([LineString(stroke) for stroke in text("H8", 3.0)])
-    width, height = extent("H8", 3.0)
+    drawn = shapely.total_bounds([LineString(stroke) for stroke in text_strokes("H8", 3.0)])
+    width, height = text_extent("H8", 3.0)
     assert drawn == pytest.approx([-width / 2, -height / 2, width / 2, height / 2])
 
 
 @pytest.mark.parametrize("outline", [WIDE, BAND])
 def test_id_lies_inside_even_a_band_narrower_than_a_letter_is_high(outline: Polygon) -> None:
-    placed = fitted("H12", outline, outline, Labels())
+    placed = place_id("H12", outline, outline, Labels())
     assert placed is not None
     strokes = shapely.union_all([LineString(stroke) for stroke in placed.strokes])
     assert outline.covers(strokes)
@@ -31,7 +30,7 @@ def test_id_lies_inside_even_a_band_narrower_than_a_letter_is_high(outline: Poly
 
 
 def test_underside_is_the_mirror_image_of_the_top() -> None:
-    placed = fitted("F7", WIDE, WIDE, Labels())
+    placed = place_id("F7", WIDE, WIDE, Labels())
     assert placed is not None
     for top, below in zip(placed.strokes, placed.mirrored, strict=True):
         assert below[:, 1] == pytest.approx(top[:, 1])
@@ -39,9 +38,9 @@ def test_underside_is_the_mirror_image_of_the_top() -> None:
 
 
 def test_arrow_points_up_and_keeps_off_the_id() -> None:
-    placed = fitted("F7", WIDE, WIDE, Labels())
+    placed = place_id("F7", WIDE, WIDE, Labels())
     assert placed is not None
-    stem, shaft = mark(WIDE, WIDE, placed.box, Labels())
+    stem, shaft = orientation_mark(WIDE, WIDE, placed.box, Labels())
     assert stem[1, 1] == max(stem[:, 1]) > stem[0, 1]
     assert shaft[1] == pytest.approx(stem[1])
     assert not placed.box.intersects(LineString(stem))

@@ -9,16 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from pipeline.datasets import file_hash
-from pipeline.fabrication.checks import assembled_specimen, bill_checks, check_package
-from pipeline.fabrication.checks.expected_parts import of_design
-from pipeline.fabrication.checks.package_record import PackageRecord
-from pipeline.fabrication.papers import manifest
-from pipeline.fabrication.readback import read_meshes
+from pipeline.fabrication.checks import check_package
+from pipeline.fabrication.checks.assembled_specimen import unit_sections
+from pipeline.fabrication.checks.bill_checks import check_bill
+from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
+from pipeline.fabrication.papers import MANIFEST
+from pipeline.fabrication.readback import read_stl
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
+from tests.pipeline.fabrication.files import write_stl
 
 UNITS = "laser/units_sheet1_nominal"
 KERF = "laser/units_sheet1_kerf0.15"
@@ -37,7 +40,7 @@ def package(whole: tuple[Path, Problem], tmp_path: Path) -> Path:
 
 def refused(package: Path, asked: Problem) -> str:
     """What the checks say to a package whose manifest tells of its files as they are."""
-    path = package / manifest.NAME
+    path = package / MANIFEST
     if path.exists():
         told = json.loads(path.read_text())
         files = [file for file in package.rglob("*") if file.is_file() and file != path]
@@ -64,11 +67,7 @@ def edited(name: str, before: str, after: str, count: int = 1) -> Callable[[Path
     return damage
 
 
-def gone(name: str) -> Callable[[Path], None]:
-    return lambda package: (package / name).unlink()
-
-
-def all_gone(pattern: str) -> Callable[[Path], None]:
+def gone(pattern: str) -> Callable[[Path], None]:
     def damage(package: Path) -> None:
         for path in package.glob(pattern):
             path.unlink()
@@ -81,6 +80,13 @@ def copied(name: str, to: str) -> Callable[[Path], None]:
         shutil.copy(package / name, package / to)
 
     return damage
+
+
+def without_id(package: Path) -> None:
+    """A unit whose underside is plain."""
+    path = package / "print/units/A1.stl"
+    body = trimesh.creation.extrude_polygon(read_stl(path).section(4.0), 8.1, engine="earcut")
+    write_stl(path, np.asarray(body.vertices), np.asarray(body.faces))
 
 
 def halved(name: str) -> Callable[[Path], None]:
@@ -106,21 +112,22 @@ def scaled(name: str, factor: float) -> Callable[[Path], None]:
 
 DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "inches": (edited(f"{UNITS}.dxf", "$INSUNITS\n 70\n4", "$INSUNITS\n 70\n1"), "$INSUNITS is 1"),
-    "id swapped": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nZ9\n"), "unit A1: it is missing"),
-    "id twice": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nB1\n"), "unit A1: it is missing"),
+    "id swapped": (
+        edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nZ9\n", -1),
+        "unit A1: it is missing",
+    ),
+    "id twice": (edited(f"{UNITS}.dxf", "1000\nA1\n", "1000\nB1\n", -1), "unit A1: it is missing"),
     "layer": (edited(f"{UNITS}_r12.dxf", "CUT_OUTER", "CUT_OTHER", -1), "a layer of name"),
     "svg id": (edited(f"{UNITS}.svg", 'label="C2"', 'label="C9"'), "other parts, layers"),
     "svg scale": (edited(f"{UNITS}.svg", 'width="600mm"', 'width="600cm"'), "the page does not"),
     "r12 missing": (gone(f"{UNITS}_r12.dxf"), "units_sheet1_nominal_r12.dxf"),
-    "kerf missing": (
-        all_gone(f"{KERF}*"),
-        "there is no sheet of units for a kerf of 0.15 mm",
-    ),
+    "kerf missing": (gone(f"{KERF}*"), "there is no sheet of units for a kerf of 0.15 mm"),
     "no kerf made good": (copied(f"{UNITS}.dxf", f"{KERF}.dxf"), "another size or place"),
     "dxf cut short": (halved(f"{UNITS}.dxf"), "cannot be read back"),
     "unit missing": (gone("print/units/B1.stl"), "unit B1: it is missing"),
     "another unit": (copied("print/units/A1.stl", "print/units/B1.stl"), "unit B1"),
     "one unit more": (copied("print/units/A1.stl", "print/units/D7.stl"), "unit D7"),
+    "no id below": (without_id, "part A1: its underside shows no id"),
     "stl larger": (scaled("print/units/A1.stl", 1.01), "part A1: it is 8.181 mm high"),
     "stl cut short": (halved("print/units/A1.stl"), "cannot be read back"),
     "assembled larger": (scaled("print/assembled.stl", 1.5), "unit C1 is not in its place"),
@@ -130,6 +137,10 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
     "shims": (edited("bom.csv", "shim,S8.25,", "spare,S8.25,"), "8 on the sheets, 0 in the bill"),
     "too few shims": (edited("bom.csv", "shim,S8.25,8,", "shim,S8.25,7,"), "8 on the sheets, 7 in"),
     "another shim": (edited("bom.csv", "8.2500,8.1000", "8.2700,8.1000"), "it is not 8.27 x 8.10"),
+    "another letter": (
+        edited(MANIFEST, '"letters_for_ids": {}', '"letters_for_ids": {"A1": "Q"}'),
+        "unit A1: it is not on the assembly sheet",
+    ),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
 }
 
@@ -152,14 +163,11 @@ def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
     package: Path, whole: tuple[Path, Problem]
 ) -> None:
     edited("bom.csv", "8.2500,8.1000", "8.3000,8.1000")(package)
-    wanted, asked = of_design(built.design(), "cloaked"), whole[1].fabrication
-    found = assembled_specimen.shapes(
-        read_meshes.read_stl(package / "print/assembled.stl"), wanted, asked
-    )
-    told = [
-        fault.what for fault in bill_checks.check(PackageRecord(package, wanted, found, asked, {}))
-    ]
-    assert told == ["no shim is 8.25 mm long, from slot end to slot end"] * len(wanted.joints)
+    parts, settings = expected_parts(built.design(), "cloaked"), whole[1].fabrication
+    shapes = unit_sections(read_stl(package / "print/assembled.stl"), parts, settings)
+    faults = check_bill(PackageRecord(package, parts, shapes, settings, {}))
+    what = "no shim is 8.25 mm long, from slot end to slot end"
+    assert [fault.what for fault in faults] == [what] * len(parts.joints)
 
 
 @pytest.mark.parametrize("name", ["bom.csv", "laser/comb_sheet1_nominal.svg"])

@@ -9,7 +9,7 @@ from shapely import LineString, Polygon
 
 from pipeline.fabrication.parts import Slot
 from pipeline.fabrication.units.slot_candidates import Corner, side_truncations
-from pipeline.fabrication.units.slots import NoRoomError, place
+from pipeline.fabrication.units.slots import NoRoomError, place_slots
 from pipeline.fabrication.units.unit_outlines import cut, filleted, lugs, room_to_grow
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
@@ -63,7 +63,7 @@ def square(side: float) -> Polygon:
 
 def test_unit_of_the_paper_has_slots_towards_its_centroid_three_mm_deep() -> None:
     polygon = square(9.594)
-    for slot in place(polygon, corners(polygon), ASKED):
+    for slot in place_slots(polygon, corners(polygon), ASKED, polygon):
         assert slot.depth == 3.0
         assert slot.width == pytest.approx(0.45)
         assert slot.direction == pytest.approx(-slot.mouth / np.linalg.norm(slot.mouth))
@@ -77,7 +77,7 @@ def test_slot_in_a_sharp_corner_goes_deeper_for_its_walls() -> None:
     arm = 20.0 * np.array([np.cos(half), np.sin(half)])
     polygon = Polygon([(0.0, 0.0), arm * [1, -1], arm])
     corner = Corner(0, 0, np.array([1.0, 0.0]))
-    (slot,) = place(polygon, [corner], asked(direction="ligament"))
+    (slot,) = place_slots(polygon, [corner], asked(direction="ligament"), polygon)
     least = (0.8 + 0.225 * np.cos(half)) / np.sin(half)  # 0.56 mm would be left at 3 mm
     assert slot.depth == pytest.approx(np.ceil(least / 0.25) * 0.25)
     assert slot.wall >= 0.8
@@ -102,11 +102,11 @@ def test_slots_leave_walls_keep_apart_and_open_at_their_vertices(
     wanted = asked(direction=direction)
     room = polygon
     try:
-        slots = place(polygon, corners(polygon), wanted)
+        slots = place_slots(polygon, corners(polygon), wanted, polygon)
     except NoRoomError:
         room = room_to_grow(polygon, [], wanted.slots.thicken, wanted)
         try:
-            slots = place(polygon, corners(polygon), wanted, room)
+            slots = place_slots(polygon, corners(polygon), wanted, room)
         except NoRoomError:
             assume(False)
     body = lugs(polygon, room, slots, wanted)
@@ -143,7 +143,7 @@ def test_tips_are_cut_back_to_the_asked_thickness(angle: float, tip: float) -> N
 def test_too_slender_a_corner_is_named_with_the_wall_that_it_could_have() -> None:
     sliver = Polygon([(0.0, 0.0), (30.0, 0.0), (30.0, 1.0), (0.0, 1.0)])
     with pytest.raises(NoRoomError) as caught:
-        place(sliver, [Corner(0, 0, np.array([1.0, 0.0]))], ASKED)
+        place_slots(sliver, [Corner(0, 0, np.array([1.0, 0.0]))], ASKED, sliver)
     assert caught.value.vertex == 0
     assert caught.value.wall == pytest.approx((1.0 - 0.45) / 2, abs=0.05)
 

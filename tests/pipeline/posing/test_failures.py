@@ -20,7 +20,7 @@ def test_an_infeasible_start_names_unit_and_vertex(tmp_path: Path) -> None:
     values = constraints.values(np.zeros(scene.space.n_variables))
     for number in (0, len(values) - 1):
         error = InfeasibleStartError(number, 0.5)
-        told = failures.infeasible(error, constraints, path)
+        told = failures.infeasible_start(error, constraints, path)
         kind, where = constraints.named(number)
         assert told.key == f"constraints.{'convex' if kind == 'convexity' else kind}"
         assert where in told.what

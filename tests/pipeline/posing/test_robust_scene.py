@@ -13,7 +13,7 @@ import yaml
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.posing import design_scene
-from pipeline.problem.reading import load, overlaid
+from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import UserError
 from reports.products.robust_gains import build
 from sim.solvers import Harmonic
@@ -115,7 +115,7 @@ def test_a_pulse_is_a_load_of_its_own(fig2: Path) -> None:
 def test_a_preset_starts_from_the_design_of_the_study(fig2: Path, tmp_path: Path) -> None:
     content = yaml.safe_load(fig2.read_text())
     presets, again = content["presets"], {"optimiser": {"start": "study"}}
-    presets["again"] = overlaid(deepcopy(presets["quick"]), again)
+    presets["again"] = overlay_keys(deepcopy(presets["quick"]), again)
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump(content))
     words = ["--problem", str(path), "--method", "sqp", "--quiet", "--preset"]

@@ -9,8 +9,8 @@ import pytest
 from pipeline.__main__ import run_stage
 from pipeline.problem import content_hash, section_hash
 from pipeline.problem.reading import load
-from pipeline.problem.sections import numbered
-from pipeline.problem.sections.designs import parted
+from pipeline.problem.sections import design_name
+from pipeline.problem.sections.designs import split_name
 from pipeline.runtime import ROOT, UserError
 from pipeline.workflow.studies import Study, families, together
 from tests.pipeline import static
@@ -20,11 +20,11 @@ TWO = "designs: { cloak.disc.radius: [20 mm, 22 mm] }\n"
 
 
 def test_a_name_is_a_preset_and_a_number() -> None:
-    assert parted("quick") == ("quick", None)
-    assert parted("quick.2") == ("quick", 2)
-    assert parted("2") == (None, 2)
-    assert parted(None) == (None, None)
-    assert [numbered("quick", 2), numbered("", 2)] == ["quick.2", "2"]
+    assert split_name("quick") == ("quick", None)
+    assert split_name("quick.2") == ("quick", 2)
+    assert split_name("2") == (None, 2)
+    assert split_name(None) == (None, None)
+    assert [design_name("quick", 2), design_name("", 2)] == ["quick.2", "2"]
 
 
 def test_a_design_is_the_problem_with_its_value(tmp_path: Path) -> None:

@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.posing import scene_of
 from pipeline.problem import (
     Problem,
     canonical_json,
@@ -19,7 +21,7 @@ from pipeline.problem import (
     interest_units,
     section_hash,
 )
-from pipeline.problem.reading import load, overlaid, preset_names
+from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Quads
 from pipeline.runtime import UserError
 
@@ -118,20 +120,20 @@ mappings = st.recursive(
 
 @given(mappings)
 def test_nothing_laid_over_changes_nothing(base: dict[str, object]) -> None:
-    assert overlaid(base, {}) == base
+    assert overlay_keys(base, {}) == base
 
 
 @given(mappings, mappings)
 def test_an_overlay_wins_and_is_idempotent(
     base: dict[str, object], overlay: dict[str, object]
 ) -> None:
-    once = overlaid(base, overlay)
-    assert overlaid(once, overlay) == once
+    once = overlay_keys(base, overlay)
+    assert overlay_keys(once, overlay) == once
     assert set(once) == set(base) | set(overlay)
 
 
 def test_null_removes_a_key() -> None:
-    assert overlaid({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
+    assert overlay_keys({"a": {"b": 1, "c": 2}}, {"a": {"b": None}}) == {"a": {"c": 2}}
 
 
 SERIES = """drive:
@@ -170,6 +172,18 @@ def test_a_measured_motion_must_be_there_and_as_meant(fig2: Path, tmp_path: Path
     with pytest.raises(UserError, match="not the file that was meant") as caught:
         load(with_series(fig2, tmp_path, f"{SERIES}  sha256: {wrong}\n"))
     assert caught.value.key == "drive.sha256"
+
+
+def test_a_measured_motion_is_read_in_the_units_of_its_heading(fig2: Path, tmp_path: Path) -> None:
+    path = with_series(fig2, tmp_path, SERIES)
+    rows = ["time (ms);ux (cm);uy (mm);theta (deg)", "0;0;0;0", "1000;0,5;-2;180"]
+    (tmp_path / "motion.csv").write_text("\n".join(rows))
+    (drive,) = scene_of(load(path), tmp_path).loads.motions
+    np.testing.assert_allclose(drive(np.array([1.0])), [[5.0, -2.0, math.pi]])
+    (tmp_path / "motion.csv").write_text("\n".join([*rows, "1500;1;x;0"]))
+    with pytest.raises(UserError, match="not a finite number") as caught:
+        scene_of(load(path), tmp_path)
+    assert caught.value.line == 4
 
 
 def test_loading_leaves_the_heavy_libraries_alone(fig2: Path) -> None:

@@ -209,8 +209,8 @@ def test_a_bad_formula_is_told(tmp_path: Path, x: str, what: str) -> None:
 
 
 def test_points_on_the_rim_are_inside() -> None:
-    from pipeline.problem.outlines import inside
+    from pipeline.problem.outlines import find_inside
 
     square = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
     points = [(1.0, 0.0), (0.0, 0.0), (2.0, 1.0), (1.0, 1.0), (2.1, 1.0), (1.0, math.nan)]
-    assert inside(points, (square,), 1e-9) == [True, True, True, True, False, False]
+    assert find_inside(points, (square,), 1e-9) == [True, True, True, True, False, False]

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from pipeline.__main__ import main, overview
-from pipeline.datasets import TABLES
+from pipeline.datasets.tables import TABLES
 from pipeline.problem import Problem
 from pipeline.runtime import ROOT, STAGES, Stage
 

@@ -126,8 +126,8 @@ def test_random_cases_do_not_depend_on_their_number(tmp_path: Path) -> None:
     few = problem.load(static.write(tmp_path, static.HOLE + RANDOM)).sweep
     assert few is not None
     many = few.model_copy(update={"samples": 50})
-    drawn = list(sweep_cases.settings(many))
-    assert list(sweep_cases.settings(few)) == drawn[:3]
+    drawn = list(sweep_cases.list_settings(many))
+    assert list(sweep_cases.list_settings(few)) == drawn[:3]
     values = np.array([[float(str(word).split()[0]) for word in case.values()] for case in drawn])
     assert len(np.unique(values[:, 0])) == 50
     assert ((values[:, 0] > 1) & (values[:, 0] < 2)).all()
@@ -136,17 +136,17 @@ def test_random_cases_do_not_depend_on_their_number(tmp_path: Path) -> None:
 
 def test_values_side_by_side() -> None:
     wanted = Sweep.model_validate({"list": {"a.b": ["1 mm", "2 mm"], "c": ["x", "y"]}})
-    assert list(sweep_cases.settings(wanted)) == [
+    assert list(sweep_cases.list_settings(wanted)) == [
         {"a.b": "1 mm", "c": "x"},
         {"a.b": "2 mm", "c": "y"},
     ]
-    assert sweep_cases.unit_of(wanted, "c") == "1"
+    assert sweep_cases.parameter_unit(wanted, "c") == "1"
 
 
 def test_directions_are_load_cases_of_one_scene() -> None:
     grid = {"drive.directions": ["0 deg", "90 deg"], "drive.frequency": ["2 Hz", "3 Hz", "4 Hz"]}
     wanted = Sweep.model_validate({"grid": grid})
-    parts = [sweep_cases.part(wanted, k, 2) for k in range(2)]
+    parts = [sweep_cases.select_groups(wanted, k, 2) for k in range(2)]
     assert [group.numbers for part in parts for group in part] == [
         range(2),
         range(2, 4),

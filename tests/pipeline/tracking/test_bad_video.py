@@ -11,23 +11,26 @@ import numpy as np
 import pytest
 
 from pipeline.runtime import UserError
-from pipeline.tracking.detect import placed
-from pipeline.tracking.frames import BrokenOffError, Frame, frames, import_video
-from pipeline.tracking.geometry import SpecimenOutlines, of_design
-from pipeline.tracking.motion import follow
+from pipeline.tracking.detect import orientation_text
+from pipeline.tracking.frames import BrokenOffError, Frame, import_video, read_frames
+from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
+from pipeline.tracking.motion import track_video
 from tests.pipeline.tracking.conftest import CLIPS
+from tests.pipeline.virtual_lab.conftest import GRID, film_of
 
-SCALE = 2.74
+SCALE = 1 / 0.365
+WIDTH = 320
 
 
 @pytest.fixture(scope="module")
 def specimen() -> SpecimenOutlines:
-    return of_design(import_video.design(import_video.description(CLIPS / "f_silhouette.yaml")))
+    return outlines_of_design(import_video.design(GRID))
 
 
 @pytest.fixture(scope="module")
 def clip() -> list[np.ndarray]:
-    return [frame.image for frame in frames(CLIPS / "f_silhouette.mp4")][:4]
+    """The last frame at rest and three in motion."""
+    return list(film_of("bare").images())[2:6]
 
 
 def timed(images: list[np.ndarray]) -> list[Frame]:
@@ -38,7 +41,7 @@ def test_units_are_found_again_after_a_black_frame(
     specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
     shown = timed([*clip[:2], np.zeros_like(clip[0]), *clip[2:]])
-    track = follow(iter(shown), specimen, SCALE)
+    track = track_video(iter(shown), specimen, SCALE)
     assert np.isnan(track.displacement[2]).all()
     assert (track.quality[2] != 0).all()
     assert (track.quality[3:] == 0).all()
@@ -47,10 +50,10 @@ def test_units_are_found_again_after_a_black_frame(
 def test_a_video_from_behind_has_the_same_motions(
     specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
-    plain = follow(iter(timed(clip)), specimen, SCALE)
+    plain = track_video(iter(timed(clip)), specimen, SCALE)
     mirrored = [np.ascontiguousarray(image[:, ::-1]) for image in clip]
-    behind = follow(iter(timed(mirrored)), specimen, SCALE)
-    assert "mirrored" in placed(behind.calibration.camera)
+    behind = track_video(iter(timed(mirrored)), specimen, SCALE)
+    assert "mirrored" in orientation_text(behind.calibration.camera)
     apart = behind.displacement - plain.displacement
     assert np.sqrt(np.mean(apart[..., :2] ** 2)) / plain.calibration.pixel < 0.01
 
@@ -59,7 +62,7 @@ def test_pictures_of_16_bit_in_a_folder_are_a_video(tmp_path: Path, clip: list[n
     for number, image in enumerate(clip):
         path = tmp_path / f"frame{number + 8}.tif"
         assert cv2.imwrite(str(path), image.astype(np.uint16) * 257)
-    read = list(frames(tmp_path, rate=50.0))
+    read = list(read_frames(tmp_path, rate=50.0))
     assert [frame.time for frame in read] == [0.0, 0.02, 0.04, 0.06]
     np.testing.assert_allclose(read[3].image, clip[3], atol=1e-3)
 
@@ -68,29 +71,30 @@ def test_pictures_without_a_rate_or_of_another_size_are_told(
     tmp_path: Path, clip: list[np.ndarray]
 ) -> None:
     with pytest.raises(UserError, match="no pictures"):
-        list(frames(tmp_path, rate=1.0))
+        list(read_frames(tmp_path, rate=1.0))
     cv2.imwrite(str(tmp_path / "a1.png"), clip[0])
     cv2.imwrite(str(tmp_path / "a2.png"), clip[1][:50])
     with pytest.raises(UserError, match="no times"):
-        list(frames(tmp_path))
-    shown = frames(tmp_path, rate=1.0)
+        list(read_frames(tmp_path))
+    shown = read_frames(tmp_path, rate=1.0)
     next(shown)
     with pytest.raises(BrokenOffError, match="changes its size"):
         next(shown)
     (tmp_path / "a2.png").write_bytes(b"nothing")
     with pytest.raises(BrokenOffError, match=r"a2\.png cannot be read"):
-        list(frames(tmp_path, rate=1.0))
+        list(read_frames(tmp_path, rate=1.0))
 
 
-def test_a_phone_s_video_is_shown_upright(tmp_path: Path, clip: list[np.ndarray]) -> None:
+def test_a_phone_s_video_is_shown_upright(tmp_path: Path) -> None:
     """The header of the track tells by how much players are to turn it."""
     held = bytearray((CLIPS / "f_silhouette.mp4").read_bytes())
+    plain = next(read_frames(CLIPS / "f_silhouette.mp4")).image
     matrix = held.index(b"tkhd") + 4 + 40  # behind version, times, ids and layer
     one = 1 << 16
     held[matrix : matrix + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 768 * one, 0, 1 << 30)
     phone = tmp_path / "phone.mp4"
     phone.write_bytes(held)
-    np.testing.assert_array_equal(next(frames(phone)).image, np.rot90(clip[0], -1))
+    np.testing.assert_array_equal(next(read_frames(phone)).image, np.rot90(plain, -1))
 
 
 def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
@@ -99,11 +103,11 @@ def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> Non
     broken.write_bytes(whole[: len(whole) * 2 // 3])
     read: list[Frame] = []
     with pytest.raises(BrokenOffError, match="which are tracked") as caught:
-        read.extend(frames(broken))
+        read.extend(read_frames(broken))
     assert 0 < len(read) < 6
     end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
     assert end == pytest.approx(read[-1].time, abs=0.001)
-    assert list(frames(broken, end=end))
+    assert list(read_frames(broken, end=end))
 
 
 @pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])
@@ -114,7 +118,7 @@ def test_what_was_tracked_before_an_end_is_kept(
         yield from timed(clip[:2])
         raise error
 
-    track = follow(shown(), specimen, SCALE)
+    track = track_video(shown(), specimen, SCALE)
     assert track.ended is error
     assert track.displacement.shape[0] == len(track.time) == len(track.quality) == 2
 
@@ -123,12 +127,13 @@ def test_a_specimen_that_jumped_is_found_again(
     specimen: SpecimenOutlines, clip: list[np.ndarray]
 ) -> None:
     """By half the distance of two units, where a neighbour is as near as the unit itself."""
-    moved = cv2.getRotationMatrix2D((384, 384), 21.0, 1.0) + np.array([[0, 0, -9.0], [0, 0, 17.0]])
-    jumped = cv2.warpAffine(clip[0], moved, (768, 768), borderValue=205)
-    track = follow(iter(timed([clip[0], jumped])), specimen, SCALE)
+    turn = cv2.getRotationMatrix2D((WIDTH / 2, WIDTH / 2), 21.0, 1.0)
+    moved = turn + np.array([[0, 0, -9.0], [0, 0, 17.0]])
+    jumped = cv2.warpAffine(clip[0], moved, (WIDTH, WIDTH), borderValue=205)
+    track = track_video(iter(timed([clip[0], jumped])), specimen, SCALE)
     camera, pose = track.calibration.camera, track.displacement[1]
     wanted = camera.project(specimen.centre) @ moved[:, :2].T + moved[:, 2]
     seen = camera.project(specimen.centre + pose[:, :2])
-    inside = ((wanted > 20) & (wanted < 747)).all(axis=1)
+    inside = ((wanted > 20) & (wanted < WIDTH - 21)).all(axis=1)
     assert (track.quality[1:, inside] == 0).all()
     assert np.abs(seen - wanted)[inside].max() < 0.5

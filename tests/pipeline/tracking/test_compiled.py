@@ -10,8 +10,8 @@ from types import ModuleType
 import pytest
 from numba.core.registry import CPUDispatcher
 
-MODULES = ("blocks", "cells", "dense", "patch", "spline")
-NAMES = [*(f"pipeline.tracking.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
+MODULES = ("normal_equations", "patch_correlation", "template", "template_cells")
+NAMES = [*(f"pipeline.tracking.fit.{name}" for name in MODULES), "pipeline.virtual_lab.coverage"]
 
 
 def loops(module: ModuleType) -> Iterator[CPUDispatcher]:
@@ -33,4 +33,4 @@ def test_a_compiled_loop_calls_inlined_ones_only(name: str) -> None:
 
 def test_there_are_such_calls() -> None:
     patch = importlib.import_module("pipeline.tracking.fit.patch_correlation")
-    assert len(list(called(patch.fit))) > 2
+    assert len(list(called(patch.fit_patches))) > 2

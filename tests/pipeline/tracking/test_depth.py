@@ -8,12 +8,12 @@ import shapely
 
 from pipeline.problem.sections import VirtualRecording
 from pipeline.tracking.frames import Frame, import_video
-from pipeline.tracking.geometry import Depth, depth_of, of_design
-from pipeline.tracking.motion import follow
-from pipeline.tracking.reference_frame import Setup
-from pipeline.virtual_lab import sensor
+from pipeline.tracking.geometry import Depth, estimate_depth, outlines_of_design
+from pipeline.tracking.motion import track_video
+from pipeline.tracking.reference_frame import RecordingSetup
+from pipeline.virtual_lab import filming
 from pipeline.virtual_lab.camera_pose import viewpoint
-from pipeline.virtual_lab.face_marks import marks
+from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene
 from tests.pipeline.virtual_lab.conftest import GRID
 
@@ -24,23 +24,25 @@ MIDDLE = np.array([48.0, 40.0])  # that the camera looks at; the specimen is off
 
 
 def filmed(frames: int) -> tuple[FilmScene, list[np.ndarray], list[Frame]]:
-    specimen = of_design(import_video.design({**GRID, "grid": [5, 5]}))
+    specimen = outlines_of_design(import_video.design({**GRID, "grid": [5, 5]}))
     view = viewpoint(ASKED.camera, MIDDLE)
     none = np.empty((0, 2, 2), int)
-    scene = FilmScene(specimen, none, marks(specimen, "bare", ASKED.look, 0), ASKED.look, view)
+    scene = FilmScene(specimen, none, draw_marks(specimen, "bare", ASKED.look, 0), ASKED.look, view)
     place = np.round(specimen.centre / 15)
     sign = np.where(place.sum(axis=1) % 2 == 0, -0.3, 0.3)
     full = np.column_stack([-0.04 * specimen.centre[:, 0], 0.02 * specimen.centre[:, 1], sign])
     poses = [share * full for share in np.linspace(0, 1, frames)]
-    images = [sensor.frame(scene, pose[None], 0.0, k, ASKED) for k, pose in enumerate(poses)]
+    images = [
+        filming.sensor_frame(scene, pose[None], 0.0, k, ASKED) for k, pose in enumerate(poses)
+    ]
     return scene, poses, [Frame(k, k / 30, image) for k, image in enumerate(images)]
 
 
 def test_walls_are_no_motion() -> None:
     scene, poses, frames = filmed(8)
     errors = []
-    for setup in (Setup(8.0, 1000.0), Setup()):
-        track = follow(iter(frames), scene.specimen, 1 / 0.365, setup=setup)
+    for setup in (RecordingSetup(8.0, 1000.0), RecordingSetup()):
+        track = track_video(iter(frames), scene.specimen, 1 / 0.365, setup=setup)
         apart = (track.displacement - poses)[..., :2] / track.calibration.pixel
         errors.append(np.sqrt(np.mean(apart**2)))
     assert errors[0] < 0.03
@@ -49,7 +51,7 @@ def test_walls_are_no_motion() -> None:
 
 def test_a_distance_tells_where_the_camera_stands() -> None:
     view = viewpoint(ASKED.camera, MIDDLE)
-    found = depth_of(view.camera, MIDDLE, 8.0, 1000.0)
+    found = estimate_depth(view.camera, MIDDLE, 8.0, 1000.0)
     np.testing.assert_allclose([*found.foot, found.height], view.eye, rtol=1e-3)
 
 

@@ -10,7 +10,7 @@ import pytest
 from pipeline import datasets
 from pipeline.__main__ import run_stage
 from pipeline.tracking.frames import import_video
-from pipeline.tracking.geometry import of_design
+from pipeline.tracking.geometry import outlines_of_design
 from tests.pipeline.virtual_lab.conftest import GRID
 
 SMALL = GRID | {"grid": [4, 4]}
@@ -24,7 +24,7 @@ def export(tmp_path: Path) -> tuple[Path, np.ndarray]:
     """A YAML beside its CSV, y downwards and turned; and the motion (2, 16, 3) of the units."""
     design = import_video.design(SMALL)
     datasets.write(design, tmp_path / "design.nc", "design", {"problem": "{}"})
-    specimen = of_design(design)
+    specimen = outlines_of_design(design)
     random = np.random.default_rng(4)
     motion = np.zeros((2, 16, 3))
     motion[1] = random.uniform(-2, 2, (16, 3)) * [1, 1, 0.4]

@@ -33,7 +33,7 @@ def test_a_camera_is_found_from_what_it_sees(seed: int) -> None:
     camera = some_camera(random)
     points = np.stack(np.meshgrid(*2 * [np.linspace(0, 220, 10)]), axis=-1).reshape(-1, 2)
     pixels = camera.project(points)
-    found = cameras.fit(points, pixels, camera.size, 1e-3)
+    found = cameras.fit_camera(points, pixels, camera.size, 1e-3)
     np.testing.assert_allclose(found.project(points), pixels, atol=2e-3)
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
-from pipeline.tracking.frames import csv_columns, load_cell
+from pipeline.tracking.frames import load_cell
 from pipeline.tracking.frames.recording import LoadCellLog
 
 TIME = np.arange(5) / 10
@@ -53,4 +54,4 @@ def test_a_faulty_log_is_refused(tmp_path: Path, text: str, offset: float, told:
 
 def test_a_log_that_is_not_there_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="no such file"):
-        csv_columns.read(tmp_path / "none.csv", ["a"])
+        csv_columns.read_columns(tmp_path / "none.csv", ["a"])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from pipeline.tracking.detect import placed, sight
-from pipeline.tracking.detect.blobs import blobs
+from pipeline.tracking.detect import detect_lattice, orientation_text
+from pipeline.tracking.detect.blobs import find_blobs
 from pipeline.tracking.frames import import_video
-from pipeline.tracking.geometry import SpecimenOutlines, of_design
+from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID
 
@@ -16,7 +16,7 @@ PIXEL = 0.365 / 0.66  # mm: of the camera, and of the picture made smaller
 
 
 def specimen() -> SpecimenOutlines:
-    return of_design(import_video.design({**GRID, "grid": [24, 16]}))
+    return outlines_of_design(import_video.design({**GRID, "grid": [24, 16]}))
 
 
 def picture(name: str) -> np.ndarray:
@@ -25,10 +25,10 @@ def picture(name: str) -> np.ndarray:
 
 def test_units_at_rest_are_found_in_their_places() -> None:
     shown = specimen()
-    found = sight(picture("focusing_ref_frame_overlay_contours"), shown, None)[0]
+    found = detect_lattice(picture("focusing_ref_frame_overlay_contours"), shown, None)[0]
     assert not found.bright
     assert len(found.unit) > 0.8 * shown.count
-    assert placed(found.camera) == "upright"
+    assert orientation_text(found.camera) == "upright"
     area = np.abs(np.linalg.det(found.camera.jacobian(shown.centre)))
     np.testing.assert_allclose(np.sqrt(np.median(area)), 1 / PIXEL, rtol=0.05)
     apart = found.camera.project(shown.centre[found.unit]) - found.blob
@@ -38,6 +38,6 @@ def test_units_at_rest_are_found_in_their_places() -> None:
 def test_most_units_in_motion_stand_apart() -> None:
     shown = specimen()
     image = picture("focusing_dynamic_frame_overlay_quads")
-    found = blobs(image, shown, 1 / PIXEL, bright=False)
+    found = find_blobs(image, shown, 1 / PIXEL, bright=False)
     assert 0.6 * shown.count < len(found) < 1.1 * shown.count
     assert (np.ptp(found, axis=0) > 0.7 * np.ptp(shown.centre, axis=0) / PIXEL).all()

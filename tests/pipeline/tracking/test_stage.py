@@ -10,6 +10,8 @@ from pipeline import datasets
 from pipeline.__main__ import run_stage
 from tests.pipeline.tracking.conftest import CLIPS
 
+VIDEO = str(CLIPS / "f_silhouette.mp4")
+
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
@@ -22,7 +24,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What the stage says when it refuses; it must leave nothing behind."""
+    """Returns what the stage says when it refuses; it must leave nothing behind."""
     out = recording.with_name("track.nc")
     assert run_stage("track", [str(recording), "--out", str(out)]) == 2
     assert not out.exists()
@@ -40,15 +42,29 @@ def extended(recording: Path, line: str) -> None:
 
 
 def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
+    """With driven units, and a load cell on the clock of the file whatever the window."""
+    path, log = recording.with_name("f_silhouette_design.nc"), recording.with_name("load.csv")
+    design = datasets.read(path, "design")
+    driven = design["support"].copy()
+    driven[[112, 113]] = 2
+    origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
+    datasets.write(design.assign(support=driven), path, "design", origin)
+    log.write_text("time,force\n100,0\n101,1000\n", encoding="utf-8")
+    extended(recording, "window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}")
+    extended(recording, "load_axis: driven displacement")
     out = recording.with_name("track.nc")
     assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
     made = datasets.read(out, "track")
-    design = datasets.read(recording.with_name("f_silhouette_design.nc"), "design")
     assert made["displacement"].dims == ("time", "unit", "dof")
     np.testing.assert_array_equal(made["unit"], design["unit"])
     np.testing.assert_allclose(np.diff(made["time"]), 1 / 300, atol=1e-6)
     assert (made["quality"] == 0).all()
     assert made.attrs["synthetic"] == "yes"
+    assert made["frame"].values[0] == 2
+    np.testing.assert_allclose(made["load_force"], 1000 * made["frame"] / 300, atol=0.02)
+    mean = made["displacement"].isel(unit=[112, 113], dof=[0, 1]).mean("unit")
+    np.testing.assert_allclose(made["drive_displacement"], mean.values, atol=1e-9)
+    assert "drive_displacement" in made.coords
 
 
 @pytest.mark.parametrize(
@@ -65,120 +81,60 @@ def test_another_design_is_refused(
     other = recording.with_name("other.yaml")
     other.write_bytes((CLIPS / "f_silhouette.yaml").read_bytes())
     changed(other, old, new)
-    video = str(CLIPS / "f_silhouette.mp4")
     folder = str(recording.parent)
-    assert run_stage("track", ["import", str(other), "--video", video, "--out-dir", folder]) == 0
+    assert run_stage("track", ["import", str(other), "--video", VIDEO, "--out-dir", folder]) == 0
     words = refused(recording, capsys)
     assert "does not show this design" in words
     assert told in words
 
 
-def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(recording: Path) -> None:
-    made = []
-    for turned in ("0 deg", "180 deg"):
-        changed_to = recording.read_text(encoding="utf-8") + f"turned: {turned}\n"
-        asked = recording.with_name("turned.yaml")
-        asked.write_text(changed_to, encoding="utf-8")
-        out = recording.with_name("track.nc")
-        assert run_stage("track", [str(asked), "--out", str(out), "--no-report"]) == 0
-        made.append(datasets.read(out, "track")["displacement"].values)
-    upright, turned_by_half = made
-    assert np.abs(upright[-1, :, :2]).max() > 0.05
-    np.testing.assert_allclose(turned_by_half[:, ::-1, :2], -upright[..., :2], atol=0.01)
-
-
-def test_a_turn_that_is_not_so_is_refused(
+def test_a_lattice_that_looks_the_same_turned_is_as_the_recording_says(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    extended(recording, "mirrored: true")
-    assert "the specimen is seen otherwise: upright" in refused(recording, capsys)
+    """A log of another time leaves the track without forces."""
+    recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+    text = recording.read_text(encoding="utf-8")
+    made, out = [], recording.with_name("track.nc")
+    for turned, code in (("turned: 0 deg", 0), ("turned: 180 deg", 2)):
+        log = "load_cell: {file: load.csv, offset: 70}\n" if code else ""
+        recording.write_text(f"{text}{turned}\n{log}", encoding="utf-8")
+        assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == code
+        made.append(datasets.read(out, "track"))
+    upright, turned_by_half = (each["displacement"].values for each in made)
+    assert np.abs(upright[-1, :, :2]).max() > 0.05
+    np.testing.assert_allclose(turned_by_half[:, ::-1, :2], -upright[..., :2], atol=0.01)
+    assert np.isnan(made[1]["load_force"]).all()
+    assert "do not overlap: the track is kept" in capsys.readouterr().err
 
 
-def test_a_wrong_scale_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    changed(recording, "pixel_size: 0.365 mm", "pixel_size: 0.6 mm")
-    assert "pixels measure about 0.36" in refused(recording, capsys)
-
-
-def test_what_is_no_video_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    changed(recording, str(CLIPS / "f_silhouette.mp4"), str(CLIPS / "README.md"))
-    assert "not a readable video" in refused(recording, capsys)
-
-
-def test_black_frames_are_refused(
-    recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("", "mirrored: true\n", "the specimen is seen otherwise: upright"),
+        ("pixel_size: 0.365 mm", "pixel_size: 0.6 mm", "pixels measure about 0.36"),
+        (VIDEO, str(CLIPS / "README.md"), "not a readable video"),
+        (VIDEO, "black.mkv", "black or without contrast"),
+        ("pixel_size: 0.365 mm", "pixel_size: 0.365", "pixel_size"),
+        ("", "load_axis: driven displacement\n", "the design has no driven units"),
+        ("", "load_cell: {file: none.csv}\n", "none.csv"),
+    ],
+)
+def test_a_recording_that_cannot_be_tracked_is_refused(
+    recording: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, told: str
 ) -> None:
-    black = tmp_path / "black.mkv"
-    with av.open(str(black), "w") as container:
+    with av.open(str(recording.with_name("black.mkv")), "w") as container:
         stream = container.add_stream("ffv1", rate=10)
         stream.width, stream.height, stream.pix_fmt = 320, 240, "gray"
         frame = av.VideoFrame.from_ndarray(np.zeros((240, 320), np.uint8), format="gray")
         container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-    changed(recording, str(CLIPS / "f_silhouette.mp4"), str(black))
-    assert "black or without contrast" in refused(recording, capsys)
-
-
-def test_a_key_without_its_unit_is_refused(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    changed(recording, "pixel_size: 0.365 mm", "pixel_size: 0.365")
-    assert "pixel_size" in refused(recording, capsys)
-
-
-def test_the_load_cell_runs_on_the_clock_of_the_file_whatever_the_window(recording: Path) -> None:
-    log = recording.with_name("load.csv")
-    log.write_text("time,force\n100,0\n101,1000\n", encoding="utf-8")
-    extended(recording, "window: {start: 0.005 s}\nload_cell: {file: load.csv, offset: 100}")
-    out = recording.with_name("track.nc")
-    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
-    made = datasets.read(out, "track")
-    assert made["frame"].values[0] == 2
-    np.testing.assert_allclose(made["load_force"], 1000 * made["frame"] / 300, atol=0.02)
-
-
-def test_a_track_holds_the_displacement_of_the_driven_units(recording: Path) -> None:
-    path = recording.with_name("f_silhouette_design.nc")
-    design = datasets.read(path, "design")
-    driven = design["support"].copy()
-    driven[[112, 113]] = 2
-    origin = {"problem": "{}", "problem_hash": "", "parents": "{}"}
-    datasets.write(design.assign(support=driven), path, "design", origin)
-    extended(recording, "load_axis: driven displacement")
-    out = recording.with_name("track.nc")
-    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 0
-    made = datasets.read(out, "track")
-    mean = made["displacement"].isel(unit=[112, 113], dof=[0, 1]).mean("unit")
-    np.testing.assert_allclose(made["drive_displacement"], mean.values, atol=1e-9)
-    assert "drive_displacement" in made.coords
-
-
-def test_without_driven_units_there_is_no_such_axis(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    extended(recording, "load_axis: driven displacement")
-    assert "the design has no driven units" in refused(recording, capsys)
-
-
-def test_a_log_that_is_not_there_is_told_before_tracking(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    extended(recording, "load_cell: {file: none.csv}")
-    told = refused(recording, capsys)
-    assert "none.csv" in told
-    assert "units;" not in told
-
-
-def test_a_track_is_kept_where_its_log_is_of_another_time(
-    recording: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    recording.with_name("load.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-    extended(recording, "load_cell: {file: load.csv, offset: 70}")
-    out = recording.with_name("track.nc")
-    assert run_stage("track", [str(recording), "--out", str(out), "--no-report"]) == 2
-    assert "do not overlap: the track is kept" in capsys.readouterr().err
-    made = datasets.read(out, "track")
-    assert np.isnan(made["load_force"]).all()
-    assert np.isfinite(made["displacement"]).all()
+    if old:
+        changed(recording, old, new)
+    else:
+        extended(recording, new)
+    words = refused(recording, capsys)
+    assert told in words
+    assert "units;" not in words  # before tracking
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ def _template() -> tuple[np.ndarray, np.ndarray]:
 
 def test_cells_with_weight_are_steep_where_the_brightness_changes() -> None:
     brightness, weight = _template()
-    made = template_cells.cells_of(brightness[None], weight[None], np.array([50.0]))
+    made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     kind = made.kind[0]
     assert kind[15, 15] == template_cells.STEEP
     assert kind[15, 8] == template_cells.FLAT
@@ -28,7 +28,7 @@ def test_cells_with_weight_are_steep_where_the_brightness_changes() -> None:
 
 def test_nodes_are_unfolded_wherever_a_cell_reads_them() -> None:
     brightness, weight = _template()
-    made = template_cells.cells_of(brightness[None], weight[None], np.array([50.0]))
+    made = template_cells.classify_templates(brightness[None], weight[None], np.array([50.0]))
     nodes = np.full((SIZE, SIZE, 4), np.nan, np.float32)
     template_cells.unfold(brightness, weight, made.span[0], nodes)
     used = made.kind[0] != template_cells.EMPTY

@@ -27,7 +27,7 @@ def _made(motion: Floats, noise: Floats, told: float, seed: int) -> Floats:
     error -= image[0] * random.normal(size=error[0].shape)
     error[0] = 0.0
     steady = np.ones(len(motion), bool)
-    sigma = uncertainty.calibrated(motion[..., None] + error, image, CENTRE, steady)
+    sigma = uncertainty.calibrate_sigma(motion[..., None] + error, image, CENTRE, steady)
     return np.asarray(error[1:] / sigma[1:])
 
 
@@ -60,7 +60,7 @@ def test_what_noise_drifts_by_at_rest_is_no_motion() -> None:
     random = np.random.default_rng(4)
     drift = np.cumsum(0.02 * random.normal(size=(40, len(CENTRE), 3)), axis=0)
     image = np.full_like(drift, 0.05)
-    sigma = uncertainty.calibrated(drift, image, CENTRE, np.ones(40, bool))
+    sigma = uncertainty.calibrate_sigma(drift, image, CENTRE, np.ones(40, bool))
     spread = (drift / sigma).std(axis=(0, 1))
     assert (spread > 0.7).all()
     assert (spread < 1.5).all()
@@ -82,7 +82,7 @@ def test_few_frames_understate_nothing(frames: int) -> None:
 
 def test_too_few_frames_get_a_usual_multiple_of_the_image_s_figure() -> None:
     image = np.full((5, len(CENTRE), 3), 0.01)
-    sigma = uncertainty.calibrated(np.zeros_like(image), image, CENTRE, np.ones(5, bool))
+    sigma = uncertainty.calibrate_sigma(np.zeros_like(image), image, CENTRE, np.ones(5, bool))
     assert (sigma > 2 * image).all()
     assert (sigma < 3 * image).all()
 
@@ -93,6 +93,6 @@ def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
     error = 0.05 * np.random.default_rng(8).normal(size=motion.shape)
     motion, image = motion + error, np.full(motion.shape, 0.02)
     motion[250:], image[250:] = np.nan, np.nan
-    sigma = uncertainty.calibrated(motion, image, CENTRE, np.ones(frames, bool))
+    sigma = uncertainty.calibrate_sigma(motion, image, CENTRE, np.ones(frames, bool))
     assert HONEST[0] < (error / sigma)[:250].std() < HONEST[1]
     assert np.isnan(sigma[250:]).all()

@@ -11,8 +11,8 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.problem.sections import VirtualRecording
 from pipeline.tracking.frames import import_video
-from pipeline.virtual_lab import of_case, prepared
-from pipeline.virtual_lab.filming import Filming
+from pipeline.virtual_lab import prepare_film, select_case
+from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.samples import sample
 
 GRID = {
@@ -60,10 +60,14 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def film_of(kind: str, **changes: object) -> VirtualFilm:
+    """Prepares the film of the cloaked structure of the lattice, under one load case."""
+    one = select_case(response(import_video.design(GRID)), "cloaked", 0)
+    setup = VirtualRecording.model_validate({**SETUP, **changes})
+    return prepare_film(one, "cloaked", kind, setup)
+
+
 @pytest.fixture
-def film(files: Path) -> Filming:
+def film() -> VirtualFilm:
     """The cloaked structure of the lattice, bare, in the virtual lab."""
-    held = datasets.read(files / "response.nc", "response")
-    return prepared(
-        of_case(held, "cloaked", 0), "cloaked", "bare", VirtualRecording.model_validate(SETUP)
-    )
+    return film_of("bare")

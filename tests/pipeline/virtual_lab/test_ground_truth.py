@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from pipeline.problem.sections import UnitAppearance, Viewing
+from pipeline.problem.sections import CameraView, UnitAppearance
 from pipeline.tracking.geometry import SpecimenOutlines
-from pipeline.virtual_lab import coverage, sensor
+from pipeline.virtual_lab import coverage, filming
 from pipeline.virtual_lab.camera_pose import viewpoint
 from pipeline.virtual_lab.coverage import NestedPolygons
-from pipeline.virtual_lab.face_marks import marks
+from pipeline.virtual_lab.face_marks import draw_marks
 from pipeline.virtual_lab.film_scene import FilmScene
-from pipeline.virtual_lab.filming import Filming
+from pipeline.virtual_lab.filming import VirtualFilm
 
 SAMPLES = 16
 DEPTH = 8.0
@@ -22,7 +22,9 @@ def test_a_pixel_is_covered_by_what_lies_in_it() -> None:
     random = np.random.default_rng(5)
     angle = np.sort(random.uniform(0, 2 * np.pi, 7))
     corner = np.array([5.3, 4.1]) + 4.9 * np.column_stack([np.cos(angle), -np.sin(angle)])
-    made = coverage.picture(NestedPolygons(corner, np.array([0, 7]), np.array([1.0])), (9, 11))
+    made = coverage.coverage_image(
+        NestedPolygons(corner, np.array([0, 7]), np.array([1.0])), (9, 11)
+    )
     polygon = shapely.Polygon(corner)
     column, row = np.meshgrid(np.arange(11), np.arange(9))
     pixels = shapely.box(column - 0.5, row - 0.5, column + 0.5, row + 0.5)
@@ -40,7 +42,7 @@ def one_unit(look: UnitAppearance) -> FilmScene:
         np.empty((0, 2), int),
         np.zeros((1, 4), bool),
     )
-    asked = Viewing.model_validate(
+    asked = CameraView.model_validate(
         {
             "image": [64, 64],
             "pixel_size": "0.5 mm",
@@ -50,7 +52,7 @@ def one_unit(look: UnitAppearance) -> FilmScene:
         }
     )
     view = viewpoint(asked, np.array([12.0, 5.0]))
-    discs = marks(specimen, "dots", look, 0)
+    discs = draw_marks(specimen, "dots", look, 0)
     return FilmScene(specimen, np.empty((0, 2, 2), int), discs, look, view)
 
 
@@ -84,7 +86,7 @@ def test_the_picture_is_true_to_a_fraction_of_a_hundredth_of_a_pixel() -> None:
     look = UnitAppearance.model_validate({"face": 0.6, "mark": 0.0, "side": 0.3, "board": 1.0})
     scene = one_unit(look)
     pose = np.array([0.37, -0.21, 0.5])
-    made, exact = sensor.shade(scene, pose[None], 0.0), sampled(scene, pose)
+    made, exact = filming.shade_image(scene, pose[None], 0.0), sampled(scene, pose)
     assert np.isclose(exact, look.side).sum() > 20  # the walls are seen
     assert len(scene.marks.unit) == 2
     slope = np.gradient(made)
@@ -98,20 +100,21 @@ def test_blur_does_not_move_anything() -> None:
     """Blurred on a grid three times as fine, or nine times: the same picture."""
     scene = one_unit(UnitAppearance())
     pose = np.array([[0.1, 0.2, -0.3]])
-    made = sensor.shade(scene, pose, 0.5)
-    usual, sensor.FINER = sensor.FINER, 9
+    made = filming.shade_image(scene, pose, 0.5)
+    usual, filming.FINER = filming.FINER, 9
     try:
-        finer = sensor.shade(scene, pose, 0.5)
+        finer = filming.shade_image(scene, pose, 0.5)
     finally:
-        sensor.FINER = usual
+        filming.FINER = usual
     slope = np.gradient(made)
     for axis in (0, 1):
         assert abs((slope[axis] * (finer - made)).sum() / (slope[axis] ** 2).sum()) < 0.002
 
 
-def test_noise_is_that_of_the_electrons(film: Filming) -> None:
+def test_noise_is_that_of_the_electrons(film: VirtualFilm) -> None:
     scene, asked = film.scene, film.asked
-    still = [sensor.frame(scene, film.motion.instants[0], 0.0, index, asked) for index in range(2)]
+    poses = film.motion.instants[0]
+    still = [filming.sensor_frame(scene, poses, 0.0, index, asked) for index in range(2)]
     change = still[1][:20, :20].astype(float) - still[0][:20, :20]
     level = still[0][:20, :20].mean()
     counted = asked.sensor.full_well / 255

@@ -14,31 +14,27 @@ import pytest
 
 from pipeline import datasets
 from pipeline.problem.sections import VirtualRecording
-from pipeline.tracking.frames import Frame, frames
-from pipeline.tracking.motion import Track, follow
-from pipeline.virtual_lab import of_case, prepared
-from pipeline.virtual_lab.face_marks import Marks
-from pipeline.virtual_lab.filming import Filming
-from tests.pipeline.virtual_lab.conftest import SETUP
+from pipeline.tracking.frames import Frame, read_frames
+from pipeline.tracking.motion import Track, track_video
+from pipeline.virtual_lab import prepare_film, select_case
+from pipeline.virtual_lab.face_marks import FaceMarks
+from pipeline.virtual_lab.filming import VirtualFilm
+from tests.pipeline.virtual_lab.conftest import SETUP, film_of
 
 DARK, LIGHT = 0.05, 0.8
 
 
-def filmed(files: Path, specimen: str, **look: float) -> Filming:
+def filmed(specimen: str, **look: float) -> VirtualFilm:
     """Four frames, thin units: faces, marks and board of the shades that are given."""
-    held = datasets.read(files / "response.nc", "response")
-    asked = {**SETUP, "rate": "3 Hz", "look": {"thickness": "0 mm", **look}}
-    return prepared(
-        of_case(held, "cloaked", 0), "cloaked", specimen, VirtualRecording.model_validate(asked)
-    )
+    return film_of(specimen, rate="3 Hz", look={"thickness": "0 mm", **look})
 
 
-def shown(film: Filming) -> Iterator[Frame]:
+def shown(film: VirtualFilm) -> Iterator[Frame]:
     for index, image in enumerate(film.images()):
         yield Frame(index, index / 3, image)
 
 
-def check(film: Filming, track: Track, bar: float = 0.03) -> None:
+def check(film: VirtualFilm, track: Track, bar: float = 0.03) -> None:
     assert (track.quality == 0).all()
     error = track.displacement - film.motion.pose
     assert np.sqrt(np.mean(error[..., :2] ** 2)) / track.calibration.pixel < bar
@@ -55,20 +51,18 @@ def check(film: Filming, track: Track, bar: float = 0.03) -> None:
         ("bare", {"face": LIGHT, "side": LIGHT, "board": DARK}),
     ],
 )
-def test_shades_of_faces_marks_and_board(
-    files: Path, specimen: str, look: dict[str, float]
-) -> None:
-    film = filmed(files, specimen, **look)
-    check(film, follow(shown(film), film.scene.specimen, 1 / 0.365))
+def test_shades_of_faces_marks_and_board(specimen: str, look: dict[str, float]) -> None:
+    film = filmed(specimen, **look)
+    check(film, track_video(shown(film), film.scene.specimen, 1 / 0.365))
 
 
 @pytest.mark.parametrize(("specimen", "bar"), [("bare", 0.03), ("dots", 0.08)])
-def test_units_turn_about_their_own_middles(files: Path, specimen: str, bar: float) -> None:
+def test_units_turn_about_their_own_middles(specimen: str, bar: float) -> None:
     """Bare ones, assembled off their places; and those in their places, with faces glued on askew.
 
     The places of the latter are known no better than the camera, which such faces bend a little.
     """
-    film = filmed(files, specimen)
+    film = filmed(specimen)
     units, marks = film.scene.specimen, film.scene.marks
     off = np.where(np.arange(units.count) % 2, 1.0, -1.0)[:, None] * [0.3, 0.2]
     if specimen == "bare":
@@ -77,19 +71,19 @@ def test_units_turn_about_their_own_middles(files: Path, specimen: str, bar: flo
         made = replace(units, outline=units.outline + off[:, None])
         marks = marks._replace(centre=marks.centre + off[marks.unit])
     film = film._replace(scene=film.scene._replace(specimen=made, marks=marks))
-    check(film, follow(shown(film), units, 1 / 0.365), bar)
+    check(film, track_video(shown(film), units, 1 / 0.365), bar)
 
 
-def test_units_that_are_marked_in_different_ways(files: Path) -> None:
-    kinds = [filmed(files, kind).scene.marks for kind in ("dots", "speckle", "bare")]
-    film = filmed(files, "bare")
+def test_units_that_are_marked_in_different_ways() -> None:
+    kinds = [filmed(kind).scene.marks for kind in ("dots", "speckle", "bare")]
+    film = filmed("bare")
     parts = [
-        Marks(*(values[marks.unit % 3 == kind] for values in marks))
+        FaceMarks(*(values[marks.unit % 3 == kind] for values in marks))
         for kind, marks in enumerate(kinds)
     ]
-    mixed = Marks(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    mixed = FaceMarks(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     film = film._replace(scene=film.scene._replace(marks=mixed))
-    check(film, follow(shown(film), film.scene.specimen, 1 / 0.365))
+    check(film, track_video(shown(film), film.scene.specimen, 1 / 0.365))
 
 
 def test_polygons_with_other_numbers_of_corners(files: Path) -> None:
@@ -102,11 +96,11 @@ def test_polygons_with_other_numbers_of_corners(files: Path) -> None:
     whole = held.assign(vertices=(held["vertices"].dims, vertices))
     kept = whole.isel(ligament=np.isfinite(corners).all(axis=(1, 2)))
     asked: dict[str, Any] = {**SETUP, "rate": "3 Hz", "look": {"thickness": "0 mm"}}
-    film = prepared(
-        of_case(kept, "cloaked", 0), "cloaked", "bare", VirtualRecording.model_validate(asked)
+    film = prepare_film(
+        select_case(kept, "cloaked", 0), "cloaked", "bare", VirtualRecording.model_validate(asked)
     )
     assert film.scene.specimen.count == 42
-    check(film, follow(shown(film), film.scene.specimen, 1 / 0.365))
+    check(film, track_video(shown(film), film.scene.specimen, 1 / 0.365))
 
 
 @pytest.mark.parametrize(
@@ -114,9 +108,9 @@ def test_polygons_with_other_numbers_of_corners(files: Path) -> None:
     [("ffv1", "gray16le", ".mkv"), ("mjpeg", "yuvj444p", ".avi"), ("libx265", "yuv420p", ".mp4")],
 )
 def test_files_in_colour_of_16_bit_and_of_a_varying_rate(
-    files: Path, tmp_path: Path, codec: str, layout: str, suffix: str
+    tmp_path: Path, codec: str, layout: str, suffix: str
 ) -> None:
-    film = filmed(files, "dots")
+    film = filmed("dots")
     stamps = [0, 30, 90, 120]
     video = tmp_path / f"clip{suffix}"
     with av.open(str(video), "w") as container:
@@ -133,6 +127,6 @@ def test_files_in_colour_of_16_bit_and_of_a_varying_rate(
             frame.pts, frame.time_base = stamp, Fraction(1, 30)
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-    track = follow(frames(video), film.scene.specimen, 1 / 0.365)
+    track = track_video(read_frames(video), film.scene.specimen, 1 / 0.365)
     np.testing.assert_allclose(track.time, np.array(stamps) / 30, atol=0.002)
     check(film, track)

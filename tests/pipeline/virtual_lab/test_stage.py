@@ -10,7 +10,7 @@ import yaml
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from pipeline.virtual_lab.filming import Filming
+from pipeline.virtual_lab.filming import VirtualFilm
 from tests.pipeline.virtual_lab.conftest import SETUP
 
 
@@ -69,7 +69,7 @@ def test_the_same_recording_gives_the_same_bytes(files: Path, tmp_path: Path, co
     assert first == second
 
 
-def test_the_specimen_rests_first_and_then_moves(film: Filming) -> None:
+def test_the_specimen_rests_first_and_then_moves(film: VirtualFilm) -> None:
     assert (film.motion.pose[:3] == 0).all()
     assert (np.abs(film.motion.pose[4:]).max(axis=(1, 2)) > 0).all()
     np.testing.assert_allclose(film.motion.pose[12, 0, 2], -0.3 * 0.5, atol=1e-6)

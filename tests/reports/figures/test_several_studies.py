@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.problem.reading import Joint, joint_figure
+from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
 from reports.base import style
 from reports.figures.several_studies import build, content, figure, studies
@@ -15,7 +15,7 @@ from reports.page.publishing import publish
 from reports.study import StudyResults
 from tests.reports import compressed_study, figure_assertions
 
-ASKED = Joint(title="Two voids", studies=("fig_smile", "fig_frown"))
+ASKED = JointFigure(title="Two voids", studies=("fig_smile", "fig_frown"))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_command_line(tmp_path: Path) -> None:
 
 def test_the_committed_figure_names_studies() -> None:
     path = Path(__file__).parents[3] / "experiments/fig6/figure.yaml"
-    assert joint_figure.load(path).studies == ("fig6_heart", "fig6_shamrock")
+    assert joint_figure.load_joint_figure(path).studies == ("fig6_heart", "fig6_shamrock")
 
 
 @pytest.mark.parametrize(
@@ -90,10 +90,10 @@ def test_the_committed_figure_names_studies() -> None:
 def test_a_faulty_figure_is_told(tmp_path: Path, text: str, told: str) -> None:
     (tmp_path / "figure.yaml").write_text(text)
     with pytest.raises(UserError, match=told):
-        joint_figure.load(tmp_path / "figure.yaml")
+        joint_figure.load_joint_figure(tmp_path / "figure.yaml")
 
 
 def test_a_shaken_study_has_no_place_in_it(tmp_path: Path) -> None:
     path = Path(__file__).parents[3] / "experiments/fig2/figure.yaml"
     with pytest.raises(UserError, match="no such dataset"):
-        studies.load(path, Joint(studies=("fig2",)), None, tmp_path)
+        studies.load(path, JointFigure(studies=("fig2",)), None, tmp_path)

@@ -138,7 +138,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("benchmark")
     for name, (data, kind) in GIVEN.items():
         about = {"machine": json.dumps(MACHINE), "subject": f"of {name}", "reference": "truth"}
-        origin = provenance.recorded("{}", {}, synthetic=False, role="rules")
+        origin = provenance.of_recording("{}", {}, synthetic=False, role="rules")
         datasets.write(data.assign_attrs(about), out / f"{name}.nc", kind, origin)
     files = [str(out / f"{name}.nc") for name in GIVEN]
     assert build.main(["--datasets", *files, "--out-dir", str(out), "--quiet"]) == 0

@@ -10,7 +10,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.tracking.frames import WORD
+from pipeline.tracking.frames import SYNTHETIC_LABEL
 from reports.base import style
 from reports.products.calibration import build
 from reports.products.calibration.figure import draw_calibration
@@ -72,7 +72,7 @@ def calibration(*, synthetic: bool = True) -> xr.Dataset:
 def test_only_what_was_computed_is_called_so(synthetic: bool) -> None:
     with style.styled():
         made = drawn(draw_calibration(calibration(synthetic=synthetic)))
-    assert (WORD in words(made)) == synthetic
+    assert (SYNTHETIC_LABEL in words(made)) == synthetic
     assert_legible(made)
 
 
@@ -90,7 +90,7 @@ def test_sets_and_constants_are_told() -> None:
 
 
 def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
-    origin = provenance.recorded("{}", {}, synthetic=True, role="calibration")
+    origin = provenance.of_recording("{}", {}, synthetic=True, role="calibration")
     source = tmp_path / "calibration.nc"
     datasets.write(calibration().drop_attrs(), source, "calibration", origin | {"warnings": ""})
     for name in ("one", "two"):

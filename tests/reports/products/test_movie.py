@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.problem.sections import Codec
-from pipeline.virtual_lab import encode
+from pipeline.virtual_lab import encode_video
 from pipeline.workflow import showing
 from pipeline.workflow.movie_list import MOVIES
 from reports.base import style
@@ -73,7 +73,7 @@ def test_it_runs_at_the_speed_of_the_player() -> None:
 def test_the_same_frames_make_the_same_bytes(tmp_path: Path) -> None:
     def made(name: str) -> bytes:
         path = tmp_path / name
-        encode(path, list(images(reel(1), "title", "note"))[::8], RATE, Codec(crf=20), {})
+        encode_video(path, list(images(reel(1), "title", "note"))[::8], RATE, Codec(crf=20), {})
         return path.read_bytes()
 
     assert made("a.mp4") == made("b.mp4")

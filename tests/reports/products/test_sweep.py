@@ -10,7 +10,7 @@ import pytest
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.problem.sections import sweep_cases, taken_apart
+from pipeline.problem.sections import split_value, sweep_cases
 from pipeline.runtime import SweepResult
 from pipeline.stages import sweep as stage
 from reports.products.sweep import build, cases
@@ -35,7 +35,7 @@ STUCK = "no equilibrium at step 3"
 
 def found(setting: dict[str, str]) -> SweepResult:
     """A loss that grows with the amplitude and with nothing else; half of it with the cloak."""
-    amplitude, _ = taken_apart(setting["drive.amplitude"]) or (np.nan, "")
+    amplitude, _ = split_value(setting["drive.amplitude"]) or (np.nan, "")
     if amplitude > LIMIT:
         return SweepResult.failed(STUCK)
     return SweepResult(0.1 * amplitude, 0.2 * amplitude, -0.1 * amplitude)
@@ -47,10 +47,10 @@ def paths(folder: Path, text: str) -> tuple[Path, Path]:
     at = static.write(folder, static.HOLE + text, size=5)
     asked = problem.load(at)
     assert asked.sweep is not None
-    numbered = list(enumerate(sweep_cases.settings(asked.sweep)))
+    numbered = list(enumerate(sweep_cases.list_settings(asked.sweep)))
     results = {number: found(setting) for number, setting in numbered}  # type: ignore[arg-type]
     made = stage.dataset(asked, numbered, results)
-    datasets.write(made, folder / "sweep.nc", "sweep", provenance.attributes(asked, "sweep"))
+    datasets.write(made, folder / "sweep.nc", "sweep", provenance.of_study(asked, "sweep"))
     return at, folder / "sweep.nc"
 
 

@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.calibration import computed_sets, computed_track
 from pipeline.calibration.experiments import full_field
-from pipeline.calibration.experiments.measured_drive import changed
+from pipeline.calibration.experiments.measured_drive import apply_changes
 from pipeline.calibration.experiments.simulated_experiment import KnownDrive
-from pipeline.calibration.fit_uncertainty import lost_to_drives, uncertainty
-from pipeline.calibration.inputs import TrackedMotion, start
-from pipeline.calibration.least_squares import Fit, Model
+from pipeline.calibration.fit_uncertainty import estimate_errors, information_lost
+from pipeline.calibration.inputs import TrackedMotion, start_constants
+from pipeline.calibration.least_squares import Fit, FitModel
 from pipeline.comparison import redrive
 from pipeline.runtime import ROOT
 from sim.core import Floats
@@ -39,17 +39,17 @@ def fit(tmp_path_factory: pytest.TempPathFactory) -> Fit:
     }
     names = ["shear_stiffness", "damping_ratio"]
     asked = loaded(folder, described([track], names, material=TRUTH))
-    begin, true, (each,) = start(asked), computed_sets.truth(asked), asked.data
+    begin, true, (each,) = start_constants(asked), computed_sets.true_constants(asked), asked.data
     assert isinstance(each, TrackedMotion)
     random = np.random.default_rng(0)
-    seen = full_field.experiment(
-        each, folder, begin, computed_track.track_of(each, folder, true, random)
+    seen = full_field.pose_track(
+        each, folder, begin, computed_track.simulate_track(each, folder, true, random)
     )
     sigma = seen.measured.sigma
     values = seen.predict(true, np.zeros(0)) + sigma * random.normal(size=len(sigma))
     seen = replace(seen, measured=replace(seen.measured, values=values))
     seen = seen.with_drive_noise(true).with_drive_noise(true)
-    model = Model(begin, asked.fit, [seen])
+    model = FitModel(begin, asked.fit, [seen])
     at = true.logs(asked.fit)
     reach = np.stack([at - 1.0, at + 1.0], axis=1)
     return Fit(model, at, np.array([1.1]), model.residual(at), model.jacobian(at), reach)
@@ -65,7 +65,9 @@ def by_changes(fit: Fit, unknowns: Floats) -> Floats:
     step, columns = 1e-3, []
     for one in each.changes:
         ahead, behind = (
-            each.simulation.predict(constants, KnownDrive(units, changed(motion, [one], size)))
+            each.simulation.predict(
+                constants, KnownDrive(units, apply_changes(motion, [one], size))
+            )
             for size in (np.array([step]), np.array([-step]))
         )
         columns.append((ahead - behind) / (2 * step))
@@ -97,13 +99,13 @@ def test_what_is_lost_to_a_noisy_drive_is_that_of_its_definition(fit: Fit) -> No
     level = fit.level[0] ** 2
     whole = (straight / level + turned).T @ known @ (straight / level + turned)
     expected = level * (whole - straight.T @ known @ straight / level**2)
-    found = lost_to_drives(fit)
+    found = information_lost(fit)
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=0.02 * np.abs(expected).max())
 
 
 def test_intervals_are_those_of_what_is_left_of_the_information(fit: Fit) -> None:
-    known, information = uncertainty(fit), fit.jacobian.T @ fit.jacobian
+    known, information = estimate_errors(fit), fit.jacobian.T @ fit.jacobian
     np.testing.assert_allclose(known.least @ information, np.eye(2), atol=1e-9)
-    left = np.linalg.inv(information - lost_to_drives(fit))
+    left = np.linalg.inv(information - information_lost(fit))
     np.testing.assert_allclose(known.covariance, left @ information @ left, rtol=1e-6)
-    assert np.abs(lost_to_drives(fit)).max() > 0.01 * information.min()
+    assert np.abs(information_lost(fit)).max() > 0.01 * information.min()

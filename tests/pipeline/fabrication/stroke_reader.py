@@ -7,23 +7,18 @@ letter is looked for. Slots may cut through letters, so not all of a letter has 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 import shapely
 from shapely import LineString
 from shapely.geometry.base import BaseGeometry
 
-from pipeline.fabrication.engraving.reading_order import in_order
-from pipeline.fabrication.engraving.stroke_font import text
+from pipeline.fabrication.engraving import text_strokes
 from sim.core import Floats
 
-LEAST = 2.0
-"""Height of letters below which they cannot be read, mm."""
-
-LEGIBLE = 0.6
-"""Share of an id's strokes that has to be there."""
-
+_LEAST = 2.0  # mm, height of letters below which they cannot be read
+_LEGIBLE = 0.6  # share of an id that has to be there
 _WHOLE = 0.98  # of the strokes, with which no better height is looked for
 _TURNED = 0.01  # rad; turns nearer to each other, or to half a turn, go together
 _NEAR = 0.02  # mm from a stroke
@@ -33,62 +28,45 @@ _HEIGHTS = (1.9, 12.0)  # mm, of letters
 _TURNS, _SIZES = 1e-3, 2e-3  # rad and mm: votes so near to each other are one
 _TURNS_KEPT, _SIZES_KEPT = 6, 3
 _SPOTS_KEPT = 8
+_AHEAD, _BELOW = 0.5, -0.9  # heights from letter to letter, at least
 _MARK = 1.8  # mm, largest mark
 
 
-class Reading(NamedTuple):
-    """How letters stand: their height in mm, and their turn in rad."""
-
-    height: float
-    turn: float
-
-
-def read(words: str, strokes: Sequence[Floats]) -> Reading | None:
-    """How the letters of an id stand; None if the strokes do not show it and a mark beside it.
-
-    Args:
-        words: the id.
-        strokes: polylines (n, 2), mm: the id and the mark that tells how it stands.
-    """
-    lines = [stroke for stroke in strokes if len(stroke) > 1]
-    if not lines:
-        return None
-    lines = [stroke - lines[0][0] for stroke in lines]  # the same wherever the text stands
+def read(words: str, strokes: Sequence[Floats]) -> float | None:
+    """Reads the height of an id, mm; None if the strokes do not show it and a mark beside it."""
+    lines = [stroke - strokes[0][0] for stroke in strokes]  # the same wherever the text stands
     drawn = _segments(lines)
-    glyphs = [text(letter, 1.0) for letter in words]
+    glyphs = [text_strokes(letter, 1.0) for letter in words]
     whole = shapely.MultiLineString(lines)
     shapely.prepare(whole)
-    best, most = None, LEGIBLE
+    best, most, upright = None, _LEGIBLE, 0.0
     for size, turn in _ballots(drawn, np.concatenate([_segments(glyph) for glyph in glyphs])):
-        if best is not None and (most > _WHOLE or abs(np.sin(turn - best.turn)) > _TURNED):
+        if best is not None and (most > _WHOLE or abs(np.sin(turn - upright)) > _TURNED):
             break  # no better one is to be expected, upright or upside down
         spin = size * np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         letters = [[stroke @ spin for stroke in glyph] for glyph in glyphs]
         found, share = _read(letters, drawn, whole, spin)
         if share > most and _is_mark(whole.difference(found.buffer(2 * _NEAR))):
-            best, most = Reading(size, turn), share
+            best, most, upright = size, share, turn
     return best
 
 
 def _is_mark(rest: BaseGeometry) -> bool:
-    """Whether the strokes that belong to no letter can be one small mark."""
+    """Tests that the strokes that belong to no letter can be one small mark."""
     pieces = [piece for piece in shapely.get_parts(rest) if piece.length > _SPECK]
-    return bool(pieces) and span(pieces) < _MARK
-
-
-def span(pieces: Sequence[BaseGeometry]) -> float:
-    """Longer side of the box about some pieces."""
+    if not pieces:
+        return False
     x0, y0, x1, y1 = shapely.total_bounds(pieces)
-    return float(max(x1 - x0, y1 - y0))
+    return bool(max(x1 - x0, y1 - y0) < _MARK)
 
 
 def _segments(strokes: Sequence[Floats]) -> Floats:
-    """(n, 2, 2) starts and ends."""
+    """Lists starts and ends (n, 2, 2)."""
     return np.concatenate([np.stack([stroke[:-1], stroke[1:]], axis=1) for stroke in strokes])
 
 
 def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
-    """Heights and turns of the text, those with most votes first.
+    """Yields heights and turns of the text, those with most votes first.
 
     A stroke that a slot cuts votes for the right turn still, for the height only a whole one does:
     where all are cut, letters are small.
@@ -102,11 +80,11 @@ def _ballots(drawn: Floats, known: Floats) -> Iterator[tuple[float, float]]:
     for turn in _commonest(turns, _TURNS_KEPT):
         for size in _commonest(sizes[possible & (turns == turn)], _SIZES_KEPT):
             yield size * _SIZES, turn * _TURNS
-        yield LEAST, turn * _TURNS
+        yield _LEAST, turn * _TURNS
 
 
 def _commonest(votes: Floats, count: int) -> list[float]:
-    """The values with most votes, the largest of those with as many first."""
+    """Lists the values with most votes, the largest of those with as many first."""
     kinds, counts = np.unique(votes, return_counts=True)
     return [float(kind) for kind in kinds[np.lexsort((-kinds, -counts))[:count]]]
 
@@ -114,12 +92,14 @@ def _commonest(votes: Floats, count: int) -> list[float]:
 def _read(
     letters: Sequence[Sequence[Floats]], drawn: Floats, whole: shapely.Geometry, spin: Floats
 ) -> tuple[shapely.Geometry, float]:
-    """The letters where they stand, in reading order, and the share of them that is there."""
+    """Finds the letters where they stand, in reading order, and the share of them that is there."""
     lengths = [shapely.MultiLineString(letter).length for letter in letters]
     offers = [_spots(letter, drawn, whole) for letter in letters]
+    if not all(len(places) for places, _ in offers):
+        return shapely.MultiLineString(), 0.0
     upright = [places @ np.linalg.inv(spin) for places, _ in offers]
     weights = [there * length for (_, there), length in zip(offers, lengths, strict=True)]
-    taken, weight = in_order(upright, weights)
+    taken, weight = _in_order(upright, weights)
     lines = [
         stroke + places[at]
         for at, letter, (places, _) in zip(taken, letters, offers, strict=False)
@@ -131,7 +111,7 @@ def _read(
 def _spots(
     letter: Sequence[Floats], drawn: Floats, whole: shapely.Geometry
 ) -> tuple[Floats, Floats]:
-    """Where a letter may be (n, 2), and how much of it is there (n,); the best places.
+    """Finds where a letter may be (n, 2), and how much of it is there (n,); the best places.
 
     A stroke of the letter, or what a slot leaves of it, is drawn from its start or to its end.
     """
@@ -144,12 +124,29 @@ def _spots(
     fits = (np.abs(aside) < _NEAR * lengths) & (reach > _SAMPLE) & (reach < lengths + _NEAR)
     places = np.concatenate([(both[:, None] - own[None])[fits][:, end] for end in (0, 1)])
     places = np.unique(np.round(places, 2), axis=0)
-    points = np.concatenate([shapely.get_coordinates(_finely(one)) for one in letter])
+    points = shapely.get_coordinates(shapely.segmentize([LineString(s) for s in letter], _SAMPLE))
     near = shapely.dwithin(whole, shapely.points(places[:, None] + points[None]), 2 * _NEAR)
     there = near.mean(axis=1)
     order = np.argsort(-there, kind="stable")[:_SPOTS_KEPT]
     return places[order], there[order]
 
 
-def _finely(stroke: Floats) -> shapely.Geometry:
-    return shapely.segmentize(LineString(stroke), _SAMPLE)
+def _in_order(places: Sequence[Floats], weights: Sequence[Floats]) -> tuple[list[int], float]:
+    """Finds the heaviest choice of one place for each letter, on a line or below each other.
+
+    Places (n, 2) are upright, in heights; where no choice reads, the weight is zero.
+    """
+    choices: list[tuple[list[int], float]] = [([], 0.0)]
+    for below in (False, True):
+        sums, before = weights[0], []
+        for (first, second), weight in zip(pairwise(places), weights[1:], strict=True):
+            steps = second[None] - first[:, None]
+            follows = steps[..., 1] < _BELOW if below else steps[..., 0] > _AHEAD
+            ways = np.where(follows, sums[:, None], -np.inf)
+            before.append(ways.argmax(axis=0))
+            sums = ways.max(axis=0) + weight
+        taken = [int(sums.argmax())]
+        for way in reversed(before):
+            taken.append(int(way[taken[-1]]))
+        choices.append((taken[::-1], float(sums.max())))
+    return max(choices, key=lambda choice: choice[1])

@@ -1,4 +1,4 @@
-"""What is made, as data: units with their slots, shims, and any other flat part.
+"""Holds the parts of a specimen as data: units with their slots, shims, other flat parts.
 
 All lengths in mm. Units lie in the specimen frame (origin at the lattice point of unit (0, 0), x to
 the right, y up, seen from the top); z = 0 is the underside.
@@ -6,25 +6,53 @@ the right, y up, seen from the top); z = 0 is the underside.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
-from shapely import Polygon
+from shapely import Geometry, Polygon
 
+from pipeline.runtime import UserError
 from sim.core import Floats
 
 THIN_WALL = 1.2
 """Walls below this print, but break easily: they are warned of, mm."""
 
+LETTERS = "ABCDEFGHJKLMNPRSTUVXY4"
+"""What small units carry instead of their ids; none looks like another one that is turned."""
+
 Strokes = tuple[Floats, ...]
 """Open polylines (n, 2)."""
 
 
+class UnbuildableUnitError(UserError):
+    """Reports a unit of a design that cannot be made, with what a picture of it needs.
+
+    Args:
+        what: the fault in one sentence, with the unit's label.
+        around: outlines to show, mm.
+        spot: where the fault is, mm.
+        words: file, key, value and remedy of the error.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        around: tuple[Geometry, ...],
+        spot: Geometry,
+        **words: Any,  # noqa: ANN401
+    ) -> None:
+        super().__init__(what, **words)
+        self.around = around
+        self.spot = spot
+
+
 @dataclass(frozen=True)
 class Circle:
-    """A round hole, or a dot."""
+    """Holds a round hole, or a dot."""
 
     centre: tuple[float, float]
     diameter: float
@@ -32,7 +60,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class FlatPart:
-    """A flat part: one outline that is cut, round holes, strokes that are engraved.
+    """Holds a flat part: one outline that is cut, round holes, strokes that are engraved.
 
     Attributes:
         id: unique in the package; the name of its files and objects.
@@ -57,28 +85,27 @@ class FlatPart:
         return x1 - x0, y1 - y0
 
     def moved(self, x: float, y: float) -> FlatPart:
-        """The part with the lower left corner of its bounding box at (x, y)."""
-        x0, y0, _, _ = self.outline.bounds
-        shift = np.array([x - x0, y - y0])
-        return FlatPart(
-            self.id,
-            shapely.transform(self.outline, lambda points: points + shift),
-            self.height,
-            tuple(
-                Circle((hole.centre[0] + shift[0], hole.centre[1] + shift[1]), hole.diameter)
+        """Moves the lower left corner of the bounding box to (x, y)."""
+        shift = np.array([x, y]) - self.outline.bounds[:2]
+        dx, dy = shift
+        return replace(
+            self,
+            outline=shapely.transform(self.outline, lambda points: points + shift),
+            holes=tuple(
+                Circle((hole.centre[0] + dx, hole.centre[1] + dy), hole.diameter)
                 for hole in self.holes
             ),
-            tuple(stroke + shift for stroke in self.engraving),
-            tuple(stroke + shift for stroke in self.scores),
+            engraving=tuple(stroke + shift for stroke in self.engraving),
+            scores=tuple(stroke + shift for stroke in self.scores),
         )
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A slot at a vertex of a unit, for the end of one shim.
+    """Holds a slot at a vertex of a unit, for the end of one shim.
 
     Attributes:
-        vertex: which of the unit's vertices.
+        vertex: number of the unit's vertex.
         ligament: id of the ligament.
         mouth: (2,) the vertex as designed.
         direction: (2,) unit vector from the mouth to the inner end.
@@ -105,22 +132,22 @@ class Slot:
 
 @dataclass(frozen=True)
 class Unit:
-    """One unit of the specimen, where it stands before any load.
+    """Holds one unit of the specimen, where it stands before any load.
 
     Attributes:
         number: id in the datasets.
         label: id on the part and in all files: column letter and row number, from the lower left.
         column, row: lattice indices (i, j), from zero.
         design: the polygon as designed.
-        outline: the polygon as made: slots cut, tips truncated, corners filleted.
+        outline: the polygon to cut: with slots, truncated tips, filleted corners.
         slots: one for each ligament that ends here.
         lettering: strokes of the label, to be read from the top.
-        underside: the same, to be read from below, seen from the top.
         mark: strokes of the arrow that points to +y.
         markers: the tracking dots.
         height: in z.
+        underside: the lettering, to be read from below, seen from the top.
         thickened: area added beside slots so that their walls are thick enough, mm^2.
-        letter: what it carries instead of its id, where there is no room for that.
+        letter: carried instead of the id, where there is no room for that.
     """
 
     number: int
@@ -151,7 +178,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Ligament:
-    """One ligament of the specimen and the shim that it takes.
+    """Holds one ligament of the specimen and the shim that it takes.
 
     Attributes:
         number: id in the datasets.
@@ -170,7 +197,7 @@ class Ligament:
 
 @dataclass(frozen=True)
 class Shim:
-    """All shims of one length.
+    """Holds all shims of one length.
 
     Attributes:
         id: "S" and the length.
@@ -193,7 +220,7 @@ class Shim:
 
 @dataclass(frozen=True)
 class BuiltSpecimen:
-    """One structure of a study as it is built.
+    """Holds one structure of a study as it is built.
 
     Attributes:
         study: name of the study.
@@ -210,7 +237,7 @@ class BuiltSpecimen:
     ligaments: tuple[Ligament, ...]
     shims: tuple[Shim, ...]
     clamped: tuple[str, ...] = ()
-    driven: tuple[str, ...] = field(default=())
+    driven: tuple[str, ...] = ()
 
     @property
     def letters(self) -> dict[str, str]:
@@ -226,3 +253,30 @@ class BuiltSpecimen:
     def thin(self) -> dict[str, float]:
         """Thinnest walls by label, of the units that have thin ones."""
         return {unit.label: unit.wall for unit in self.units if unit.wall < THIN_WALL}
+
+
+def column_letters(column: int) -> str:
+    """Spells columns from zero as A, B, ... Z, AA, AB, ... as in a spreadsheet."""
+    letters = ""
+    column += 1
+    while column:
+        column, digit = divmod(column - 1, 26)
+        letters = chr(ord("A") + digit) + letters
+    return letters
+
+
+def labels(indices: Iterable[tuple[int, int]]) -> list[str]:
+    """Gives each lattice index (i, j) a unique label: "C7" is column 2, row 6.
+
+    Units that share an index (the two triangles of a kagome cell) get a, b, ... behind it.
+    """
+    pairs = [(int(i), int(j)) for i, j in indices]
+    shared = len(set(pairs)) < len(pairs)
+    seen: dict[tuple[int, int], int] = {}
+    names = []
+    for pair in pairs:
+        nth = seen.get(pair, 0)
+        seen[pair] = nth + 1
+        suffix = chr(ord("a") + nth) if shared else ""
+        names.append(f"{column_letters(pair[0])}{pair[1] + 1}{suffix}")
+    return names

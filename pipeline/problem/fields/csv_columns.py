@@ -1,0 +1,146 @@
+"""Reads columns of numbers from other programs' CSV files, whatever their separator."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from pipeline.problem.fields import units
+from pipeline.runtime import UserError, read_bounded, refusal
+
+if TYPE_CHECKING:
+    from sim.core import Floats
+
+_LARGEST = 512 << 20
+_HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
+
+
+class CsvCells(NamedTuple):
+    """Holds the cells of a CSV.
+
+    Attributes:
+        rows: of cells, without blanks about them.
+        separator: a comma, semicolon or tab; with the latter two, a comma may be the decimal sign.
+    """
+
+    rows: list[list[str]]
+    separator: str
+
+    def number(self, row: list[str], column: int) -> float | None:
+        """Reads the number in a cell; None where it holds no finite one."""
+        text = row[column] if column < len(row) else ""
+        try:
+            value = float(text if self.separator == "," else text.replace(",", "."))
+        except ValueError:
+            return None
+        return value if math.isfinite(value) else None
+
+
+def read_cells(path: Path) -> CsvCells:
+    """Reads all cells of a file, a row a line.
+
+    Raises:
+        UserError: no such file, too large, or no CSV.
+    """
+    try:
+        lines = read_bounded(path, _LARGEST).decode("utf-8-sig", errors="replace").splitlines()
+    except FileNotFoundError as error:
+        raise UserError("no such file", file=path, remedy="check the path") from error
+    except OSError as error:
+        raise refusal(path, error) from error
+    separator = next((sign for sign in ";\t" if any(sign in line for line in lines)), ",")
+    rows = csv.reader(lines, delimiter=separator)
+    try:
+        return CsvCells([[cell.strip() for cell in row] for row in rows], separator)
+    except csv.Error as error:
+        remedy = "give plain columns of numbers"
+        raise UserError(f"not a readable CSV: {error}", file=path, remedy=remedy) from error
+
+
+def read_columns(path: Path, names: Iterable[str]) -> Floats:
+    """Reads the named columns (lines, names) as they are; lines with gaps are left out.
+
+    Args:
+        path: a CSV; lines above its heading are comments.
+        names: of the columns.
+
+    Raises:
+        UserError: no such file, no such column, or no numbers in them.
+    """
+    import numpy as np
+
+    cells = read_cells(path)
+    heading, named = _heading(cells.rows, list(names), path)
+    found = [[cells.number(row, named[name]) for name in names] for row in cells.rows[heading:]]
+    kept = np.array([values for values in found if None not in values], float)
+    if not len(kept):
+        remedy = "give plain numbers below the heading"
+        raise UserError("no line holds numbers in all columns", file=path, remedy=remedy)
+    return kept
+
+
+def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: int = 1) -> Floats:
+    """Reads the named columns (lines, names) in working units.
+
+    Args:
+        path: a CSV whose heading names every column as `NAME (UNIT)`; lines above it are comments.
+        wanted: names and what they are.
+        least: number of lines below the heading that are needed.
+
+    Raises:
+        UserError: no such file or column, no unit or a wrong one, too few lines, or a line without
+            a finite number.
+    """
+    import numpy as np
+
+    cells = read_cells(path)
+    heading, named = _heading(cells.rows, list(wanted), path)
+    titles = {name: cells.rows[heading - 1][named[name]] for name in wanted}
+    factors = [_factor(titles[name], wanted[name], name, path) for name in wanted]
+    lines = [(number, row) for number, row in enumerate(cells.rows, 1) if any(row)]
+    lines = [(number, row) for number, row in lines if number > heading]
+    if len(lines) < least:
+        remedy = f"give {least} lines or more below the heading"
+        raise UserError(f"only {len(lines)} lines of numbers", file=path, remedy=remedy)
+    found = np.empty((len(lines), len(wanted)))
+    for place, (number, row) in enumerate(lines):
+        for column, at in enumerate(named[name] for name in wanted):
+            if (value := cells.number(row, at)) is None:
+                remedy = "mend or delete the line: all wanted columns need finite numbers"
+                text = row[at] if at < len(row) else ""
+                what = "not a finite number"
+                raise UserError(what, file=path, line=number, value=text, remedy=remedy)
+            found[place, column] = value
+    return np.asarray(found * factors)
+
+
+def _heading(rows: list[list[str]], wanted: list[str], path: Path) -> tuple[int, dict[str, int]]:
+    """Finds the line of the heading, counted from one, and the column of each name in it."""
+    seen: list[str] = []
+    for line, row in enumerate(rows, 1):
+        matches = [_HEADING.fullmatch(cell) for cell in row]
+        bare = {match["name"]: column for column, match in enumerate(matches) if match}
+        named = bare | {cell: column for column, cell in enumerate(row)}
+        if set(wanted) <= set(named):
+            return line, named
+        if len(row) >= len(wanted) and not seen:
+            seen = row
+    remedy = f"name the columns as the file does; it has: {', '.join(seen) or 'none'}"
+    raise UserError("columns are missing", file=path, value=wanted, remedy=remedy)
+
+
+def _factor(title: str, dimension: units.Dimension, name: str, path: Path) -> float:
+    """Reads the unit in a column's title: so many working units are one of it."""
+    remedy = f"write the heading as {name} ({dimension.unit}), with the unit of the numbers"
+    match = _HEADING.fullmatch(title)
+    if match is None:
+        raise UserError("the unit of the column is missing", file=path, key=name, remedy=remedy)
+    try:
+        return units.parse_quantity(f"1 {match['unit']}", dimension)
+    except UserError as error:
+        value = match["unit"]
+        raise UserError(error.what, file=path, key=name, value=value, remedy=remedy) from error
