@@ -130,10 +130,11 @@ bench-tracking: dev
 
 stress: dev
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \
-	    $(BIN)/python -m reports.products.stress.build --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
+	    $(BIN)/python -m reports stress --counts results/stress/stress.json --out-dir results/stress --quiet && exit $$code
 
 survive: dev
-	$(BIN)/python -m tests.hostile $(PARTS)
+	@$(BIN)/python -m tests.hostile $(PARTS); code=$$?; \
+	    $(BIN)/python -m reports survival --out-dir results/survival --quiet && exit $$code
 
 # Pins that still fit stay; those of the tools agree with those of users.
 LOCK = CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --strip-extras --allow-unsafe \

@@ -8,6 +8,8 @@ from snakemake.utils import min_version
 
 from pipeline.runtime import source_hash
 from pipeline.workflow import calibration_inputs, recordings, rule_inputs, studies
+from reports.catalogue import REPORTS
+from reports.paper_figures import paper_figures, paper_movies
 
 min_version("9.20")
 

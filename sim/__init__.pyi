@@ -13,12 +13,15 @@ from .scene import Objective as Objective
 from .scene import Response as Response
 from .scene import Scene as Scene
 from .scene import Structure as Structure
+from .scene import concrete_parameters as concrete_parameters
 from .scene import evaluate as evaluate
 from .scene import make_plan as make_plan
 from .scene import minimise as minimise
+from .scene import sample_times as sample_times
 from .scene import simulate as simulate
 from .solvers import Harmonic as Harmonic
 from .solvers import LinearRamp as LinearRamp
+from .solvers import MotionLaw as MotionLaw
 from .solvers import PrescribedMotion as PrescribedMotion
 from .solvers import Pulse as Pulse
 from .solvers import TanhRamp as TanhRamp
@@ -30,3 +33,11 @@ from .structure import VoidAngleContact as VoidAngleContact
 from .structure import damping_of_ratio as damping_of_ratio
 from .structure import kagome as kagome
 from .structure import quads as quads
+from .vibration import UnitCell as UnitCell
+from .vibration import bands as bands
+from .vibration import brillouin_path as brillouin_path
+from .vibration import cell_of as cell_of
+from .vibration import linearised as linearised
+from .vibration import modes as modes
+from .vibration import strained as strained
+from .vibration import transmission as transmission

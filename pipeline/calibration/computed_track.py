@@ -83,8 +83,8 @@ def _force(
         remedy = "leave out load, or name a problem whose drive has directions"
         raise UserError(what, file=folder / asked.problem, key="load", remedy=remedy)
     values = concrete_parameters(posed, posed.lattice.vertices)
-    reaction = observe(posed.topology, values, motion).reaction
-    return np.asarray(reaction[:, posed.loads.driven].sum(axis=1) @ towards)
+    seen = observe(posed.topology, values, motion)
+    return np.asarray(seen.force_on(posed.loads.driven) @ towards[:2])
 
 
 def _dataset(

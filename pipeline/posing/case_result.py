@@ -1,4 +1,4 @@
-"""What is kept of a simulated case: motion, energies, forces, clearance, loss and their errors."""
+"""Reduces a simulated case to motion, energies, forces, clearance, loss and their errors."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ LOG = logging.getLogger(__name__)
 
 
 class PosedStructure(NamedTuple):
-    """A structure under the problem's drives, its vertices (n_vertices, 2) in mm."""
+    """Holds a structure under the problem's drives, its vertices (n_vertices, 2) in mm."""
 
     scene: Scene
     vertices: Floats
 
 
 class Times(NamedTuple):
-    """When the response is wanted.
+    """Holds the times of the output.
 
     Attributes:
         asked: all times, ascending, s.
@@ -55,7 +55,7 @@ class Times(NamedTuple):
 
 
 class CaseResult(NamedTuple):
-    """What is kept of a simulated case: at the times shown, of the loss, and (region) at all."""
+    """Holds a simulated case at the times shown, those of the loss, and (region) at all."""
 
     displacement: Floats
     velocity: Floats
@@ -75,7 +75,7 @@ class CaseResult(NamedTuple):
 def measure(
     structure: PosedStructure, times: Times, intact: list[CaseResult] | None
 ) -> Measure[CaseResult]:
-    """What reduces the cases of a structure.
+    """Builds the function that reduces the cases of a structure.
 
     Args:
         structure: the structure.
@@ -128,7 +128,7 @@ def measure(
 def _target(
     motion: Floats, scene: Scene, number: int, intact: list[CaseResult] | None, at: Ints
 ) -> Floats | None:
-    """What the region (1, n_at, n_region, 3) should do: as the intact one did, which is its own."""
+    """Selects the target (1, n_at, n_region, 3): the intact structure's motion, or its own."""
     if scene.objective.reference is None:
         return None
     whole = motion[:, scene.objective.region] if intact is None else intact[number].region
@@ -161,7 +161,7 @@ def _stability(solved: Solved, at: Ints) -> NDArray[np.int8]:
 
 
 def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:
-    """The structures to compare, by name; an intact one only where something is to be mimicked."""
+    """Names the structures to compare; an intact one only where something is to be mimicked."""
     found = {
         "altered": PosedStructure(scene, scene.lattice.vertices),
         "cloaked": PosedStructure(scene, flat_vertices(scene.lattice, design["vertices"])),
@@ -173,7 +173,7 @@ def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]
 
 
 def times_of(asked: Problem, scene: Scene) -> Times:
-    """Output times of a problem's response."""
+    """Merges the output times of a problem's response."""
     horizon = scene.loads.duration
     end = (
         horizon

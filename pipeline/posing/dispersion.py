@@ -10,7 +10,6 @@ from pipeline.problem import Problem
 from pipeline.problem.sections import Kagome, ListedNetwork, Spectrum
 from pipeline.runtime import UserError
 from sim.core import SimulationError
-from sim.energy import topology
 from sim.structure import Parameters, parameters, shape
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
 
@@ -51,11 +50,10 @@ def _cell(asked: Problem) -> UnitCell:
         raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
     made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked))
-    fixed = topology(lattice, np.zeros(0, dtype=np.int64), contact_laws(asked)["angle"])
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
     values = Parameters(*(np.asarray(part) for part in made))
     try:
-        return cell_of(lattice, fixed, values, period)
+        return cell_of(lattice, contact_laws(asked)["angle"], values, period)
     except ValueError as error:
         what, remedy = str(error), "enlarge the lattice, or leave the section out"
         raise UserError(what, key="spectrum", remedy=remedy) from error

@@ -1,4 +1,4 @@
-"""Losses and overlaps of structures under either law of contact, as variables of a response."""
+"""Compares losses and overlaps under either law of contact, as variables of a response."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def by_contact(
 
 
 def cloak_losses(response: xr.Dataset) -> tuple[float, float]:
-    """Losses of a response's cloak by the angle law and with contact on distance; NaN if none."""
+    """Reads the losses of a cloak by the angle law and with contact on distance; NaN if none."""
     losses = response["loss_by_contact"].sel(structure="cloaked").mean("case")
     angle, distance = (float(losses.sel(contact_law=law)) for law in LAWS)
     return angle, distance
 
 
 def geometric(asked: Problem) -> Problem:
-    """The problem with contact on the distance of units."""
+    """Sets contact on the distance of units."""
     contact = asked.contact.model_copy(update={"law": "geometric"})
     return asked.model_copy(update={"contact": contact})
 
@@ -65,7 +65,7 @@ def geometric(asked: Problem) -> Problem:
 def _under(
     name: str, structure: PosedStructure, law: str, contact: ContactModel
 ) -> NDArray[np.float64]:
-    """Losses, largest number of overlaps and smallest gap (3, n_cases) under a law of contact."""
+    """Simulates losses, largest number of overlaps and smallest gap (3, n_cases) under a law."""
     nothing = np.full((len(_MEASURES), len(structure.scene.loads.cases)), np.nan)
     if not structure.scene.loads.static:
         return nothing

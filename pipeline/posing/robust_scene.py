@@ -1,4 +1,4 @@
-"""The scene that a design is optimised for: the problem's own, or with all that it must hold."""
+"""Poses the scene that a design is optimised for, with all loads that it must hold."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.solvers import MotionLaw
 
 
 def design_scene(asked: Problem, folder: Path) -> Scene:
-    """The scene whose loss a design of a problem is to lower; the drive's own cases come first.
+    """Poses the scene whose loss a design is to lower; the drive's own cases come first.
 
     Raises:
         UserError: the file of a measured drive cannot be read.
@@ -37,14 +37,14 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
 
 
 def _under(asked: Problem, load: Load) -> Problem:
-    """The problem under another load."""
+    """Puts the problem under another load."""
     assert isinstance(asked.drive, HarmonicDrive | RampHarmonicDrive)
     changed = load.model_dump(include={"amplitude", "frequency"}, exclude_none=True)
     return asked.model_copy(update={"drive": asked.drive.model_copy(update=changed)})
 
 
 def _copies(robust: Robust, scene: Scene) -> NDArray[np.float64]:
-    """Shifts (n_copies, n_groups, 2) of the vertices, evenly spread, mm."""
+    """Draws shifts (n_copies, n_groups, 2) of the vertices, evenly spread, mm."""
     largest = robust.geometry * scene.lattice.spacing
     random = np.random.default_rng(robust.seed)
     return random.uniform(-largest, largest, (robust.copies, scene.lattice.n_groups, 2))

@@ -1,4 +1,4 @@
-"""The losses of the altered structure and of a design in one problem, and why there are none."""
+"""Simulates the losses of the altered structure and of a design in one problem."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ Result = Outcome[tuple[float, float]]
 
 
 class UnposedError(ValueError):
-    """A setting that makes no problem that could be simulated."""
+    """Refuses a setting that makes no problem that could be simulated."""
 
 
 def results(
     asked: Problem, setting: Setting, folder: Path, vertices: xr.DataArray, threads: int
 ) -> list[SweepResult]:
-    """What comes of every load case of a problem with a setting laid over it.
+    """Simulates every load case of a problem with a setting laid over it.
 
     Args:
         asked: the problem, whose files lie in ``folder``.
@@ -60,7 +60,7 @@ def results(
 
 
 def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
-    """Several load cases as one: their losses weighted, their smallest void angle."""
+    """Joins several load cases into one: their losses weighted, their smallest void angle."""
     numbers = np.array([each[:-1] for each in found])
     loss, altered = weights @ numbers[:, :2]
     status = next((each.status for each in found if each.status != "ok"), "ok")
@@ -68,7 +68,7 @@ def mean(found: list[SweepResult], weights: Floats) -> SweepResult:
 
 
 def _posed(asked: Problem, setting: Setting) -> Problem:
-    """The problem with a setting in place of its own values, and without a sweep."""
+    """Lays a setting over a problem's own values, and drops the sweep."""
     data = apply_setting(json.loads(canonical_json(asked, "sweep")), setting)
     data.pop("sweep")
     problem = from_canonical(data)
@@ -88,7 +88,7 @@ def _found(altered: Result, cloaked: Result) -> SweepResult:
 def _simulated(
     scene: Scene, vertices: Floats, target: Floats | None, threads: int
 ) -> Iterator[Result]:
-    """Loss and smallest void angle of a structure in each load case."""
+    """Simulates loss and smallest void angle of a structure in each load case."""
     try:
         plan = make_plan(scene, vertices, threads=threads)
     except SimulationError as error:

@@ -1,4 +1,4 @@
-"""Motions in time with shorter and shorter steps, and with contact on the distance of units."""
+"""Repeats motions with shorter and shorter steps, and with contact on the distance of units."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Runs = dict[str, Response]
 def trials(
     asked: Problem, folder: Path, design: xr.Dataset
 ) -> tuple[dict[str, dict[str, CheckResult]], dict[str, str]]:
-    """Numbers by check and structure, and by check whether there are any or why not.
+    """Collects numbers by check and structure, and by check whether there are any or why not.
 
     Raises:
         SimulationError: a structure cannot be simulated as it was run.
@@ -70,7 +70,7 @@ def _first(structure: PosedStructure, times: Times) -> Response:
 
 
 def _time_step(run: Response) -> float:
-    """Longest of the equal steps of all cases, s; NaN of a graded grid."""
+    """Reads the longest of the equal steps of all cases, s; NaN of a graded grid."""
     steps = [r.steps.h if isinstance(r, ExplicitRecord) else np.nan for r in run.records]
     return float(max(steps))
 

@@ -1,4 +1,4 @@
-"""From a problem to the scene that sim/ simulates."""
+"""Poses the scene that sim/ simulates from a problem."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "thet
 
 
 def lattice_of(problem: Problem) -> Lattice:
-    """The intact initial network of a problem."""
+    """Builds the intact initial network of a problem."""
     return problem.lattice.network()
 
 
 def altered_lattice_of(problem: Problem) -> Lattice:
-    """The initial network of a problem with its void."""
+    """Builds the initial network of a problem with its void."""
     return lattice_of(problem).without(_units(problems.void_units(problem)))
 
 
 def scene_of(
     problem: Problem, folder: Path, motions: tuple[loads.MotionLaw, ...] | None = None
 ) -> Scene:
-    """The scene of a problem whose files lie in ``folder``.
+    """Poses the scene of a problem whose files lie in ``folder``.
 
     Args:
         problem: the problem.
@@ -109,7 +109,7 @@ def _loads(
 
 
 def _selected(problem: Problem, units: Selector, lattice: Lattice) -> NDArray[np.int64]:
-    """Places of selected units in a network."""
+    """Finds the places of selected units in a network."""
     return lattice.positions(_units(problems.selected_units(units, problem.lattice)))
 
 
@@ -118,7 +118,7 @@ def _units(ids: Iterable[int]) -> NDArray[np.int64]:
 
 
 def contact_laws(problem: Problem) -> dict[str, ContactModel]:
-    """Laws of contact by their names in the problem file, whichever it asks for."""
+    """Builds the laws of contact by their names in the problem file, whichever it asks for."""
     asked, ligament = problem.contact, problem.lattice.ligament_length
     by_default = activation_distance(ligament, problem.constraints.gap)
     return {
@@ -128,7 +128,7 @@ def contact_laws(problem: Problem) -> dict[str, ContactModel]:
 
 
 def limits_of(problem: Problem) -> Limits:
-    """What a design must keep to so that it can be made."""
+    """Reads the limits that a design must keep to so that it can be made."""
     asked = problem.constraints
     return Limits(
         edge_length=asked.edge_length,
@@ -140,12 +140,12 @@ def limits_of(problem: Problem) -> Limits:
 
 
 def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
-    """Places of the units of a network that follow the drive."""
+    """Finds the places of the units of a network that follow the drive."""
     return _selected(problem, problem.drive.units, lattice)
 
 
 def material_of(problem: Problem) -> Material:
-    """Constants of a problem's specimen, without those of an inclusion."""
+    """Reads the constants of a problem's specimen, without those of an inclusion."""
     given = problem.material
     translation, rotation = problem.damping_coefficients
     return Material(
@@ -160,7 +160,7 @@ def material_of(problem: Problem) -> Material:
 
 
 def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Material:
-    """The material with the ligaments of an inclusion's units as much stiffer as asked for."""
+    """Stiffens the ligaments of an inclusion's units as much as asked for."""
     if problem.inclusion is None:
         return material
     stiff = lattice.positions(_units(problems.inclusion_units(problem)))
@@ -174,7 +174,7 @@ def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Materi
 
 
 def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
-    """The drive of every load case."""
+    """Builds the motion of every load case."""
     drive = problem.drive
     match drive:
         case TimeSeriesDrive():

@@ -23,11 +23,11 @@ rule benchmark:
     threads: 1
     params:
         folder=subpath(output[0], parent=True),
-        source=lambda wildcards: source_hash("reports.products.benchmark.build"),
+        source=lambda wildcards: source_hash(REPORTS["benchmark"].module),
     message:
         "Drawing the benchmarks"
     shell:
-        "python -m reports.products.benchmark.build --datasets {input} --out-dir {params.folder} --log {log}"
+        "python -m reports benchmark --datasets {input} --out-dir {params.folder} --log {log}"
 
 
 rule measure:

@@ -52,9 +52,9 @@ rule calibration_figure:
     threads: 1
     params:
         folder=subpath(output[0], parent=True),
-        source=source_hash("reports.products.calibration.build"),
+        source=source_hash(REPORTS["calibration"].module),
     message:
         "Drawing the fit of {wildcards.calibration}"
     shell:
-        "python -m reports.products.calibration.build --calibration {input} --out-dir {params.folder}"
+        "python -m reports calibration --calibration {input} --out-dir {params.folder}"
         " --log {log}"

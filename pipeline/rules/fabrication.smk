@@ -35,9 +35,9 @@ rule fabrication_page:
             path.rpartition("/")[0] for path in input.packages
         ],
         problem=rule_inputs.section("fabricate"),
-        source=source_hash("reports.products.fabrication.build"),
+        source=source_hash(REPORTS["fabrication"].module),
     message:
         "Drawing the page of what is built of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.products.fabrication.build {params.study} --packages {params.folders}"
+        "python -m reports fabrication {params.study} --packages {params.folders}"
         " --out {output} --log {log}"

@@ -29,9 +29,9 @@ rule robust_gains_page:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        source=source_hash("reports.products.robust_gains.build"),
+        source=source_hash(REPORTS["robust-gains"].module),
     message:
         "Drawing what the robust presets of {wildcards.name} gain"
     shell:
-        "python -m reports.products.robust_gains.build --problem experiments/{wildcards.name}/problem.yaml"
+        "python -m reports robust-gains --problem experiments/{wildcards.name}/problem.yaml"
         " --gains {input.gains} --out-dir {params.folder} --log {log}"

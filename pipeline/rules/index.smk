@@ -4,18 +4,18 @@ rule all:
         expand(
             "results/{figure}/report/index.html", figure=["fig1", *studies.figures()]
         ),
-        expand("results/movies/{movie}.mp4", movie=studies.movies()),
+        expand("results/movies/{movie}.mp4", movie=MOVIES),
     output:
         "results/index.html",
     log:
         "results/logs/index.log",
     threads: 1
     params:
-        source=source_hash("reports.products.index.build"),
+        source=source_hash(REPORTS["index"].module),
     message:
         "Drawing the index of results"
     shell:
-        "python -m reports.products.index.build --results results --log {log}"
+        "python -m reports index --results results --log {log}"
 
 
 # The same page over what is there now. It has no output, so it always runs when it is asked for.
@@ -26,4 +26,4 @@ rule index:
     message:
         "Drawing the index of what is there"
     shell:
-        "python -m reports.products.index.build --results results --log {log}"
+        "python -m reports index --results results --log {log}"

@@ -1,11 +1,12 @@
 # The paper's movies, of the studies that there are; every study in full, with its recordings.
+MOVIES = studies.present(paper_movies())
+
+
 rule movie:
     input:
-        datasets=lambda wildcards: rule_inputs.datasets_of(
-            studies.movies()[wildcards.movie]
-        ),
+        datasets=lambda wildcards: rule_inputs.datasets_of(MOVIES[wildcards.movie]),
         comparisons=lambda wildcards: rule_inputs.comparisons_of(
-            studies.movies()[wildcards.movie]
+            MOVIES[wildcards.movie]
         ),
     output:
         "results/movies/{movie}.mp4",
@@ -13,20 +14,16 @@ rule movie:
         "results/logs/movie_{movie}.log",
     threads: 1
     params:
-        problems=lambda wildcards: [
-            study.problem for study in studies.movies()[wildcards.movie]
-        ],
-        problem=lambda wildcards: rule_inputs.hashes_of(
-            studies.movies()[wildcards.movie]
-        ),
-        source=source_hash("reports.products.movie.build"),
+        problems=lambda wildcards: [study.problem for study in MOVIES[wildcards.movie]],
+        problem=lambda wildcards: rule_inputs.hashes_of(MOVIES[wildcards.movie]),
+        source=source_hash(REPORTS["movie"].module),
     message:
         "Drawing movie {wildcards.movie}"
     shell:
-        "python -m reports.products.movie.build --problems {params.problems} --results results"
+        "python -m reports movie --problems {params.problems} --results results"
         " --comparisons {input.comparisons} --out {output} --log {log}"
 
 
 rule movies:
     input:
-        expand("results/movies/{movie}.mp4", movie=studies.movies()),
+        expand("results/movies/{movie}.mp4", movie=MOVIES),

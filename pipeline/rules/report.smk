@@ -24,11 +24,11 @@ rule report:
         datasets=rule_inputs.shown_options,
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.section("report"),
-        source=source_hash("reports.figures.study_report"),
+        source=source_hash(REPORTS["study"].module),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.figures.study_report {params.study} {params.datasets}"
+        "python -m reports study {params.study} {params.datasets}"
         " --comparisons {input.comparisons} --out-dir {params.folder} --log {log}"
 
 
@@ -57,11 +57,11 @@ rule joint_report:
         preset=lambda wildcards: wildcards.preset.replace("@", "--preset "),
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.member_hashes,
-        source=source_hash("reports.figures.several_studies.build"),
+        source=source_hash(REPORTS["several-studies"].module),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.figures.several_studies.build --figure {input.figure} {params.preset}"
+        "python -m reports several-studies --figure {input.figure} {params.preset}"
         " --results results --out-dir {params.folder} --log {log}"
 
 
@@ -91,11 +91,11 @@ rule family_report:
         study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.member_hashes,
-        source=source_hash("reports.figures.several_designs.build"),
+        source=source_hash(REPORTS["several-designs"].module),
     message:
         "Drawing figure and page of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.figures.several_designs.build {params.study} --results results"
+        "python -m reports several-designs {params.study} --results results"
         " --out-dir {params.folder} --log {log}"
 
 

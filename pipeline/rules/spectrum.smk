@@ -36,9 +36,9 @@ rule spectrum_page:
         study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.section("spectrum"),
-        source=source_hash("reports.products.spectrum.build"),
+        source=source_hash(REPORTS["spectrum"].module),
     message:
         "Drawing modes, transmission and waves of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.products.spectrum.build {params.study} --spectrum {input.spectrum}"
+        "python -m reports spectrum {params.study} --spectrum {input.spectrum}"
         " --out-dir {params.folder} --log {log}"

@@ -29,8 +29,8 @@ rule stress_page:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        source=lambda wildcards: source_hash("reports.products.stress.build"),
+        source=lambda wildcards: source_hash(REPORTS["stress"].module),
     message:
         "Drawing what came of the attempts to break the numbers"
     shell:
-        "python -m reports.products.stress.build --counts {input} --out-dir {params.folder} --log {log}"
+        "python -m reports stress --counts {input} --out-dir {params.folder} --log {log}"

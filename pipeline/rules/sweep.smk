@@ -60,9 +60,9 @@ rule sweep_page:
         study=rule_inputs.options,
         folder=subpath(output.page, parent=True),
         problem=rule_inputs.section("report"),
-        source=source_hash("reports.products.sweep.build"),
+        source=source_hash(REPORTS["sweep"].module),
     message:
         "Drawing the sweep of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.products.sweep.build {params.study} --sweep {input.sweep}"
+        "python -m reports sweep {params.study} --sweep {input.sweep}"
         " --out-dir {params.folder} --log {log}"

@@ -90,9 +90,9 @@ rule track_report:
     threads: 1
     params:
         folder=subpath(output.page, parent=True),
-        source=source_hash("reports.products.tracking.build"),
+        source=source_hash(REPORTS["tracking"].module),
     message:
         "Drawing overlay and quality of {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m reports.products.tracking.build --track {input.track} --video {input.video:q}"
+        "python -m reports tracking --track {input.track} --video {input.video:q}"
         " --out-dir {params.folder} --log {log}"

@@ -256,7 +256,7 @@ expect. Choices that are given several values are tried in every combination."""
             _file("--video", "FILE", "import: the video"),
             option("--pixel-size", type=float, metavar="MM", help="init: roughly"),
             _file("--out-dir", "FOLDER", "of the files", default=Path()),
-            option("--no-report", action="store_true", help="neither overlay nor quality page"),
+            option("--no-report", action="store_true", help="no hint at overlay and quality page"),
         ),
         about="""\
   track RECORDING.yaml --out track.nc [--design NC]
@@ -264,7 +264,7 @@ expect. Choices that are given several values are tried in every combination."""
   track points POINTS.yaml --out track.nc [--design NC]
   track import VIDEO.yaml [--video FILE] [--out-dir FOLDER]
 
-The first also writes track.csv, and track_report/ with an overlay video and a page on quality.
+The first also writes track.csv, and tells how an overlay video and a page on quality are made.
 The second proposes a recording YAML, draws the units that it found on the first frame, and says
 what it could not tell. The third reads the points of a commercial DIC system, a CSV that the YAML
 names, instead of a video. The fourth writes NAME_recording.yaml and NAME_design.nc for a described

@@ -7,8 +7,6 @@ import json
 import logging
 import os
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -151,21 +149,13 @@ def _track(path: Path, args: argparse.Namespace) -> None:
         LOG.warning("warning: the %d frames until then are kept in %s", len(track.time), args.out)
         raise track.ended
     if not args.no_report:
-        _report(args.out, video)
+        words = ["--track", str(args.out), "--video", str(video), "--out-dir"]
+        command = shlex.join([*words, str(args.out.with_name(f"{args.out.stem}_report"))])
+        LOG.info("overlay and quality page: python -m %sreports tracking %s", PREFIX, command)
     if track.ended is not None:
         raise track.ended
     if cell is not None:
         load_cell.check(log, track.start + track.time, held, cell)
-
-
-def _report(track: Path, video: Path) -> None:
-    """Runs the stage that draws overlay and quality."""
-    folder = track.with_name(f"{track.stem}_report")
-    words = ["--track", str(track), "--video", str(video), "--out-dir", str(folder)]
-    command = [sys.executable, "-m", f"{PREFIX}reports.products.tracking.build", *words]
-    if subprocess.run(command, check=False).returncode:
-        remedy = f"the track itself is whole; for the report run: {shlex.join(command[1:])}"
-        raise UserError("the report could not be made", file=folder, remedy=remedy)
 
 
 def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Path]:

@@ -1,1 +1,0 @@
-from .movie_list import showing as showing

@@ -15,7 +15,6 @@ from pipeline.problem import Problem
 from pipeline.problem.reading import joint_figure, load, overlay_keys, preset_names, yaml_file
 from pipeline.problem.sections import design_count, design_name
 from pipeline.runtime import WORK, UserError
-from pipeline.workflow.movie_list import MOVIES
 from pipeline.workflow.recordings import RECORDINGS
 
 PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", RECORDINGS)
@@ -53,10 +52,6 @@ class Study:
     def options(self) -> str:
         """Gives the options by which a stage finds the problem."""
         return f"--problem {self.problem}" + (f" --preset {self.preset}" if self.preset else "")
-
-
-FRAMED = (Study("fig2"),)
-"""From which the framework is drawn, Figure 1."""
 
 
 @cache
@@ -119,13 +114,13 @@ def figures() -> list[str]:
     return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
 
 
-def movies() -> dict[str, list[Study]]:
-    """Lists the movies whose studies are there, with these studies."""
+def present(named: Mapping[str, Collection[str]]) -> dict[str, list[Study]]:
+    """Keeps the groups of names whose studies are all below experiments/, with these studies."""
     there = {study.name for study in studies()}
     return {
-        name: [Study(each) for each in shown]
-        for name, shown in MOVIES.items()
-        if there.issuperset(shown)
+        name: [Study(each) for each in group]
+        for name, group in named.items()
+        if there.issuperset(group)
     }
 
 

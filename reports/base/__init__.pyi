@@ -1,6 +1,4 @@
 from . import style as style
-from .command_options import drawn as drawn
-from .command_options import joined as joined
 from .csv_table import Table as Table
 from .style import ALTERED as ALTERED
 from .style import GREY as GREY

@@ -1,4 +1,4 @@
-"""Data tables of a report, as CSV."""
+"""Describes data tables of a report, as CSV."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Table:
-    """A table that lies beside the page as a CSV file and inside it as a download."""
+    """Describes a table that lies beside the page as a CSV file and inside it as a download."""
 
     name: str
     text: str
@@ -22,12 +22,12 @@ class Table:
 
     @property
     def n_rows(self) -> int:
-        """Number of rows without the heading."""
+        """Returns number of rows without the heading."""
         return len(next(iter(self.columns.values())))
 
     @property
     def csv(self) -> bytes:
-        """The table as CSV: ten significant digits, empty where there is no value."""
+        """Returns the table as CSV: ten significant digits, empty where there is no value."""
         lines = StringIO()
         writer = csv.writer(lines, lineterminator="\n")
         writer.writerow(self.columns)

@@ -1,4 +1,4 @@
-"""One plotting style for every figure: millimetres, fonts, colours, reproducible files.
+"""Describes one plotting style for every figure: millimetres, fonts, colours, reproducible files.
 
 Figures are laid out in millimetres from the top-left corner of the page, so a panel has the size
 that it will have in print. Colour maps are straight in lightness and even in OKLab (Ottosson
@@ -97,25 +97,25 @@ _TO_LAB = np.array(
 
 
 def oklab(rgb: Floats) -> Floats:
-    """OKLab coordinates (..., 3) of sRGB colours (..., 3) in [0, 1]."""
+    """Returns OKLab coordinates (..., 3) of sRGB colours (..., 3) in [0, 1]."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return np.cbrt(linear @ _TO_LMS.T) @ _TO_LAB.T
 
 
 def srgb(lab: Floats) -> Floats:
-    """SRGB colours (..., 3), clipped to [0, 1], of OKLab coordinates (..., 3)."""
+    """Returns SRGB colours (..., 3), clipped to [0, 1], of OKLab coordinates (..., 3)."""
     linear = ((lab @ np.linalg.inv(_TO_LAB).T) ** 3) @ np.linalg.inv(_TO_LMS).T
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def colour_map(name: str, anchors: Sequence[str], levels: int = 256) -> Colormap:
-    """Colour map through `anchors` with equal OKLab distance between neighbouring levels."""
+    """Finds colour map through `anchors` with equal OKLab distance between neighbouring levels."""
     return ListedColormap(_even_path(anchors, levels), name=name).with_extremes(bad="white")
 
 
 def two_sided(name: str, low: Sequence[str], high: Sequence[str]) -> Colormap:
-    """Colour map of two even halves that meet in the first anchor of both."""
+    """Returns colour map of two even halves that meet in the first anchor of both."""
     halves = [_even_path(anchors, 129) for anchors in (low, high)]
     return ListedColormap(
         np.concatenate([halves[0][:0:-1], halves[1][1:]]), name=name
@@ -148,12 +148,12 @@ def styled() -> Iterator[None]:
 
 
 def page(height: float, width: float = TWO_COLUMNS) -> Figure:
-    """Empty figure of width x height mm."""
+    """Makes an empty figure of width x height mm."""
     return Figure(figsize=(width / MM_PER_INCH, height / MM_PER_INCH))
 
 
 def place(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
-    """Axes whose frame lies `left`, `top` mm from the page's top-left corner."""
+    """Returns axes whose frame lies `left`, `top` mm from the page's top-left corner."""
     inches_wide, inches_high = figure.get_size_inches()
     page_width, page_height = inches_wide * MM_PER_INCH, inches_high * MM_PER_INCH
     bottom = page_height - top - height
@@ -163,7 +163,7 @@ def place(figure: Figure, left: float, top: float, width: float, height: float) 
 
 
 def write(figure: Figure, left: float, top: float, text: str, **style: str | float) -> None:
-    """Text whose top-left corner lies `left`, `top` mm from the page's top-left corner."""
+    """Writes text whose top-left corner lies `left`, `top` mm from the page's top-left corner."""
     inches_wide, inches_high = figure.get_size_inches()
     settings: dict[str, Any] = {"ha": "left", "va": "top"} | style
     x, y = left / (inches_wide * MM_PER_INCH), 1 - top / (inches_high * MM_PER_INCH)
@@ -171,13 +171,13 @@ def write(figure: Figure, left: float, top: float, text: str, **style: str | flo
 
 
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:
-    """Bold panel letter, and its title beside it."""
+    """Draws bold panel letter, and its title beside it."""
     write(figure, left, top, name, fontsize=PANEL, fontweight="bold")
     write(figure, left + 4.2, top + 0.45, title, fontsize=TITLE)
 
 
 def save(figure: Figure, stem: Path, dpi: int = 300) -> list[Path]:
-    """Write stem.pdf, stem.svg and stem.png; the same figure gives the same bytes."""
+    """Writes stem.pdf, stem.svg and stem.png; the same figure gives the same bytes."""
     paths = []
     for suffix, metadata in _METADATA.items():
         path = stem.with_suffix(f".{suffix}")

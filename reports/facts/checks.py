@@ -1,4 +1,4 @@
-"""Facts that any design and any response have: evaluations, margins, gaps, overlaps, stability."""
+"""States facts that any design and response have: evaluations, margins, gaps, stability."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MARGINS = {
 
 
 def history_facts(design: xr.Dataset) -> Iterator[Fact]:
-    """Evaluations, best feasible loss and optimality of every method."""
+    """Yields evaluations, best feasible loss and optimality of every method."""
     for method in design["method"].values:
         history = design.sel({"method": method})
         loss = history["loss"].values
@@ -46,7 +46,7 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
 
 
 def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
-    """What the solver's tolerance leaves of errors."""
+    """Tells what the solver's tolerance leaves of errors."""
     for key, label in (("loss_error", "loss"), ("displacement_error", "displacement")):
         value = float(response[key].max())
         yield Fact(
@@ -55,7 +55,7 @@ def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
 
 
 def bias_fact(initial: RigidUnits) -> Fact:
-    """How far the units are turned at rest in the initial design."""
+    """Tells how far the units are turned at rest in the initial design."""
     arm = initial.vertices[0, 0] - initial.site[0]
     bias = abs(float(np.degrees(np.arctan2(arm[1], arm[0]))))
     note = "measured on the initial design"
@@ -63,7 +63,7 @@ def bias_fact(initial: RigidUnits) -> Fact:
 
 
 def design_facts(design: xr.Dataset) -> Iterator[Fact]:
-    """Margins of the constraints, gaps and overlaps of the design at rest."""
+    """Yields margins of the constraints, gaps and overlaps of the design at rest."""
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
     for name, margin in margins:
         label = f"{_MARGINS[str(name)]}: margin to the bound"
@@ -77,7 +77,7 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
 
 
 def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
-    """Voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
+    """Yields voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
     for name in (str(name) for name in response["structure"].values):
         part = response.sel(structure=name)
         void, gap = float(np.degrees(part["min_void_angle"].min())), float(part["min_gap"].min())
@@ -97,7 +97,7 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
 
 
 def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
-    """Equilibria of a structure (its name in words) that are not stable, or reached by a jump."""
+    """Yields equilibria of a structure (its name in words), unstable or reached by a jump."""
     flags = part["stability"].values
     key = name.replace(" ", "_")
     if (flags >= 0).any():
@@ -110,7 +110,7 @@ def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
 
 
 def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
-    """Largest strain of a shim as a foil bent by the turn of its ends, against the limit."""
+    """Finds largest strain of a shim as a foil bent by the turn of its ends, against the limit."""
     length, limit = problem.lattice.ligament_length, problem.report.shim_strain_limit
     slenderness = problem.fabrication.shims.thickness / length
     stretch, shear, bend = (
@@ -128,7 +128,7 @@ def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
 
 
 def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -> float:
-    """Largest strain of a beam (Euler-Bernoulli) whose ends turn against each other and its chord.
+    """Finds the largest strain of a beam (Euler-Bernoulli) whose ends turn against one another.
 
     Args:
         stretch: of its axis.
@@ -140,7 +140,7 @@ def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -
 
 
 def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
-    """Losses of the design with finer load steps and under another contact law."""
+    """Yields losses of the design with finer load steps and under another contact law."""
     if verification is None:
         return
     unit = verification["loss"].attrs["units"]
@@ -161,5 +161,5 @@ def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:
 
 
 def settled(margin: float) -> float:
-    """Margins within the optimiser's tolerance count as active."""
+    """Returns margins within the optimiser's tolerance count as active."""
     return 0.0 if abs(margin) < 1e-5 else margin

@@ -1,4 +1,4 @@
-"""The paper's claims in numbers, judged by the facts of the reports.
+"""Describes the paper's claims in numbers, judged by the facts of the reports.
 
 reports/facts/claims.yaml lists them; everything but the paper's value is computed here.
 """
@@ -29,7 +29,7 @@ MEASURED = "measured_"
 
 
 class Claim(Section):
-    """One claim; claims.yaml tells what its keys mean."""
+    """Describes one claim; claims.yaml tells what its keys mean."""
 
     study: str
     line: Annotated[int, Field(gt=0)]
@@ -47,19 +47,19 @@ class Claim(Section):
 
     @property
     def quoted(self) -> str:
-        """The number in words."""
+        """Returns the number in words."""
         return (self.paper or self.meaning or "").replace(" x ", " × ").replace(" deg", "°")
 
     @property
     def tolerance(self) -> str:
-        """What may be said to agree with it, in words."""
+        """Tells what may be said to agree with it, in words."""
         if self.relation == "is":
             return "as quoted"
         return f"within {ABOUT:.0%}" if self.relation == "about" else self.relation
 
 
 class Claims(Section):
-    """All claims, and where they are made."""
+    """Describes all claims, and where they are made."""
 
     source: str
     claims: tuple[Claim, ...]
@@ -67,7 +67,7 @@ class Claims(Section):
 
 @dataclass(frozen=True)
 class Side:
-    """What the simulation, or the experiment, says of a claim: its number in words, and whether.
+    """States what simulation or experiment says of a claim: its number in words, and whether.
 
     `why` tells what is missing where there is no number.
     """
@@ -79,7 +79,7 @@ class Side:
 
 @dataclass(frozen=True)
 class JudgedClaim:
-    """A claim with what became of it; `note` tells how our number is taken."""
+    """Describes a claim with what became of it; `note` tells how our number is taken."""
 
     claim: Claim
     simulation: Side
@@ -88,7 +88,7 @@ class JudgedClaim:
 
     @property
     def both(self) -> Status:
-        """Whether it holds in simulation and in experiment, of a claim on both."""
+        """Tells whether it holds in simulation and in experiment, of a claim on both."""
         sides = [self.simulation.status, self.experiment.status]
         order: tuple[Status, ...] = ("does not hold", "not yet evaluated", "holds")
         return next(status for status in order if status in sides)
@@ -96,12 +96,12 @@ class JudgedClaim:
 
 @cache
 def listed() -> Claims:
-    """The claims of the file."""
+    """Returns the claims of the file."""
     return load_section(Path(__file__).with_name("claims.yaml"), Claims)
 
 
 def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
-    """The claims on a study, by the facts of its report; with none of them, all are open.
+    """Returns the claims on a study, by the facts of its report; with none of them, all are open.
 
     Raises:
         UserError: a fact is in another unit than the claim on it.
@@ -111,7 +111,7 @@ def judged(study: str, facts: Sequence[Fact]) -> list[JudgedClaim]:
 
 
 def verdict(found: Sequence[JudgedClaim]) -> str:
-    """How many claims hold, in one line."""
+    """Tells how many claims hold, in one line."""
     simulated = [each.simulation.status for each in found]
     both = [each for each in found if each.claim.of == "both"]
     measured = [each.experiment.status for each in both]
@@ -159,7 +159,7 @@ def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -
 
 
 def agrees(ours: float, relation: Relation, paper: float, place: float) -> bool:
-    """Whether our number stands in the relation to the paper's, quoted to `place`."""
+    """Tells whether our number stands in the relation to the paper's, quoted to `place`."""
     half = place / 2 * (1 + 1e-9)
     return {
         "is": abs(ours - paper) <= half,
@@ -172,7 +172,7 @@ def agrees(ours: float, relation: Relation, paper: float, place: float) -> bool:
 
 
 def parsed(text: str) -> tuple[float, str, float]:
-    """Value, unit and last place of "5.2 mm", "64 %" or "15 x 15" (a number of units)."""
+    """Returns value, unit and last place of "5.2 mm", "64 %" or "15 x 15" (a number of units)."""
     if " x " in text:
         return math.prod(map(float, text.split(" x "))), "1", 1.0
     number, _, unit = text.partition(" ")

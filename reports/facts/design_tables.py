@@ -12,7 +12,7 @@ Columns = dict[str, NDArray[Any]]
 
 
 def vertices(design: xr.Dataset) -> Columns:
-    """One row a vertex, mm."""
+    """Returns one row a vertex, mm."""
     shape = design["vertices"].transpose("unit", "vertex", "xy").values
     initial = design["vertices_initial"].transpose("unit", "vertex", "xy").values
     unit, vertex = np.nonzero(~np.isnan(shape[..., 0]))
@@ -27,7 +27,7 @@ def vertices(design: xr.Dataset) -> Columns:
 
 
 def history(design: xr.Dataset) -> Columns:
-    """One row an evaluation."""
+    """Returns one row an evaluation."""
     loss = design["loss"].transpose("method", "evaluation").values
     cases = design["loss_case"].transpose("method", "evaluation", "case").values
     method, evaluation = np.nonzero(np.isfinite(loss))

@@ -1,4 +1,4 @@
-"""A fact: one number of a report, beside the number that the paper quotes, and where it is from."""
+"""States facts: numbers of a report beside those that the paper quotes, and their origin."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ABSENT = "—"
 
 @dataclass(frozen=True)
 class Fact:
-    """One line of a table of facts.
+    """Describes one line of a table of facts.
 
     `value` is in `unit` ("1" if it has none, "%" for a share in hundredths); `ours` and `paper` are
     the same numbers in words, `paper` a dash where it quotes none.
@@ -44,17 +44,17 @@ def number(
     paper: str = ABSENT,
     note: str = "",
 ) -> Fact:
-    """Fact whose wording is the value to `digits` significant digits and its unit."""
+    """Returns fact whose wording is the value to `digits` significant digits and its unit."""
     return Fact(key, label, value, unit, worded(value, unit, digits), paper, note)
 
 
 def share(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
-    """Fact of a share given as a fraction of one, shown in per cent to a tenth."""
+    """Returns fact of a share given as a fraction of one, shown in per cent to a tenth."""
     return Fact(key, label, 100.0 * value, "%", percent(value), paper, note)
 
 
 def quoted(facts: Sequence[Fact], paper: Paper | None) -> list[Fact]:
-    """The facts with the words that a publication uses for them; without one, with none.
+    """Returns the facts with the words that a publication uses for them; without one, with none.
 
     Raises:
         UserError: the publication's words are for a fact that there is not.
@@ -72,17 +72,17 @@ def quoted(facts: Sequence[Fact], paper: Paper | None) -> list[Fact]:
 
 
 def grouped(group: str, facts: Iterable[Fact]) -> list[Fact]:
-    """The same facts under one heading."""
+    """Returns the same facts under one heading."""
     return [replace(fact, group=group) for fact in facts]
 
 
 def within(value: float, unit: str, digits: int) -> str:
-    """Wording of an error (not negative): one too small to mean more is told as a bound."""
+    """Returns wording of an error (not negative): one too small to mean more is told as a bound."""
     return worded(value, unit, digits) if value >= 1e-9 else f"below {worded(1e-9, unit, 1)}"
 
 
 def worded(value: float, unit: str, digits: int) -> str:
-    """Number and unit as they are printed; tiny rounding leftovers are zero."""
+    """Returns number and unit as they are printed; tiny rounding leftovers are zero."""
     text = "0" if abs(value) < 1e-9 else f"{value:.{digits}g}"
     if "e" in text:
         mantissa, exponent = text.split("e")
@@ -95,12 +95,12 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def percent(value: float) -> str:
-    """Fraction of one as per cent to a tenth."""
+    """Returns fraction of one as per cent to a tenth."""
     return f"{100 * value:.1f} %".replace("-0.0 ", "0.0 ").replace("-", "−")
 
 
 def write_json(facts: Sequence[Fact], path: Path) -> None:
-    """Facts as a list of objects, in the order of the table; a value that is not finite is null."""
+    """Writes facts as a list of objects, in the table's order; a value not finite is null."""
     records = [
         asdict(fact) | {"value": fact.value if math.isfinite(fact.value) else None}
         for fact in facts
@@ -109,7 +109,7 @@ def write_json(facts: Sequence[Fact], path: Path) -> None:
 
 
 def read_json(path: Path) -> list[Fact]:
-    """Facts as they were written; a value that was not finite is NaN."""
+    """Returns facts as they were written; a value that was not finite is NaN."""
     records = json.loads(path.read_text(encoding="utf-8"))
     return [
         Fact(**(record | {"value": math.nan if record["value"] is None else record["value"]}))
@@ -118,6 +118,6 @@ def read_json(path: Path) -> list[Fact]:
 
 
 def table(facts: Sequence[Fact]) -> Table:
-    """Facts as a table, one a line."""
+    """Returns facts as a table, one a line."""
     columns = {entry.name: [getattr(fact, entry.name) for fact in facts] for entry in fields(Fact)}
     return Table("facts.csv", "the numbers above", columns)

@@ -1,4 +1,4 @@
-"""Numbers computed from the datasets of a study: reductions, peak-to-peak values, symmetry."""
+"""Reduces the datasets of a study to numbers: reductions, peak-to-peak values, symmetry."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LAST_SAMPLE = 1.0 + 1e-9
 
 
 def magnitude(displacement: xr.DataArray, scale: Floats) -> xr.DataArray:
-    """Magnitude |U| of the dimensionless displacement U = (ux/s, uy/s, theta), any dims but dof."""
+    """Finds |U| of the dimensionless displacement U = (ux/s, uy/s, theta), any dims but dof."""
     divisors = xr.DataArray(scale, dims="dof", coords={"dof": displacement["dof"]})
     squares: xr.DataArray = (displacement / divisors) ** 2
     size: xr.DataArray = squares.sum("dof") ** 0.5
@@ -22,7 +22,7 @@ def magnitude(displacement: xr.DataArray, scale: Floats) -> xr.DataArray:
 
 
 def mean_magnitude(response: xr.Dataset, scene: ReportScene, until: float) -> xr.DataArray:
-    """Mean |U| (structure, case) over region of interest and time [0, until] (trapezoid rule)."""
+    """Averages |U| (structure, case) over region of interest and time [0, until] (trapezoids)."""
     window = response["displacement"].sel(time=slice(None, until * LAST_SAMPLE))
     inside = response["roi"].values.astype(bool)
     size = magnitude(window.isel(unit=inside), scene.scale).mean("unit")
@@ -32,29 +32,29 @@ def mean_magnitude(response: xr.Dataset, scene: ReportScene, until: float) -> xr
 
 
 def reduction(values: xr.DataArray) -> float:
-    """1 - cloaked/altered of values (structure,)."""
+    """Returns 1 - cloaked/altered of values (structure,)."""
     return 1.0 - float(values.sel(structure="cloaked")) / float(values.sel(structure="altered"))
 
 
 def nearest_case(response: xr.Dataset, direction: float) -> int:
-    """Index of the load case whose direction is nearest to `direction` in degrees."""
+    """Returns index of the load case whose direction is nearest to `direction` in degrees."""
     return int(np.argmin(np.abs(response["direction"].values - direction)))
 
 
 def case_direction(response: xr.Dataset, direction: float) -> float:
-    """Direction in degrees of the load case that is nearest to `direction`."""
+    """Returns direction in degrees of the load case that is nearest to `direction`."""
     return float(response["direction"].values[nearest_case(response, direction)])
 
 
 def peak_to_peak(series: xr.DataArray, until: float) -> xr.DataArray:
-    """Peak-to-peak value over the time [0, until]."""
+    """Returns peak-to-peak value over the time [0, until]."""
     window = series.sel(time=slice(None, until * LAST_SAMPLE))
     span: xr.DataArray = window.max("time") - window.min("time")
     return span
 
 
 def asymmetry(structure: RigidUnits, middle: tuple[float, float]) -> Floats:
-    """Distance (n,) in mm of each cloak vertex from the design turned by 90 degrees about `middle`.
+    """Finds how far (n,) in mm cloak vertices are from the design turned by 90° about `middle`.
 
     Each unit is turned onto the unit whose lattice point it meets; its vertices are paired with
     that unit's in order, from the start that fits best. Zero for a four-fold symmetric design.
@@ -88,7 +88,7 @@ def _best_fit(polygon: Floats, other: Floats) -> Floats:
 
 
 def porosity(structure: RigidUnits, middle: tuple[float, float], low: float, high: float) -> float:
-    """Open share of the ring between two distances (mm) from `middle`, by geometry."""
+    """Returns open share of the ring between two distances (mm) from `middle`, by geometry."""
     disc = shapely.Point(middle)
     ring = disc.buffer(high, quad_segs=64).difference(disc.buffer(low, quad_segs=64))
     polygons = [polygon[~np.isnan(polygon[:, 0])] for polygon in structure.vertices]
@@ -97,12 +97,12 @@ def porosity(structure: RigidUnits, middle: tuple[float, float], low: float, hig
 
 
 def site_radius(structure: RigidUnits, middle: tuple[float, float], region: int) -> float:
-    """Largest distance in mm of a unit's initial lattice point in `region` from `middle`."""
+    """Finds largest distance in mm of a unit's initial lattice point in `region` from `middle`."""
     members = structure.site[structure.region == region]
     return float(np.linalg.norm(members - np.array(middle), axis=1).max()) if len(members) else 0.0
 
 
 def first_within(history: Floats, best: float, share: float) -> int:
-    """First evaluation after which `share` of the way from the start to `best` is done."""
+    """Returns first evaluation after which `share` of the way from the start to `best` is done."""
     target = history[0] - share * (history[0] - best)
     return int(np.argmax(np.fmin.accumulate(history) <= target))

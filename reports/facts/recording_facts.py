@@ -1,4 +1,4 @@
-"""The numbers of recordings beside their simulation, the same for every study."""
+"""Describes the numbers of recordings beside their simulation, the same for every study."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DOFS = {"ux": "u_x", "uy": "u_y", "theta": "θ"}
 
 
 def recorded_facts(recordings: Sequence[RecordedMotion]) -> list[Fact]:
-    """How far measurement and simulation are apart, under a heading for each recording."""
+    """Tells how far measurement and simulation are apart, under a heading for each recording."""
     return [
         fact
         for each in recordings
@@ -23,7 +23,7 @@ def recorded_facts(recordings: Sequence[RecordedMotion]) -> list[Fact]:
 
 
 def intervals(measured: Floats, predicted: Floats, unit: str = "") -> str:
-    """The ends (2,) of an interval, and of that which imperfect specimens span, in words."""
+    """Finds the ends (2,) of an interval, and of that which imperfect specimens span, in words."""
     words = f"95 %: {measured[0]:.3g} to {measured[1]:.3g}{unit}"
     if np.isfinite(predicted).all():
         words += f"; predicted {predicted[0]:.3g} to {predicted[1]:.3g}{unit}"

@@ -1,93 +1,73 @@
-"""Which report a study gets, by what its problem asks for and not by its name."""
+"""Chooses the report of a study, by what its problem asks for and not by its name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from matplotlib.figure import Figure
-
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive
-from reports.base import Table
 from reports.facts import Fact
-from reports.figures.loading_path import content as path
+from reports.figures import loading_path, shielding, wave
 from reports.figures.shielding import MAPPED
-from reports.figures.shielding import content as about
-from reports.page import PageText, ReportPage, study_page
-from reports.panels import Animation, payload
+from reports.page import PageText, study_text
+from reports.panels import Animation, PanelFigure
 from reports.study import StudyResults
 
 
 @dataclass(frozen=True)
 class ReportKind:
-    """The parts of a report, each made from a study.
+    """Holds the parts of a report, each made from a study.
 
     Attributes:
+        name: in figures.yaml.
         facts: numbers computed from the datasets.
-        tables: what the curves show.
-        figure: the figure at two-column width.
-        words: what the page says of itself.
+        figure: its panels with captions and tables.
+        text: what the page says of itself, by the caption of the figure and the facts.
         animation: what the page's player and movies show.
     """
 
+    name: str
     facts: Callable[[StudyResults], list[Fact]]
-    tables: Callable[[StudyResults], list[Table]]
-    figure: Callable[[StudyResults], Figure]
-    words: Callable[[StudyResults], PageText]
+    figure: Callable[[StudyResults], PanelFigure]
+    text: Callable[[StudyResults, str, Sequence[Fact]], PageText]
     animation: Callable[[StudyResults], Animation]
 
-    def page(
-        self, study: StudyResults, facts: Sequence[Fact], tables: Sequence[Table], svg: str,
-        figure_files: Sequence[str],
-    ) -> ReportPage:  # fmt: skip
-        """The page of a study, of which everything else has been made."""
-        words, player = self.words(study), payload(self.animation(study))
-        return study_page.page(study, words, facts, tables, player, svg, figure_files)
+
+def _wave_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
+    headline = ("error_altered", "error_cloaked", "error_reduction", "loss_reduction")
+    paper = study.problem.report.paper
+    return study_text(study, caption, facts, credit=loading_path.credit(paper), headline=headline)
+
+
+SHIELDING = ReportKind(
+    "shielding",
+    shielding.facts.shielding_facts,
+    shielding.figure.shielding_figure,
+    shielding.figure.shielding_text,
+    shielding.figure.shielding_animation,
+)
+LOADING_PATH = ReportKind(
+    "loading_path",
+    loading_path.facts.loading_path_facts,
+    loading_path.figure.loading_path_figure,
+    loading_path.figure.loading_path_text,
+    loading_path.figure.loading_path_animation,
+)
+WAVE = ReportKind(
+    "wave",
+    wave.facts.wave_facts,
+    wave.figure.wave_figure,
+    _wave_text,
+    loading_path.figure.loading_path_animation,
+)
 
 
 def kind_of(problem: Problem) -> ReportKind:
-    """The report of a problem: shielding from a source with its map, of a wave, or of a path."""
+    """Returns the report of a problem: shielding with its map, of a wave, or along a path."""
     shaken, sweep = isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive), problem.sweep
-    if shaken and sweep is not None and sweep.grid is not None and set(sweep.keys) == {*MAPPED}:
-        return _shielding()
+    mapped = sweep is not None and sweep.grid is not None and set(sweep.keys) == {*MAPPED}
+    if shaken and mapped:
+        return SHIELDING
     mimics = problem.objective.kind == "displacement" and problem.objective.target == "intact"
-    return _of_a_wave() if mimics and not problem.static else _along_a_path()
-
-
-def _shielding() -> ReportKind:
-    from reports.figures.shielding import facts, figure, tables
-
-    return ReportKind(
-        facts.shielding_facts,
-        tables.shielding_tables,
-        figure.draw_shielding,
-        about.shielding_text,
-        about.shielding_animation,
-    )
-
-
-def _along_a_path() -> ReportKind:
-    from reports.figures.loading_path import content as about
-    from reports.figures.loading_path import facts, figure, tables
-
-    return ReportKind(
-        facts.loading_path_facts,
-        tables.loading_path_tables,
-        figure.draw_loading_path,
-        about.loading_path_text,
-        about.loading_path_animation,
-    )
-
-
-def _of_a_wave() -> ReportKind:
-    from reports.figures.wave import content as about
-    from reports.figures.wave import facts, figure, tables
-
-    return ReportKind(
-        facts.wave_facts,
-        tables.wave_tables,
-        figure.draw_wave,
-        about.wave_text,
-        path.loading_path_animation,
-    )
+    return WAVE if mimics and not problem.static else LOADING_PATH

@@ -1,4 +1,4 @@
-"""How to cite this software, in words and as BibTeX, from CITATION.cff."""
+"""Tells how to cite this software, in words and as BibTeX, from CITATION.cff."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FILE = Path(__file__).resolve().parents[2] / "CITATION.cff"
 
 @dataclass(frozen=True)
 class Citation:
-    """One work to cite: what it is for, in words, and as BibTeX."""
+    """Describes one work to cite: what it is for, in words, and as BibTeX."""
 
     what: str
     words: str
@@ -24,7 +24,7 @@ class Citation:
 
 @cache
 def citations() -> tuple[Citation, ...]:
-    """The paper, the software and the paper's data, in this order."""
+    """Returns the paper, the software and the paper's data, in this order."""
     known = yaml.safe_load(FILE.read_text(encoding="utf-8"))
     paper = known["preferred-citation"]
     works = [("The paper", paper), ("This software", known)]

@@ -1,73 +1,141 @@
-"""The page of a report from its parts: what every report tells in the same way."""
+"""Lays out the page of one or several studies: one HTML file that works from disk."""
 
 from __future__ import annotations
 
+import base64
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
 import xarray as xr
+from matplotlib.figure import Figure
 
-from pipeline.problem import canonical_json, content_hash
+from pipeline.problem import Problem, canonical_json, content_hash
 from reports.base import Table
-from reports.facts import Fact, claims, worded
-from reports.page.report_page import ReportPage, Source, source
-from reports.panels import quantisation_error
-from reports.study import StudyResults
+from reports.facts import ABSENT, Fact, claims, worded
+from reports.page import citation
+from reports.page.report import Report
+from reports.panels import Animation, payload, quantisation_error
+from reports.paper_figures import movies_of
+from reports.study import LABEL, StudyResults
+
+LARGEST_PAGE = 6_000_000
+"""Bytes that a page may have."""
 
 
 @dataclass(frozen=True)
 class PageText:
-    """What a kind of report says of itself; `caption` is HTML, `headline` are keys of facts."""
+    """Holds what a page says of itself.
 
+    `caption` is HTML; `headline` are the facts above all others, `note` is told of the animation.
+    """
+
+    title: str
+    lead: str
     credit: str
     figure_title: str
     caption: str
-    headline: Sequence[str]
-    player_note: str = ""
+    headline: Sequence[Fact]
+    note: str = ""
 
 
-def page(
+def study_text(
     study: StudyResults,
-    words: PageText,
+    caption: str,
+    facts: Sequence[Fact],
+    *,
+    credit: str,
+    headline: Sequence[str],
+    figure_title: str = "",
+    note: str = "",
+) -> PageText:
+    """Returns the text of one study; `headline` are keys of facts, as far as there are such."""
+    by_key = {fact.key: fact for fact in facts}
+    title = study.problem.title or study.name
+    shown = [by_key[key] for key in headline if key in by_key]
+    lead = study.problem.doc.strip()
+    return PageText(title, lead, credit, figure_title or title, caption, shown, note)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Describes names a part of the page, a dataset say, with its attributes."""
+
+    name: str
+    entries: Sequence[tuple[str, str]]
+
+
+def study_page(
+    name: str,
+    studies: Mapping[str, StudyResults],
+    text: PageText,
     facts: Sequence[Fact],
     tables: Sequence[Table],
-    player: Mapping[str, Any],
-    svg: str,
-    figure_files: Sequence[str],
-) -> ReportPage:
-    """The page of a study, of which everything else has been made."""
-    by_key = {fact.key: fact for fact in facts}
-    return ReportPage(
-        title=study.problem.title or study.name,
-        targets=[study.target],
-        lead=study.problem.doc.strip(),
-        credit=words.credit,
-        figure_title=words.figure_title,
-        caption=words.caption,
-        svg=svg,
-        figure_files=figure_files,
-        datasets=[f"../{name}" for name in study.files],
-        headline=[by_key[key] for key in words.headline if key in by_key],
-        facts=facts,
-        tables=tables,
-        player=player,
-        player_note=" ".join(filter(None, [rounding(player), words.player_note])),
-        provenance=provenance(study),
-        problem=json.dumps(
-            json.loads(canonical_json(study.problem)), indent=1, sort_keys=True, ensure_ascii=False
-        ),
-        skipped=skipped(study.response),
-        draft=study.draft,
-        recordings=study.recordings,
-        claims=[] if study.draft else claims.judged(study.name, facts),
-    )
+    figure: Callable[[], Figure],
+    animation: Animation,
+    together: tuple[str, Problem] | None = None,
+) -> Report:
+    """Returns the report of studies, of which everything else has been made.
+
+    Args:
+        name: of the figure's files; the paper's claims on it are judged.
+        studies: by what their datasets are called beside others'; a single one needs no such name.
+        text: what the page says of itself.
+        facts: all numbers, as the page groups them.
+        tables: beside the page, and inside it as downloads.
+        figure: makes it.
+        animation: what the page's player shows.
+        together: what builds all studies and the problem that asks for them, where one does.
+    """
+    player, single = payload(animation), "" in studies
+    several = list(studies.values())
+    draft = list(dict.fromkeys(reason for study in several for reason in study.draft))
+    judged = [] if draft else claims.judged(name, facts)
+    recordings = studies[""].recordings if single else []
+    targets = [together[0]] if together else [study.target for study in several]
+    problems = {study.name: study.problem for study in several}
+    asked = studies[""].problem if single else together and together[1]
+    values = {
+        **{key: value for key, value in vars(text).items() if key != "note"},
+        "targets": targets,
+        "movies": movies_of(targets),
+        "datasets": [
+            f"../{file}" if single else f"../../{study.target}/{file}"
+            for study in several
+            for file in study.files
+        ],
+        "facts": facts,
+        "quotes": any(fact.paper != ABSENT for fact in facts),
+        # "</" would end the script element that holds the data.
+        "player": json.dumps(player, ensure_ascii=False).replace("</", "<\\/"),
+        "player_note": " ".join(filter(None, [rounding(player), text.note])),
+        "provenance": [each for label, study in studies.items() for each in sources(study, label)],
+        "problem": _json(asked or problems),
+        "skipped": list(dict.fromkeys(line for study in several for line in _skipped(study))),
+        "draft": draft,
+        "recordings": recordings,
+        "synthetic": LABEL if any(each.synthetic for each in recordings) else "",
+        "claims": judged,
+        "verdict": claims.verdict(judged),
+        "citations": citation.citations(),
+    }
+    downloads = {table.name: base64.b64encode(table.csv).decode("ascii") for table in tables}
+    return Report({name: figure}, "page.html.j2", values | {"base64": downloads}, tables, facts)
+
+
+def _json(problem: Problem | Mapping[str, Problem]) -> str:
+    """Returns a problem as resolved, or several by name, as indented JSON."""
+    if isinstance(problem, Problem):
+        content = json.loads(canonical_json(problem))
+    else:
+        content = {name: json.loads(canonical_json(each)) for name, each in problem.items()}
+    return json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False)
 
 
 def rounding(player: Mapping[str, Any]) -> str:
-    """What the player's data leave out."""
+    """Tells what the player's data leave out."""
     shift, turn = quantisation_error(player)
     shown, saved = player["axis"]["shown"], player["axis"]["saved"]
     frames = "times" if player["axis"]["loops"] else "loads"
@@ -77,46 +145,44 @@ def rounding(player: Mapping[str, Any]) -> str:
     )
 
 
-def skipped(response: xr.Dataset) -> list[str]:
-    """What the simulation left out, each with the structures that it holds for."""
-    plans = json.loads(response.attrs["plan"])
+def _skipped(study: StudyResults) -> list[str]:
+    """Tells what the simulation left out, each with the structures that it holds for."""
+    plans = json.loads(study.response.attrs["plan"])
     names: dict[str, list[str]] = {}
     for structure, plan in plans.items():
         for text in plan["skipped"]:
             names.setdefault(text, []).append(structure)
-    everywhere = len(plans)
     return [
-        text if len(found) == everywhere else f"{text} ({', '.join(found)})"
+        text if len(found) == len(plans) else f"{text} ({', '.join(found)})"
         for text, found in names.items()
     ]
 
 
-def provenance(study: StudyResults) -> list[Source]:
-    """This page and every dataset that it shows."""
+def sources(study: StudyResults, label: str = "") -> Iterator[Source]:
+    """Yields where a page is from: of itself, and of every dataset of a study that it shows."""
     packages = {name: version(name) for name in ("jinja2", "matplotlib", "numpy", "xarray")}
     made = {
         "problem_hash": content_hash(study.problem),
         "datasets": json.dumps(study.files),
         "packages": json.dumps(packages),
     }
-    own = source("this page", xr.Dataset(attrs=made))
-    return [own, *(source(f"{name}.nc", data) for name, data in study.datasets.items())]
+    before = f"{label}: " if label else ""
+    yield _source(f"{before}this page", xr.Dataset(attrs=made))
+    for name, data in study.datasets.items():
+        yield _source(f"{before}{name}.nc", data)
 
 
-def sources_of(studies: Mapping[str, StudyResults]) -> list[Source]:
-    """Where a page of several studies, by name, is from."""
-    return [
-        replace(source, name=f"{name}: {source.name}")
-        for name, study in studies.items()
-        for source in provenance(study)
-    ]
+def _source(name: str, data: xr.Dataset) -> Source:
+    """Returns attributes of a dataset, except the problem, which the page shows once."""
+    kept = {str(key): value for key, value in data.attrs.items() if key != "problem"}
+    return Source(name, [entry for key in sorted(kept) for entry in _entries(key, kept[key])])
 
 
-def skipped_of(studies: Sequence[StudyResults]) -> list[str]:
-    """What the simulations of several studies left out, each once."""
-    return list(dict.fromkeys(text for study in studies for text in skipped(study.response)))
-
-
-def drafts_of(studies: Sequence[StudyResults]) -> list[str]:
-    """Why a page of several studies is a draft, each reason once."""
-    return list(dict.fromkeys(reason for study in studies for reason in study.draft))
+def _entries(key: str, value: object) -> list[tuple[str, str]]:
+    """Returns an attribute as lines of text; JSON in it is unfolded, one line a leaf or a list."""
+    if isinstance(value, str) and value.startswith(("{", "[")):
+        value = json.loads(value)
+    if isinstance(value, dict):
+        return [line for name in sorted(value) for line in _entries(f"{key}: {name}", value[name])]
+    items = value if isinstance(value, list) else [value]
+    return [(key, "; ".join(str(item) for item in items))]

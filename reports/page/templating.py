@@ -1,4 +1,4 @@
-"""HTML from the templates beside the reports; text is escaped, what is not given is an error."""
+"""Renders HTML from templates; text is escaped, what is not given is an error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 
 def rendered(template: str, values: Mapping[str, Any]) -> str:
-    """HTML of a template.
+    """Returns HTML of a template.
 
     Args:
         template: name of its file.
@@ -32,19 +32,22 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
 
 
 def inlined(svg: str) -> str:
-    """The element of an SVG file without prologue and metadata, coordinates to 0.001 pt."""
-    element = svg[svg.index("<svg") :]
-    element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
-    return re.sub(r"(\d\.\d{3})\d+", r"\1", element)
+    """Returns the element of an SVG file, coordinates to 0.001 pt."""
+    return re.sub(r"(\d\.\d{3})\d+", r"\1", element(svg))
+
+
+def element(svg: str) -> str:
+    """Returns the element of an SVG file without prologue and metadata."""
+    return re.sub(r"<metadata>.*?</metadata>", "", svg[svg.index("<svg") :], flags=re.DOTALL)
 
 
 def _symbols(text: str) -> Markup:
-    """Escaped text in which u_y has its index."""
+    """Returns escaped text in which u_y has its index."""
     return Markup(re.sub(r"\bu_([xy])\b", r"u<sub>\1</sub>", str(escape(text))))
 
 
 def _in_order(items: Iterable[Any], attribute: str) -> list[dict[str, object]]:
-    """Items grouped by an attribute, groups in the order of their first member."""
+    """Returns items grouped by an attribute, groups in the order of their first member."""
     groups: dict[str, list[Any]] = {}
     for item in items:
         groups.setdefault(getattr(item, attribute), []).append(item)

@@ -1,4 +1,4 @@
-"""Data of the page's animated player, for any motion of rigid units.
+"""Describes data of the page's animated player, for any motion of rigid units.
 
 The player (templates/player.js) shows one or several structures side by side, deformed at true
 size, and knows nothing of what moves them. Its data is one JSON object:
@@ -53,7 +53,7 @@ LARGEST_LEVEL = 32767
 
 @dataclass(frozen=True)
 class AnimationAxis:
-    """What the slider runs over: values (n_frames,) in `unit`, shown with `digits` decimals."""
+    """Holds what the slider runs over: values (n_frames,) in `unit`, `digits` decimals."""
 
     name: str
     unit: str
@@ -65,7 +65,7 @@ class AnimationAxis:
 
 @dataclass(frozen=True)
 class AnimationClip:
-    """One structure with its motion (n_cases, n_frames, n_units, 3) in mm, mm, rad.
+    """Describes one structure with its motion (n_cases, n_frames, n_units, 3) in mm, mm, rad.
 
     `residual`, of the same shape, is what a measured motion is more than the simulated one.
     """
@@ -79,14 +79,14 @@ class AnimationClip:
 
     @property
     def weight(self) -> int:
-        """Numbers that it takes a frame."""
+        """Returns numbers that it takes a frame."""
         held = [self.motion] if self.residual is None else [self.motion, self.residual]
         return sum(case[0].size for motion in held for case in motion if _known(case))
 
 
 @dataclass(frozen=True)
 class ColourField:
-    """A scalar that colours the units; `limits` in the unit shown, after `factor`."""
+    """Describes a scalar that colours the units; `limits` in the unit shown, after `factor`."""
 
     key: str
     label: str
@@ -99,7 +99,7 @@ class ColourField:
 
 @dataclass(frozen=True)
 class DashedDisc:
-    """A dashed circle, mm."""
+    """Describes a dashed circle, mm."""
 
     x: float
     y: float
@@ -108,7 +108,7 @@ class DashedDisc:
 
 
 def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
-    """Frames that fit the page at `n_values` int16 numbers each: every k-th, and the last."""
+    """Finds frames that fit the page at `n_values` int16 numbers each: every k-th, and the last."""
     room = max(1, min(MOST_STEPS, LARGEST_MOTION // (2 * n_values) - 2))
     stride = max(1, -(-(n_frames - 1) // room))
     return np.union1d(np.arange(0, n_frames, stride), n_frames - 1)
@@ -116,7 +116,7 @@ def kept_frames(n_frames: int, n_values: int) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class Animation:
-    """What plays: structures side by side under their load cases, along one axis.
+    """Tells what plays: structures side by side under their load cases, along one axis.
 
     Attributes:
         axis: what the slider runs over.
@@ -138,7 +138,7 @@ class Animation:
 
 
 def payload(reel: Animation) -> dict[str, Any]:
-    """The player's data as an object ready for JSON; frames are thinned to fit the page."""
+    """Returns the player's data as an object ready for JSON; frames are thinned to fit the page."""
     axis, clips = reel.axis, reel.clips
     frames = kept_frames(len(axis.values), sum(clip.weight for clip in clips))
     return {
@@ -165,7 +165,7 @@ def payload(reel: Animation) -> dict[str, Any]:
 
 
 def round_up(value: float) -> float:
-    """The next value of one significant digit, or two where the first is 1."""
+    """Returns the next value of one significant digit, or two where the first is 1."""
     if value <= 0:
         return 1.0
     step = 10.0 ** np.floor(np.log10(value))
@@ -177,12 +177,12 @@ COLOUR_MAPS: dict[str, Colormap] = {"magnitude": style.MAGNITUDE, "signed": styl
 
 
 def encoded(values: NDArray[Any], dtype: str) -> str:
-    """Base64 of an array in C order, in the little-endian type `dtype`."""
+    """Returns base64 of an array in C order, in the little-endian type `dtype`."""
     return base64.b64encode(np.ascontiguousarray(values, dtype=dtype).tobytes()).decode("ascii")
 
 
 def quantisation_error(data: Mapping[str, Any]) -> tuple[float, float]:
-    """Largest rounding error of the motion in mm and in rad: half a step."""
+    """Returns largest rounding error of the motion in mm and in rad: half a step."""
     steps = np.array([case["step"] for clip in data["motion"] for case in clip if case])
     return 0.5 * float(steps[:, :2].max()), 0.5 * float(steps[:, 2].max())
 
@@ -192,7 +192,7 @@ def _known(motion: Floats) -> bool:
 
 
 def _cases(motion: Floats | None, frames: NDArray[np.int64]) -> list[dict[str, Any] | None]:
-    """Every case of a motion, None where nothing of it is known."""
+    """Returns every case of a motion, None where nothing of it is known."""
     if motion is None:
         return []
     return [_quantised(case[frames]) if _known(case) else None for case in motion]
@@ -241,7 +241,7 @@ def _field(field: ColourField, clips: Sequence[AnimationClip]) -> dict[str, Any]
 
 
 def _limits(field: ColourField, residuals: Sequence[Floats]) -> list[float]:
-    """Limits of colours that hold all but the largest hundredth of the residuals."""
+    """Returns limits of colours that hold all but the largest hundredth of the residuals."""
     values = np.concatenate([scalar(field, motion).ravel() for motion in residuals])
     known = np.abs(values[np.isfinite(values)])
     most = round_up(float(np.quantile(known, 0.99)) if known.size else 0.0)
@@ -249,7 +249,7 @@ def _limits(field: ColourField, residuals: Sequence[Floats]) -> list[float]:
 
 
 def scalar(field: ColourField, motion: Floats) -> Floats:
-    """What a field shows of motions (..., 3) in mm, mm, rad."""
+    """Tells what a field shows of motions (..., 3) in mm, mm, rad."""
     if field.key == "norm":
         size: Floats = np.linalg.norm(motion / np.array(field.scale), axis=-1)
         return field.factor * size

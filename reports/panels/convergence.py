@@ -1,4 +1,4 @@
-"""The loss against the evaluation of the design, for every method, as a panel of a figure."""
+"""Draws the loss against the evaluation of the design, for every method, as a panel of a figure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FEASIBLE = 1e-6
 
 
 def loss_history(axes: Axes, design: xr.Dataset, label: str = r"Loss $J$") -> None:
-    """Mean loss thick, each load case thin; what was rejected or infeasible is lighter."""
+    """Draws mean loss thick, each load case thin; what was rejected or infeasible is lighter."""
     for method in design["method"].values:
         history = design.sel({"method": method})
         colour = style.METHOD_COLOURS.get(str(method), style.GREY)

@@ -1,4 +1,4 @@
-"""How every figure and every player shows measurement beside simulation.
+"""Tells how every figure and every player shows measurement beside simulation.
 
 Measured curves are dashed with markers, simulated ones continuous, prediction bands behind both.
 """
@@ -24,7 +24,7 @@ _DASHES = (0, (2.6, 1.4))
 
 
 def measured_curve(axes: Axes, along: Floats, values: Floats, colour: str) -> None:
-    """A measured curve, its markers evenly spread."""
+    """Draws a measured curve, its markers evenly spread."""
     every = max(1, len(along) // MARKERS)
     axes.plot(
         along, values, color=colour, lw=0.8, ls=_DASHES, marker="o", ms=2.0, mfc="white",
@@ -33,12 +33,12 @@ def measured_curve(axes: Axes, along: Floats, values: Floats, colour: str) -> No
 
 
 def band(axes: Axes, along: Floats, low: Floats, high: Floats, colour: str) -> None:
-    """A prediction band."""
+    """Draws a prediction band."""
     axes.fill_between(along, low, high, color=colour, alpha=0.22, lw=0, zorder=2)
 
 
 def handles(recordings: Sequence[RecordedMotion]) -> list[Artist]:
-    """What a legend tells of continuous and dashed lines, and of bands."""
+    """Tells what a legend tells of continuous and dashed lines, and of bands."""
     if not recordings:
         return []
     words = "experiment" + (f" ({LABEL})" if any(each.synthetic for each in recordings) else "")
@@ -54,7 +54,7 @@ def handles(recordings: Sequence[RecordedMotion]) -> list[Artist]:
 def clips(
     recordings: Sequence[RecordedMotion], simulated: AnimationClip, wanted: Floats, spacing: float
 ) -> list[AnimationClip]:
-    """Recordings of one structure for a player, each under its own load case, with the residual.
+    """Forms clips of the recordings of one structure, each under its own case, with residual.
 
     Args:
         recordings: of the structure; a second one of the same load case is a clip of its own.
@@ -91,7 +91,7 @@ def _clip(
 
 
 def caption(recordings: Sequence[RecordedMotion]) -> str:
-    """What a figure with recordings says of them, as HTML; nothing without."""
+    """Tells what a figure with recordings says of them, as HTML; nothing without."""
     if not recordings:
         return ""
     text = (

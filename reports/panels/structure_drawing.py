@@ -28,7 +28,7 @@ def draw(
     norm: Normalize | None = None,
     margin: float = 6.0,
 ) -> PolyCollection:
-    """Draw units and ligaments, units in `colours` (one each) or `values` through a colour map."""
+    """Draws units and ligaments, units in `colours` (one each) or `values` through a colour map."""
     corners = deformed(structure, displacement)
     kept = structure.present
     ends = corners[structure.ligament_unit, structure.ligament_vertex]
@@ -52,7 +52,7 @@ def draw(
 
 
 def frame(axes: Axes, structure: RigidUnits, margin: float) -> None:
-    """Equal scales and limits around the flat structure, `margin` mm beyond it; no axis lines."""
+    """Sets equal scales and limits `margin` mm beyond the flat structure; no axis lines."""
     points = structure.vertices.reshape(-1, 2)
     low, high = np.nanmin(points, axis=0) - margin, np.nanmax(points, axis=0) + margin
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -60,7 +60,7 @@ def frame(axes: Axes, structure: RigidUnits, margin: float) -> None:
 
 
 def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
-    """Hatched pad of `pad` mm under every clamped unit."""
+    """Draws hatched pad of `pad` mm under every clamped unit."""
     for x, y in structure.centroid[structure.support == CLAMPED]:
         axes.add_patch(
             Rectangle(
@@ -77,7 +77,7 @@ def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
 
 
 def outline(axes: Axes, centre: Floats, radii: Iterable[float], colour: str) -> None:
-    """Dashed circles (mm) around a region."""
+    """Draws dashed circles (mm) around a region."""
     for radius in radii:
         axes.add_patch(
             Circle(
@@ -95,7 +95,7 @@ def outline(axes: Axes, centre: Floats, radii: Iterable[float], colour: str) -> 
 def drive_arrows(
     axes: Axes, centre: Floats, direction: float, reach: tuple[float, float], colour: str
 ) -> None:
-    """Arrows between two distances (mm) on both sides of `centre`, `direction` in degrees."""
+    """Draws arrows between two distances (mm) on both sides of `centre`, `direction` in degrees."""
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     for sign in (1.0, -1.0):
         start, end = (centre + sign * distance * along for distance in reach)

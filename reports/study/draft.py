@@ -1,4 +1,4 @@
-"""Why a report shows a draft and not the study itself."""
+"""Tells why a report shows a draft and not the study itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from reports.base import ALTERED
 
 
 def reasons(problem: Problem, study: Problem) -> list[str]:
-    """Where `problem`, a preset of `study`, is less than that; empty if it is of full size."""
+    """Lists where `problem`, a preset of `study`, is less than that; empty at full size."""
     reduced = [
         f"{ours:g} {what} instead of {full:g}"
         for (what, ours), full in zip(_sizes(problem).items(), _sizes(study).values(), strict=True)

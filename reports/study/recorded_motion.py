@@ -1,4 +1,4 @@
-"""Recordings of a study beside its simulation, along the same course: time, or the load."""
+"""Holds recordings of a study beside its simulation, along the same course: time, or the load."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _BEYOND = 0.02
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """One recording.
+    """Describes one recording.
 
     Attributes:
         name: of its file.
@@ -39,31 +39,31 @@ class RecordedMotion:
 
     @property
     def structure(self) -> str:
-        """The structure that was filmed."""
+        """Returns the structure that was filmed."""
         return str(self.data.attrs["structure"])
 
     @property
     def case(self) -> int:
-        """The load case that it was under."""
+        """Returns the load case that it was under."""
         return int(self.data.attrs["case"])
 
     @property
     def synthetic(self) -> bool:
-        """Whether it was rendered."""
+        """Tells whether it was rendered."""
         return str(self.data.attrs["synthetic"]) == "yes"
 
     @property
     def source(self) -> str:
-        """What a figure calls it."""
+        """Tells what a figure calls it."""
         return f"experiment ({LABEL})" if self.synthetic else "experiment"
 
     def values(self, variable: xr.DataArray) -> Floats:
-        """A variable (time, ...) of the dataset at its frames (n_frames, ...)."""
+        """Returns a variable (time, ...) of the dataset at its frames (n_frames, ...)."""
         found: Floats = variable.transpose("time", ...).values[self.frames]
         return found
 
     def at(self, variable: xr.DataArray, wanted: Floats) -> Floats:
-        """A variable (time, ...) of the dataset, interpolated; NaN where nothing was recorded.
+        """Interpolates a variable (time, ...) of the dataset; NaN where nothing was recorded.
 
         Args:
             variable: one of the dataset.
@@ -79,7 +79,7 @@ class RecordedMotion:
         return np.where(within.reshape(part.shape), found, np.nan)
 
     def motion(self, response: xr.Dataset, wanted: Floats) -> xr.Dataset:
-        """The measured motion in the form of a response of one structure and one case.
+        """Returns the measured motion in the form of a response of one structure and one case.
 
         Args:
             response: of the study.
@@ -95,7 +95,7 @@ class RecordedMotion:
 def recordings(
     problem: Problem, response: xr.Dataset, compared: Mapping[str, xr.Dataset]
 ) -> list[RecordedMotion]:
-    """The recordings of a study, in the order of its structures and load cases."""
+    """Returns the recordings of a study, in the order of its structures and load cases."""
     found = [_recorded(problem, response, name, data) for name, data in sorted(compared.items())]
     order = [str(name) for name in response["structure"].values]
     return sorted(found, key=lambda each: (order.index(each.structure), each.case))

@@ -1,4 +1,4 @@
-"""What the figures need to know of a problem, in their own units: mm, s, Hz and degrees."""
+"""Tells what the figures need to know of a problem, in their own units: mm, s, Hz and degrees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.core import Floats
 
 @dataclass(frozen=True)
 class ReportScene:
-    """A harmonically driven lattice.
+    """Describes a harmonically driven lattice.
 
     Lengths in mm, times in s, frequencies in Hz, directions in degrees. The loss is taken over
     `horizon`, with `weights` of the load cases; `radii` bound the cloak; `middle` is the lattice's
@@ -37,23 +37,23 @@ class ReportScene:
 
     @property
     def period(self) -> float:
-        """Of the drive, s."""
+        """Returns the period of the drive, s."""
         return 1.0 / self.frequency
 
     @property
     def scale(self) -> Floats:
-        """Divisors (3,) that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
+        """Finds divisors (3,) that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
         return np.array([self.spacing, self.spacing, 1.0])
 
     def mean(self, values: xr.DataArray) -> xr.DataArray:
-        """Weighted mean over the load cases of values (..., case)."""
+        """Returns weighted mean over the load cases of values (..., case)."""
         weights = xr.DataArray(np.array(self.weights), dims="case")
         mean: xr.DataArray = (values * weights).sum("case") / float(np.sum(self.weights))
         return mean
 
 
 def scene_of_problem(problem: Problem) -> ReportScene:
-    """Scene of a problem.
+    """Returns scene of a problem.
 
     Raises:
         UserError: the drive is not harmonic, so there are no cycles to show.
@@ -84,6 +84,6 @@ def scene_of_problem(problem: Problem) -> ReportScene:
 
 
 def cycles(scene: ReportScene, response: xr.Dataset) -> float:
-    """Number of drive cycles that a response covers."""
+    """Returns number of drive cycles that a response covers."""
     time = response["time"].values
     return float((time[-1] - time[0]) * scene.frequency)

@@ -20,7 +20,7 @@ FREE, CLAMPED, DRIVEN = 0, 1, 2
 
 @dataclass(frozen=True)
 class RigidUnits:
-    """A network of rigid units, flat.
+    """Describes a network of rigid units, flat.
 
     vertices (n_units, n_vertices, 2) mm, counter-clockwise, padded with NaN, all NaN for a unit
     that is absent, as are its ligaments; site (n_units, 2) mm
@@ -41,17 +41,17 @@ class RigidUnits:
 
     @property
     def n_units(self) -> int:
-        """Number of units, absent ones included."""
+        """Returns number of units, absent ones included."""
         return len(self.vertices)
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Whether each unit is there (n_units,)."""
+        """Tells whether each unit is there (n_units,)."""
         return np.asarray(np.isfinite(self.vertices[..., 0]).any(axis=1))
 
 
 def from_dataset(data: xr.Dataset, spacing: float, vertices: str = "vertices") -> RigidUnits:
-    """Structure held by a design dataset, or by one `structure` of a response dataset."""
+    """Returns structure held by a design dataset, or by one `structure` of a response dataset."""
     index = np.stack([data["i"].values, data["j"].values], axis=-1)
     shape = data[vertices].transpose("unit", "vertex", "xy").values.astype(float)
     unit, vertex = (data[name].values.astype(int) for name in ("ligament_unit", "ligament_vertex"))
@@ -99,11 +99,11 @@ def deformed(structure: RigidUnits, displacement: Floats | None = None) -> Float
 
 
 def unit_at(structure: RigidUnits, point: Floats) -> int:
-    """Unit whose lattice point lies nearest to `point` (mm)."""
+    """Returns unit whose lattice point lies nearest to `point` (mm)."""
     return int(np.argmin(np.linalg.norm(structure.site - point, axis=1)))
 
 
 def middle_of_top_edge(structure: RigidUnits) -> int:
-    """Unit in the middle of the top row (the left one of two)."""
+    """Returns unit in the middle of the top row (the left one of two)."""
     low, high = structure.site.min(axis=0), structure.site.max(axis=0)
     return unit_at(structure, np.array([0.5 * (low[0] + high[0]) - 1e-6, high[1]]))

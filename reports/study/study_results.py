@@ -1,4 +1,4 @@
-"""A study as a report sees it: its problem and the datasets that its stages made."""
+"""Describes a study as a report sees it: its problem and the datasets that its stages made."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ from reports.study.report_scene import ReportScene
 
 @dataclass(frozen=True)
 class RedesignResults:
-    """The design for contact on distance, and what the structures do with that contact."""
+    """Holds the design for contact on distance, and what the structures do with that contact."""
 
     design: xr.Dataset
     response: xr.Dataset
 
     @property
     def evaluations(self) -> int:
-        """Number of evaluations of the second optimisation."""
+        """Returns number of evaluations of the second optimisation."""
         return int(np.isfinite(self.design["loss"]).sum())
 
     @property
     def changed(self) -> bool:
-        """Whether there was a second optimisation."""
+        """Tells whether there was a second optimisation."""
         return self.design.sizes["evaluation"] > 1
 
 
 @dataclass(frozen=True)
 class StudyResults:
-    """Problem, datasets by kind, where they are from, and why this is but a draft (if it is one).
+    """Holds problem, datasets by kind, where they are from, and why this is but a draft.
 
     `name` is that of the study's folder and of its figure; `files` are hashes of the datasets;
     `compared` are its recordings beside their simulation, by name.
@@ -58,12 +58,12 @@ class StudyResults:
 
     @cached_property
     def recordings(self) -> list[RecordedMotion]:
-        """The recordings along the study's course."""
+        """Returns the recordings along the study's course."""
         return recorded_motion.recordings(self.problem, self.response, self.compared)
 
     @cached_property
     def scene(self) -> ReportScene:
-        """The harmonically driven lattice of the problem.
+        """Returns the harmonically driven lattice of the problem.
 
         Raises:
             UserError: the drive is not harmonic.
@@ -72,37 +72,37 @@ class StudyResults:
 
     @property
     def target(self) -> str:
-        """What builds the study, and the name of its folder of results."""
+        """Tells what builds the study, and the name of its folder of results."""
         return self.name if self.preset is None else f"{self.name}@{self.preset}"
 
     @property
     def design(self) -> xr.Dataset:
-        """The shipped design with the histories of all methods."""
+        """Returns the shipped design with the histories of all methods."""
         return self.datasets["design"]
 
     @property
     def response(self) -> xr.Dataset:
-        """What the structures do."""
+        """Tells what the structures do."""
         return self.datasets["response"]
 
     @property
     def sweep(self) -> xr.Dataset:
-        """The losses over parameters, of a problem that asks for them."""
+        """Returns the losses over parameters, of a problem that asks for them."""
         return self.datasets["sweep"]
 
     @property
     def scatter(self) -> xr.Dataset | None:
-        """Imperfect copies of the design, if the problem asks for them."""
+        """Returns imperfect copies of the design, if the problem asks for them."""
         return self.datasets.get("scatter")
 
     @property
     def verification(self) -> xr.Dataset | None:
-        """The design under finer load steps and another contact law, of a study on load steps."""
+        """Returns the design under finer load steps and another law, of a study on load steps."""
         return self.datasets.get("verification")
 
     @property
-    def again(self) -> RedesignResults | None:
-        """The design reconsidered with contact on distance, of a static study by the angle law."""
+    def redesign(self) -> RedesignResults | None:
+        """Returns the design for contact on distance, of a static study by the angle law."""
         if "geometric_design" not in self.datasets:
             return None
         return RedesignResults(
@@ -111,12 +111,9 @@ class StudyResults:
 
 
 def load(
-    path: Path,
-    preset: str | None,
-    files: Mapping[Output, Path],
-    comparisons: Sequence[Path] = (),
+    path: Path, preset: str | None, files: Mapping[Output, Path], comparisons: Sequence[Path] = ()
 ) -> StudyResults:
-    """The study of a problem file (with a preset), its datasets, and those of its recordings.
+    """Finds the study of a problem file (with a preset), its datasets, and those of its recordings.
 
     A recording is called by the folder that its comparison lies in.
 
@@ -149,10 +146,10 @@ def load(
     )
 
 
-def built(
+def load_built(
     path: Path, preset: str | None, results: Path, recordings: Sequence[str] = ()
 ) -> StudyResults:
-    """The study of a problem file, its datasets where the workflow puts them below `results`.
+    """Finds the study of a problem file, its datasets where the workflow puts them below `results`.
 
     Args:
         path: the problem file.
@@ -177,7 +174,7 @@ def _comparison(chosen: Problem, path: Path) -> xr.Dataset:
 
 
 def check_problem(posed: Problem, stage: str, data: xr.Dataset, path: Path) -> None:
-    """Whether a dataset was made from this problem.
+    """Checks that a dataset was made from this problem.
 
     Raises:
         UserError: it was not.

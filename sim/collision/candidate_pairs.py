@@ -1,4 +1,4 @@
-"""The units that may meet: what contact on their distance adds to the fixed structure."""
+"""Finds the pairs of units that may meet, where contact acts on their distance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MARGIN = 1 / 15
 
 @dataclass(frozen=True)
 class CandidatePairs:
-    """Units as polygons, and the pairs of them that the tangent couples.
+    """Holds units as polygons, and the pairs of them that the tangent couples.
 
     Attributes:
         pairs: (n_pairs, 2) units, ascending.
@@ -41,12 +41,12 @@ class CandidatePairs:
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
     def with_pairs(self, new_pairs: Ints) -> CandidatePairs:
-        """The same with more pairs (n, 2) of units."""
+        """Adds pairs (n, 2) of units."""
         return replace(self, pairs=np.unique(np.concatenate([self.pairs, new_pairs]), axis=0))
 
 
 def find_candidate_pairs(lattice: Lattice, distance: float) -> CandidatePairs:
-    """The units of a lattice, of which those within one spacing at rest are expected to meet.
+    """Pairs the units of a lattice within one spacing at rest, which are expected to meet.
 
     Others may meet as well: a solve finds out, and is repeated with them (``with_pairs``).
     """
@@ -97,7 +97,7 @@ def raise_new_pairs(contacts: ContactArrays) -> None:
 
 
 def _empty_cache(candidate_pairs: CandidatePairs, n_units: int) -> NeighbourCache:
-    """Scratch that belongs to no state yet."""
+    """Allocates scratch that belongs to no state yet."""
     n_vertices, n_watched = len(candidate_pairs.following), len(candidate_pairs.first[1:])
     return NeighbourCache(
         state=np.full(3 * n_units, np.inf),

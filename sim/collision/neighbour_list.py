@@ -1,4 +1,4 @@
-"""Which features of which units are within the reach of contact: compiled, conservative searches.
+"""Searches vertices and edges within the reach of contact: compiled, conservative.
 
 The broad phase sweeps all units and notes the gap of each pair of them that may meet. The gap of a
 pair shrinks by no more than its units have moved since, so most pairs are skipped without a look at
@@ -137,7 +137,7 @@ def _collect(contacts: ContactArrays) -> None:
 
 @compiled
 def is_same(one: Floats, other: Floats) -> bool:
-    """Whether two states are the same number by number."""
+    """Compares two states number by number."""
     d = 0
     while d < len(one) and one[d] == other[d]:
         d += 1

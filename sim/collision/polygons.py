@@ -11,7 +11,7 @@ from sim.core import Floats, Ints, compiled
 
 
 class NeighbourCache(NamedTuple):
-    """What is known of the last state looked at; overwritten at will.
+    """Caches the last state looked at; overwritten at will.
 
     Attributes:
         state: (n_dofs,) that state.
@@ -102,7 +102,7 @@ def _square_to_edge(v: int, p: int, q: int, place: Floats) -> float:
 
 @compiled
 def is_inside(v: int, unit: int, contacts: ContactArrays) -> bool:
-    """Whether vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
+    """Tests if vertex ``v`` lies inside a unit, by the parity of the edges to its right."""
     place, inside = contacts.cache.place, False
     x, y = place[v, 0], place[v, 1]
     for p in range(contacts.first[unit], contacts.first[unit + 1]):
@@ -116,14 +116,14 @@ def is_inside(v: int, unit: int, contacts: ContactArrays) -> bool:
 
 @compiled
 def _side(p: int, q: int, v: int, place: Floats) -> bool:
-    """Whether vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
+    """Tests if vertex ``v`` lies to the left of the line from ``p`` to ``q``."""
     ex, ey = place[q, 0] - place[p, 0], place[q, 1] - place[p, 1]
     return ex * (place[v, 1] - place[p, 1]) > ey * (place[v, 0] - place[p, 0])
 
 
 @compiled
 def crosses(v: int, unit: int, contacts: ContactArrays) -> bool:
-    """Whether the edge that starts at ``v`` crosses one of a unit's."""
+    """Tests if the edge that starts at ``v`` crosses one of a unit's."""
     place, w = contacts.cache.place, contacts.following[v]
     for p in range(contacts.first[unit], contacts.first[unit + 1]):
         q = contacts.following[p]

@@ -1,4 +1,4 @@
-"""The largest step on which no units pass through each other: compiled, by safe advances.
+"""Limits a step so that no units pass through each other: compiled, by safe advances.
 
 Two outlines that do not cross can only come to cross where a vertex of one meets an edge of the
 other. In the frame of the edge's unit the vertex moves on a smooth curve, whose curvature is
@@ -26,7 +26,7 @@ MAX_ADVANCES = 200
 
 @compiled
 def _advance(value: float, slope: float, curvature: float) -> float:
-    """How far a positive value with this slope stays so, if its second derivative is bounded."""
+    """Bounds how far a positive value with this slope stays so, by its second derivative."""
     root = math.sqrt(slope * slope + 2.0 * curvature * value)
     if slope < 0.0:
         return 2.0 * value / (root - slope)

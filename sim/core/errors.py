@@ -1,4 +1,4 @@
-"""Errors that a solve may end with; each says where it failed and what to try."""
+"""Defines the errors that a solve may end with; each says where it failed and what to try."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from sim.core.arrays import Floats, Ints
 
 
 class SimulationError(RuntimeError):
-    """A solve could not reach its tolerance.
+    """Reports that a solve could not reach its tolerance.
 
     Args:
         reason: what failed, where (step, worst unit) and what to try, in one sentence.
@@ -29,7 +29,7 @@ class SimulationError(RuntimeError):
 
 
 class NewContactPairs(SimulationError):  # noqa: N818  (a turn that a solve takes, no fault)
-    """Units came near each other whose coupling the tangent has no room for.
+    """Reports units near each other whose coupling the tangent has no room for.
 
     Args:
         pairs: (n, 2) units.

@@ -22,7 +22,7 @@ from sim.structure import (
 
 @dataclass(frozen=True)
 class Topology:
-    """What stays fixed while parameters and drives change.
+    """Holds what stays fixed while parameters and drives change.
 
     Attributes:
         ligament_units: (n_ligaments, 2).
@@ -59,7 +59,7 @@ class Topology:
         return np.argsort(np.where(number < 0, len(number), number), kind="stable")[: self.n_free]
 
     def coupling(self, pairs: Ints) -> Topology:
-        """The same with room in the tangent for contact of more pairs (n, 2) of units."""
+        """Makes room in the tangent for contact of more pairs (n, 2) of units."""
         assert isinstance(self.contact, CandidatePairs)
         return replace(self, contact=self.contact.with_pairs(pairs))
 
@@ -79,7 +79,7 @@ class Topology:
         return self.n_dofs - len(self.held)
 
     def network(self, values: ConcreteParameters, touching: Ints | None = None) -> NetworkArrays:
-        """The kernels' arrays of concrete parameters, with contact in ``touching`` ligaments.
+        """Lays out the kernels' arrays of parameters, with contact in ``touching`` ligaments.
 
         If contact acts on the distance of units, there is none in any ligament.
         """

@@ -1,4 +1,4 @@
-"""Energy of two units that come close: a barrier on the true distance of their outlines.
+"""Defines the energy of two units that are close: a barrier on the true distance of their outlines.
 
 Outlines that do not cross come closest between a vertex of the one and an edge, or a vertex, of the
 other. The distance from a vertex to an edge with its ends is only once differentiable where the
@@ -38,7 +38,7 @@ class DistanceLaw(NamedTuple):
 
 
 class UnitOutline(NamedTuple):
-    """A unit: its centroid (2,) and the arms (n, 2) from there to its vertices, at rest, mm."""
+    """Holds a unit: its centroid (2,) and the arms (n, 2) to its vertices, at rest, mm."""
 
     centroid: Numbers
     corner: Numbers

@@ -1,4 +1,4 @@
-"""Compiled contact of units on their distance: energy, gradient, tangent and mixed derivatives.
+"""Compiles contact of units on their distance: energy, gradient, tangent, mixed derivatives.
 
 Derived by hand from sim/energy/distance_contact.py and tested against its automatic derivatives.
 Units are rigid,
@@ -26,6 +26,7 @@ from sim.linalg import Matrix, add
 @compiled
 def _barrier(square: float, contacts: ContactArrays) -> tuple[float, float, float]:
     """Barrier at a squared distance, and its first two derivatives by that."""
+    # E = energy (1 - q)^3 / q with q = square / distance^2
     unit = contacts.distance * contacts.distance
     q, energy = square / unit, contacts.energy
     return (
@@ -38,6 +39,7 @@ def _barrier(square: float, contacts: ContactArrays) -> tuple[float, float, floa
 @compiled
 def _fade(length: float, distance: float) -> tuple[float, float, float]:
     """Weight at a length from the end of an edge, and its first two derivatives."""
+    # w = 10 x^3 - 15 x^4 + 6 x^5 with x = length / distance
     x = length / distance
     if x >= 1.0:
         return 1.0, 0.0, 0.0
@@ -66,6 +68,7 @@ def _edge_slopes(
     s: float, x: float, length: float, contacts: ContactArrays
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Energy of a vertex and an edge, and its derivatives s, x, l, ss, sx, xx, sl, xl."""
+    # E = w(x) w(l - x) B(s^2)
     energy, by_square, twice = _barrier(s * s, contacts)
     one, d_one, dd_one = _fade(x, contacts.distance)
     two, d_two, dd_two = _fade(length - x, contacts.distance)
@@ -194,7 +197,7 @@ def add_tangent(motion: Floats, contacts: ContactArrays, free: Ints, matrix: Mat
 def _rates(
     v: int, p: int, q: int, direction: Floats, contacts: ContactArrays
 ) -> tuple[float, float, float, float]:
-    """How a term's vertex moves in the other unit's frame, and how its gradient changes."""
+    """Differentiates a term's vertex in the other unit's frame, and its gradient."""
     a, b = contacts.owner[v], contacts.owner[p]
     _, gx, gy, xx, xy, yy = _slopes(v, p, q, contacts)
     ax, ay, bx, by = _arms(v, a, b, contacts)

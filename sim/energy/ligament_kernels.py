@@ -1,4 +1,4 @@
-"""Compiled loops over the ligaments: energy, gradient, tangent, and mixed derivatives of a network.
+"""Compiles loops over the ligaments: energy, gradient, tangent and mixed derivatives.
 
 Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. With d
 the current
@@ -55,6 +55,7 @@ def _kinematics(
     ch = turn[a, 2] * turn[b, 2] - turn[a, 3] * turn[b, 3]
     sh = turn[a, 3] * turn[b, 2] + turn[a, 2] * turn[b, 3]
     ex, ey = ch * vx - sh * vy, sh * vx + ch * vy
+    # gamma: angle from the reference vector, turned by the mean of both rotations, to d
     shear = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
     length = math.sqrt(dx * dx + dy * dy)
     return pax, pay, pbx, pby, dx, dy, length, math.sqrt(vx * vx + vy * vy), shear
@@ -72,6 +73,7 @@ def _forces(
     bend: float,
 ) -> tuple[float, float, float, float]:
     """dW/dd (2) and dW/dtheta of either unit at fixed d."""
+    # dW/dd = k_l (l - l0) n + k_s l0^2 gamma t / l, with n along d and t across; M = k_b bend
     nx, ny = dx / length, dy / length
     tension = net.law[k, 0] * (length - rest)
     torque = net.law[k, 1] * rest * rest * shear
@@ -92,6 +94,7 @@ def gradient(motion: Floats, net: NetworkArrays, turn: Floats, out: Floats) -> f
         pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
         bend = motion[b + 2] - motion[a + 2]
         gx, gy, wa, wb = _forces(net, k, dx, dy, length, rest, shear, bend)
+        # W = k_l (l - l0)^2 / 2 + k_s (l0 gamma)^2 / 2 + k_b bend^2 / 2
         strain_energy += 0.5 * (
             net.law[k, 0] * (length - rest) ** 2
             + net.law[k, 1] * (rest * shear) ** 2
@@ -111,6 +114,7 @@ def _second(
     net: NetworkArrays, k: int, dx: float, dy: float, length: float, rest: float, shear: float
 ) -> tuple[float, float, float, float, float]:
     """Second derivatives of W: d d (xx, xy, yy) and d theta (x, y); theta theta is constant."""
+    # d2W = k_l n n' + (k_l (l - l0) / l + k_s l0^2 / l^2) t t' - k_s l0^2 gamma / l^2 (n t' + t n')
     nx, ny = dx / length, dy / length
     axial, torsion = net.law[k, 0], net.law[k, 1] * rest * rest
     along = axial

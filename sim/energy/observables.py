@@ -1,4 +1,4 @@
-"""Energies and reactions of given states."""
+"""Computes energies and reactions of given states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sim.structure import ConcreteParameters, VoidAngleContact
 
 
 class Observables(NamedTuple):
-    """What is known of each state besides its motion.
+    """Holds what follows from each state besides its motion.
 
     Attributes:
         strain_energy, contact_energy: (n_states,) N mm.
@@ -55,7 +55,7 @@ def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pai
 
 
 def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:
-    """Observables of states ``motion`` (n_states, n_units, 3) of a structure."""
+    """Computes observables of states ``motion`` (n_states, n_units, 3) of a structure."""
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
     near = np.zeros(len(states), dtype=np.int64)

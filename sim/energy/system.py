@@ -1,4 +1,4 @@
-"""A structure with its held dofs as compiled solvers take it, and their scratch memory."""
+"""Lays out a structure as compiled solvers take it, and their scratch memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.structure import ConcreteParameters
 
 
 class System(NamedTuple):
-    """One structure, its inertia and the numbering of its dofs.
+    """Holds one structure, its inertia and the numbering of its dofs.
 
     Attributes:
         net: ligaments, and contact on their void angles.
@@ -40,7 +40,7 @@ class System(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Scratch arrays of a solve, overwritten at will.
+    """Holds scratch arrays of a solve, overwritten at will.
 
     Attributes:
         turn: (n_units, 4) of the kernels.
@@ -61,7 +61,7 @@ class Workspace(NamedTuple):
 
 
 class Bars(NamedTuple):
-    """Loss derivatives that a reverse sweep adds to.
+    """Holds loss derivatives that a reverse sweep adds to.
 
     Attributes:
         sensitivity: by the network's parameters.
@@ -95,7 +95,7 @@ def workspace(system: System) -> Workspace:
 def system_of(
     topology: Topology, values: ConcreteParameters, touching: Ints | None = None
 ) -> System:
-    """The system of concrete parameters, with contact in ``touching`` ligaments (default all)."""
+    """Lays out the system of parameters, with contact in ``touching`` ligaments (default all)."""
     free, pattern = topology.numbering
     return System(
         net=topology.network(values, touching),
@@ -127,6 +127,6 @@ def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
 
 
 def as_values(bars: Bars) -> ConcreteParameters:
-    """The derivatives by all parameters, shaped as they are."""
+    """Shapes the derivatives by all parameters as they are."""
     mass, damping = bars.mass.reshape(-1, 3), bars.damping.reshape(-1, 3)
     return ConcreteParameters(*bars.sensitivity, mass=mass, damping=damping)

@@ -1,4 +1,4 @@
-"""The whole energy of a system: its ligaments, and contact by the law of its structure.
+"""Sums the energy of a system: its ligaments, and contact by the law of its structure.
 
 The solvers see the energy and the admissible states through these functions alone.
 """

@@ -1,4 +1,4 @@
-"""Compiled contact on the angle of the voids: energy, gradient, tangent and mixed derivatives.
+"""Compiles contact on the angle of the voids: energy, gradient, tangent, mixed derivatives.
 
 Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. Units are
 rigid, so
@@ -23,6 +23,7 @@ def void_slopes(net: NetworkArrays, k: int, side: int, turn: float) -> tuple[flo
     angle = net.void[k, side] + sign * turn
     if angle >= cutoff:
         return 0.0, 0.0, 0.0
+    # E = k w^2 x^2 / (2 (1 - x^2)) with x = (angle - cutoff) / w and w = cutoff - barrier
     width = cutoff - barrier
     x = (angle - cutoff) / width
     if x <= -1.0:

@@ -1,6 +1,6 @@
-"""Compiled equilibrium paths by Newton continuation, and their exact adjoint.
+"""Follows equilibrium paths by Newton continuation, compiled, with their exact adjoint.
 
-Between two asked loads the increment adapts itself. An increment is smooth if no tangent on the
+Between two output loads the increment adapts itself. An increment is smooth if no tangent on the
 way was indefinite and the correction is short beside the step predicted; one that is not is cut, so
 that the path is followed up to where it ends: a limit point or a branching. There the structure
 jumps: the energy is descended to a minimum at the next load, and the jump is recorded.
@@ -30,7 +30,7 @@ SMALLEST_SMOOTH = 1e-3
 SHORT = 0.5
 """Correction of a smooth increment at most, over the step predicted."""
 ON_THE_WAY = 1e-3
-"""Relative residual that suffices between two asked loads."""
+"""Relative residual that suffices between two output loads."""
 EASY = 5
 """Factorisations of a correction after which the next increment is doubled."""
 MAX_SADDLES = 4
@@ -43,6 +43,7 @@ def _predict(motion: Floats, load: Floats, share: float, system: System, work: W
     for i in range(len(system.held)):
         d = system.held[i]
         work.product[d] = (load[i] - motion[d]) * share
+    # K_ff du_f = -K_fh du_h
     hessian_product(motion, system, work.turn, work.product, work.force)
     solve_free(system, work)
     for d in system.held:

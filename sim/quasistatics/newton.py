@@ -1,4 +1,4 @@
-"""Compiled Newton descent to an equilibrium at fixed held dofs.
+"""Descends to an equilibrium at fixed held dofs by Newton's method, compiled.
 
 Every step descends the energy and stops short of the contact barrier. An indefinite tangent is
 shifted until it is positive definite, so that the descent ends in a minimum or, rarely, exactly on

@@ -1,4 +1,4 @@
-"""Equilibria of one case behind the common interface of the solvers."""
+"""Finds equilibria of one case behind the common interface of the solvers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ stiffness makes of these is no force to balance."""
 
 @dataclass(frozen=True)
 class StaticRecord:
-    """What the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs.
 
     Attributes:
         states: (n_times, n_dofs) equilibria.
@@ -42,7 +42,7 @@ class StaticRecord:
 
 @dataclass(frozen=True)
 class StaticSolver:
-    """Finds the equilibria of one case at the asked load parameters (``Solver``).
+    """Finds the equilibria of one case at the given load parameters (``Solver``).
 
     The load parameter takes the place of time; the velocities of free dofs are zero.
 
@@ -52,11 +52,11 @@ class StaticSolver:
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
         threads: cases solved side by side.
-        start: of a similar structure under the same drive, whose steps between the asked loads are
+        start: of a similar structure under the same drive, whose steps between the output loads are
             tried before the path is followed step by step; of the result they change no more than
             the tolerance allows. Where that structure jumped its step is not tried. A step is the
             tangent's, bent as it was there.
-        substeps: loads to pass on the way to each asked one, that one included.
+        substeps: loads to pass on the way to each output load, that one included.
     """
 
     topology: Topology
@@ -68,7 +68,7 @@ class StaticSolver:
     substeps: int = 1
 
     def refined(self, record: StaticRecord) -> StaticSolver:
-        """One that passes twice the loads, each to a hundred times tighter a tolerance."""
+        """Passes twice the loads, each to a hundred times tighter a tolerance."""
         del record
         return replace(self, relative=self.relative / 100, start=None, substeps=2 * self.substeps)
 

@@ -95,7 +95,7 @@ class GradientChain:
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:
-    """A solver for each case that starts from the path remembered, if there is one."""
+    """Starts the solver of each case from the path remembered, if there is one."""
     if memory is None or not isinstance(solver, StaticSolver):
         return None
     records = memory.start()
@@ -227,7 +227,7 @@ def minimise(
 
 
 def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
-    """The loss by a path followed anew in small steps; None of a motion in time, which has none.
+    """Evaluates by a path followed anew in small steps; None of a motion in time.
 
     A path that starts from that of a similar design, or steps far, may pass where it should end.
     """

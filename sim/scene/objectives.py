@@ -1,4 +1,4 @@
-"""Mimicking functions: how far a response is from its target, per load case, in JAX."""
+"""Measures how far a response is from its target, per load case, in JAX."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sim.structure import Parameters
 
 
 class DisplacementMimicking(NamedTuple):
-    """Weighted sum of |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest).
+    """Sums weighted |U|^2 over samples and units, U = (ux/s, uy/s, theta) (Eq. 1, target rest).
 
     Attributes:
         units: (n,) region of interest.
@@ -35,7 +35,7 @@ class DisplacementMimicking(NamedTuple):
 
 
 class RelativeMimicking(NamedTuple):
-    """Root of the weighted sum of |U - U_target|^2, relative to the size of U_target (Eq. 1).
+    """Takes the root of the weighted sum of |U - U_target|^2, over the size of U_target (Eq. 1).
 
     Attributes:
         units: (n,) region of interest.
@@ -59,7 +59,7 @@ class RelativeMimicking(NamedTuple):
 
 
 def combined(losses: Array, weights: Numbers, sharpness: float) -> Array:
-    """Weighted p-mean of losses (n_cases,): their mean for 1, towards the largest for a large p."""
+    """Takes the weighted p-mean of losses (n_cases,): their mean for 1, the largest for large p."""
     if sharpness == 1.0:
         return jnp.asarray(weights) @ losses
     largest = jax.lax.stop_gradient(jnp.max(losses))
@@ -77,7 +77,7 @@ def extent(motion: Floats, spacing: float) -> Floats:
 
 
 class StrainEnergyMimicking(NamedTuple):
-    """Weighted sum over samples of the region's strain energy, without contact, N mm (Eq. 2).
+    """Sums weighted over samples the region's strain energy, without contact, N mm (Eq. 2).
 
     Attributes:
         ligaments: (n,) ligaments that touch the region.

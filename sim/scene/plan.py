@@ -1,4 +1,4 @@
-"""What a scene needs and what it may skip: decided once, printed, and stored with every result."""
+"""Decides what a scene needs and what it may skip: once, printed, and stored with results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene.scene import Accuracy, Scene
-from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, check_free_dofs
+from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, check_free_dofs, concrete
 from sim.structure import (
     QUARTER_TURN,
     ConcreteParameters,
@@ -38,7 +38,7 @@ _DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
 
 @dataclass(frozen=True)
 class GridRule:
-    """How the implicit grid is made.
+    """Holds how the implicit grid is made.
 
     Attributes:
         first: first step of a graded grid, s.
@@ -64,7 +64,7 @@ GRIDS: dict[Accuracy, GridRule] = {
 
 @dataclass(frozen=True)
 class Plan:
-    """Decisions for one scene.
+    """Holds the decisions for one scene.
 
     Attributes:
         integrator: how the response is computed.
@@ -82,15 +82,15 @@ class Plan:
 
     @property
     def simulated(self) -> Ints:
-        """Cases that are simulated, ascending."""
+        """Lists the cases that are simulated, ascending."""
         return np.unique(self.case_of)
 
     def describe(self) -> str:
-        """The plan in words, a line a decision."""
+        """Says the plan in words, a line a decision."""
         return "\n".join((*self.decisions, *(f"skipped: {line}" for line in self.skipped)))
 
     def record(self) -> dict[str, Any]:
-        """The plan as plain data, to be stored."""
+        """Returns the plan as plain data, to be stored."""
         return {
             "integrator": self.integrator,
             "decisions": list(self.decisions),
@@ -175,7 +175,7 @@ def _reference_line(scene: Scene) -> str:
 
 
 def sample_times(scene: Scene) -> Floats:
-    """Times (n_times,) of the samples or load steps that the loss is taken at."""
+    """Spaces the times (n_times,) of the samples or load steps that the loss is taken at."""
     if scene.objective.steps is not None:
         return (
             scene.loads.duration * np.arange(1, scene.objective.steps + 1) / scene.objective.steps
@@ -184,9 +184,9 @@ def sample_times(scene: Scene) -> Floats:
 
 
 def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
-    """Values of a structure as NumPy arrays."""
+    """Computes the parameters of a structure as NumPy arrays."""
     made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
-    return ConcreteParameters(*(np.asarray(part) for part in made))
+    return concrete(made)
 
 
 def _equal_cases(scene: Scene, vertices: Floats) -> Ints:

@@ -99,7 +99,7 @@ class Loads:
 
     @property
     def motions(self) -> tuple[MotionLaw, ...]:
-        """The motion of each case."""
+        """Lists the motion of each case."""
         return tuple(case.motion for case in self.cases)
 
     @cached_property
@@ -193,11 +193,11 @@ class Scene:
 
     @property
     def lattice(self) -> Lattice:
-        """The initial network."""
+        """Returns the initial network."""
         return self.structure.lattice
 
     def updated(self, **changes: Any) -> Scene:  # noqa: ANN401  (fields of the records)
-        """The scene with other values of fields of its records, such as ``accuracy="tight"``.
+        """Replaces fields of the records, whichever holds them, such as ``accuracy="tight"``.
 
         Raises:
             TypeError: no record has a field of that name.
@@ -214,12 +214,12 @@ class Scene:
         return Scene(**records)
 
     def driven_by(self, *motions: MotionLaw, **changes: Any) -> Scene:  # noqa: ANN401
-        """The scene under other motions of its driven units, weighted equally; see `updated`."""
+        """Replaces the motions of the driven units, weighted equally; changes as of `updated`."""
         cases = tuple(PrescribedMotion(self.loads.driven, motion) for motion in motions)
         return self.updated(**{"cases": cases, "weights": None, **changes})
 
     def under(self, motions: tuple[MotionLaw, ...], duration: float, frequency: float) -> Scene:
-        """The scene and its reference under other motions of their driven units."""
+        """Replaces the motions of the driven units, of the reference as well."""
         reference = self.objective.reference
         return self.driven_by(
             *motions,
@@ -229,11 +229,11 @@ class Scene:
         )
 
     def alone(self, case: int) -> Scene:
-        """The scene under one of its load cases."""
+        """Keeps one of the load cases."""
         return self.updated(cases=(self.loads.cases[case],), weights=None)
 
     def with_contact(self, contact: ContactModel) -> Scene:
-        """The scene, and its reference, with another law of contact."""
+        """Replaces the law of contact, of the reference as well."""
         reference = self.objective.reference
         return self.updated(
             contact=contact, reference=reference and reference.with_contact(contact)
@@ -248,7 +248,7 @@ class Scene:
 
     @cached_property
     def topology(self) -> Topology:
-        """The fixed structure; differentiable by what the design can change."""
+        """Joins the fixed structure; differentiable by what the design can change."""
         moved = np.unique(self.lattice.unit[self.space.free_vertices])
         return topology(self.lattice, self.loads.held, self.structure.contact, moved)
 

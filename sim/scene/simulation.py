@@ -23,8 +23,8 @@ from sim.scene.objectives import (
 )
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.solvers import Case, Solver, differentiable_motion, solve_cases
-from sim.structure import ConcreteParameters, Parameters, parameters, shape
+from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
+from sim.structure import Parameters, parameters, shape
 from sim.time_integration import simpson_weights
 
 Mimicking = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
@@ -84,12 +84,12 @@ class Response:
 
     @property
     def loss(self) -> Array:
-        """What is minimised: the weighted mean of the losses, or their p-mean."""
+        """Returns what is minimised: the weighted mean of the losses, or their p-mean."""
         scene = self.scene
         return combined(self.losses, scene.loads.case_weights, scene.objective.sharpness)
 
     def refined(self) -> Response:
-        """The same with half the steps, to estimate the error by.
+        """Simulates again with half the steps, to estimate the error by.
 
         Raises:
             SimulationError: a step failed.
@@ -110,9 +110,9 @@ def simulate(
 ) -> Response:
     """Simulates a structure under the load cases of a scene.
 
-    It is differentiable by the ``design``: ``jax.grad``, ``vjp`` and ``jacrev`` of functions of the
+    It is differentiable by the ``design``: ``jax.grad`` and ``jax.vjp`` of functions of the
     displacement, the velocity or the losses run the exact adjoint of the steps taken. Under
-    ``jax.jit``, ``vmap`` and ``jvp`` it raises a TypeError.
+    ``jax.jit``, ``vmap``, ``jvp``, ``jacrev`` and for second derivatives it raises a TypeError.
 
     Args:
         scene: the scene.
@@ -138,13 +138,12 @@ def simulate(
         return Response(
             scene, made, values, chosen, *differentiable_motion(made.solver, values, drives)
         )
-    concrete = ConcreteParameters(*(np.asarray(part) for part in values))
-    empty = Response(scene, made, concrete, chosen, np.empty(0), np.empty(0))
+    empty = Response(scene, made, concrete(values), chosen, np.empty(0), np.empty(0))
     return _solved(empty, (made.solver,) * len(chosen))
 
 
 def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:
-    """The response by other solvers."""
+    """Solves the cases of a response by other solvers."""
     drives = [response.scene.loads.cases[case] for case in response.cases]
     solver = response.plan.solver
     displacement, velocity, made = solve_cases(solver, response.parameters, drives, solvers)
@@ -160,7 +159,7 @@ def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:
 def cases_of(
     scene: Scene, vertices: Floats, solver: Solver, numbers: Iterable[int] | None = None
 ) -> Iterator[Case]:
-    """Load cases of a structure for `run_batch`; all, or those of the ``numbers``."""
+    """Lists the load cases of a structure for `run_batch`; all, or those of the ``numbers``."""
     values, drives = concrete_parameters(scene, vertices), scene.loads.cases
     chosen = range(len(drives)) if numbers is None else numbers
     return (Case(values, drives[number], solver, int(number)) for number in chosen)

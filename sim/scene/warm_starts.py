@@ -1,4 +1,4 @@
-"""Equilibrium paths that outlive a kill: each evaluation starts from the last accepted design's.
+"""Stores equilibrium paths: each evaluation starts from the last accepted design's.
 
 Which path a solve starts from shows in the last bits of its result, so a resumed run must start
 from the same ones. Each path is on the disc before its evaluation enters the journal, and stays
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 
 class Paths:
-    """Paths of an optimisation's designs, one record for each simulated case.
+    """Stores the paths of an optimisation's designs, one record for each simulated case.
 
     Args:
         folder: where they are kept; made if there is none.
@@ -36,7 +36,7 @@ class Paths:
         self._accepted: str | None = None
 
     def start(self) -> list[StaticRecord] | None:
-        """The records to start the next evaluation from: those of the last accepted design."""
+        """Reads the records of the last accepted design, to start the next evaluation from."""
         if self._accepted is None:
             return None
         path = self.folder / self._accepted
@@ -76,7 +76,7 @@ class Paths:
 
 
 def _records(path: Path) -> list[StaticRecord]:
-    """The records in a file, whose entries have checksums."""
+    """Reads the records in a file, whose entries have checksums."""
     with np.load(path) as stored:
         parts = (stored[name] for name in ("states", "tangents", "stable", "jumped"))
         return [

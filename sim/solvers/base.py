@@ -40,7 +40,12 @@ class CaseMotions(NamedTuple):
 
 
 class PrescribedMotion(NamedTuple):
-    """A motion and the units that follow it; all other held dofs rest."""
+    """Prescribes the motion of units, all their dofs; all other held dofs rest.
+
+    Attributes:
+        units: (n,) ids.
+        motion: of them, mm, mm, rad.
+    """
 
     units: Ints
     motion: MotionLaw
@@ -63,7 +68,7 @@ class PrescribedMotion(NamedTuple):
 
 
 def _padded(times: Floats) -> Floats:
-    """The times, up to a power of 2 with copies of the last: JAX compiles for every new length."""
+    """Pads times to a power of 2 with copies of the last: JAX compiles for every new length."""
     return np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
 
 
@@ -73,7 +78,7 @@ def _held_rates(held: Ints, units: Ints, motion: MotionLaw, times: Floats) -> Ar
 
 
 class Solver(Protocol):
-    """One way to integrate one case in time, forward and back."""
+    """Integrates one case in time, forward and back."""
 
     @property
     def topology(self) -> Topology:
@@ -91,11 +96,11 @@ class Solver(Protocol):
         ...
 
     def refined(self, record: Any) -> Solver:
-        """One with half the steps that a record was made with, to estimate its error by."""
+        """Returns one with half the steps that a record was made with, to estimate its error by."""
         ...
 
     def coupling(self, pairs: Ints) -> Solver:
-        """One with room in the tangent for contact of more pairs (n, 2) of units."""
+        """Returns one with room in the tangent for contact of more pairs (n, 2) of units."""
         ...
 
     def forward(
@@ -121,7 +126,7 @@ class Solver(Protocol):
 def solve_case(
     solver: Solver, values: ConcreteParameters, drive: PrescribedMotion
 ) -> tuple[Floats, Floats, Any]:
-    """One case: displacement and velocity (n_times, n_dofs), and the solver's record.
+    """Solves one case: displacement and velocity (n_times, n_dofs), and the solver's record.
 
     Raises:
         SimulationError: a step failed, or there is nothing meaningful to start from.
@@ -140,7 +145,7 @@ def solve_case(
 
 @jax.tree_util.register_static
 class Records:
-    """What the reverse sweeps of all cases need, opaque to JAX."""
+    """Holds what the reverse sweeps of all cases need, opaque to JAX."""
 
     def __init__(
         self, values: ConcreteParameters, drives: Sequence[PrescribedMotion], records: list[Any]
@@ -151,12 +156,25 @@ class Records:
 
 
 def concrete(parameters: Parameters[Any]) -> ConcreteParameters:
-    """Converts parameters to arrays of NumPy, as the solvers take them."""
+    """Converts parameters to arrays of NumPy, as the solvers take them.
+
+    Raises:
+        TypeError: JAX traces them.
+    """
+    _check_untraced(parameters)
     return ConcreteParameters(*(np.asarray(part) for part in parameters))
 
 
+def _check_untraced(values: object) -> None:
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(values)):
+        raise TypeError(
+            "a simulation loops over concrete arrays and cannot be traced; call it outside jax.jit"
+            " and jax.vmap, differentiate it once, and rows of a Jacobian one by one with jax.vjp"
+        )
+
+
 class Gradients(NamedTuple):
-    """Loss derivatives that a reverse sweep returns.
+    """Holds loss derivatives that a reverse sweep returns.
 
     Attributes:
         parameters: summed over the cases.
@@ -174,7 +192,7 @@ def solve_cases(
     drives: Sequence[PrescribedMotion],
     solvers: Sequence[Solver] | None = None,
 ) -> tuple[Floats, Floats, Records]:
-    """Displacement and velocity (n_cases, n_times, n_units, 3) of all cases, and their records.
+    """Solves all cases: displacement and velocity (n_cases, n_times, n_units, 3), and records.
 
     With ``solvers`` (n_cases,) each case is solved by its own, otherwise alike.
 
@@ -212,9 +230,9 @@ def differentiable_motion(
 ) -> CaseMotions:
     """Integrates every case; differentiable by the parameters and the numbers of the motions.
 
-    ``jax.grad``, ``jax.vjp`` and ``jax.jacrev`` run the exact adjoint of the steps taken, once for
-    each row. Under ``jax.jit`` and ``jax.vmap`` it cannot run: the solvers loop over concrete
-    arrays. There are no forward or second derivatives.
+    ``jax.grad`` and ``jax.vjp`` run the exact adjoint of the steps taken. Under ``jax.jit`` and
+    ``jax.vmap`` (and so ``jax.jacrev``) it cannot run: the solvers loop over concrete arrays. There
+    are no forward or second derivatives.
 
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
@@ -226,8 +244,8 @@ def differentiable_motion(
         if "jvp" not in str(error):
             raise
         raise TypeError(
-            "a simulation has no forward derivative (jax.jvp, jacfwd, hessian); use jax.grad, vjp"
-            " or jacrev"
+            "a simulation has no forward derivative (jax.jvp, jacfwd, hessian); use jax.grad"
+            " or jax.vjp"
         ) from error
 
 
@@ -241,11 +259,7 @@ def _motion(
 def _solved(
     solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
 ) -> tuple[CaseMotions, Records]:
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((parameters, cases))):
-        raise TypeError(
-            "a simulation loops over concrete arrays and cannot be traced; call it outside jax.jit"
-            " and jax.vmap, once for each structure, and differentiate it once"
-        )
+    _check_untraced(cases)
     displacement, velocity, records = solve_cases(solver, concrete(parameters), cases)
     return CaseMotions(jnp.asarray(displacement), jnp.asarray(velocity)), records
 
@@ -291,6 +305,7 @@ _motion.defvjp(_forward_rule, _backward_rule, symbolic_zeros=True)
 def _dense(cotangent: Any) -> Floats:
     if isinstance(cotangent, SymbolicZero):
         return np.zeros(cotangent.shape)
+    _check_untraced(cotangent)
     return np.asarray(cotangent)
 
 

@@ -1,4 +1,4 @@
-"""Many independent cases in one call: over all cores, memory flat, failures kept with a reason."""
+"""Solves many independent cases: over all cores, memory flat, failures kept with a reason."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True)
 class Case:
-    """One structure under one drive, the solver to use, and its number among the load cases."""
+    """Holds one structure under one drive, the solver to use, and its number among the cases."""
 
     values: ConcreteParameters
     drive: PrescribedMotion
@@ -27,7 +27,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Solved:
-    """A case that was simulated.
+    """Holds a case that was simulated.
 
     Attributes:
         case: the case.
@@ -43,7 +43,7 @@ class Solved:
 
 @dataclass(frozen=True)
 class Outcome(Generic[R]):
-    """What came of a case: the measure's value, or why there is none."""
+    """Holds what came of a case: the measure's value, or why there is none."""
 
     value: R | None
     failure: str | None = None

@@ -1,4 +1,4 @@
-"""Prescribed motions of held units as functions of time, in JAX."""
+"""Prescribes motions of held units as functions of time, in JAX."""
 
 from __future__ import annotations
 
@@ -28,10 +28,16 @@ def _along(direction: float | Array, displacement: Array) -> Array:
 
 
 class Harmonic(NamedTuple):
-    """A sin(2 pi f t) along a direction, from rest with a velocity jump, as the authors drive it.
+    """Moves along a direction by A sin(2 pi f t), from rest with a velocity jump (the authors').
 
     With a ``rise`` time the sine is switched on smoothly about ``delay``, and its phase starts
     there: A (1 + tanh((t - delay) / rise)) / 2 sin(2 pi f (t - delay)).
+
+    Attributes:
+        amplitude: A, mm.
+        frequency: f, Hz.
+        direction: against x, counter-clockwise, rad.
+        rise, delay: s.
     """
 
     amplitude: float | Array
@@ -50,7 +56,7 @@ class Harmonic(NamedTuple):
 
 
 class Pulse(NamedTuple):
-    """A exp(-((t - delay) / width)^2) along a direction."""
+    """Moves along a direction (rad) by A exp(-((t - delay) / width)^2), mm; times in s."""
 
     amplitude: float | Array
     width: float
@@ -64,7 +70,7 @@ class Pulse(NamedTuple):
 
 
 class TanhRamp(NamedTuple):
-    """A (1 + tanh(6 (2 t / T - 1))) / 2 along a direction, the authors' quasi-static ramp."""
+    """Moves along a direction (rad) by A (1 + tanh(6 (2 t / T - 1))) / 2, mm; T in s."""
 
     amplitude: float | Array
     duration: float
@@ -77,7 +83,7 @@ class TanhRamp(NamedTuple):
 
 
 class LinearRamp(NamedTuple):
-    """A t / T along a direction."""
+    """Moves along a direction (rad) by A t / T, mm; T in s."""
 
     amplitude: float | Array
     duration: float
@@ -89,7 +95,7 @@ class LinearRamp(NamedTuple):
 
 
 class TimeSeries(NamedTuple):
-    """Measured motion, interpolated linearly.
+    """Follows a measured motion, interpolated linearly.
 
     Attributes:
         times: (n,) s, ascending.

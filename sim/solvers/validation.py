@@ -1,4 +1,4 @@
-"""What a solve may start from: numbers with a meaning, and units that are not in one another.
+"""Checks solver inputs: finite parameters, units that hang together, no initial overlap.
 
 Beyond its barrier a void has no force, and a unit without mass no acceleration: a solver would go
 on from there without a sign that anything is wrong.
@@ -106,7 +106,7 @@ def check_start(
 def inadmissible(
     topology: Topology, values: ConcreteParameters, states: Floats
 ) -> NDArray[np.bool_]:
-    """Which of the states (n_states, n_dofs) have a void beyond its barrier, or an overlap."""
+    """Finds the states (n_states, n_dofs) with a void beyond its barrier, or an overlap."""
     law = topology.contact
     if isinstance(law, VoidAngleContact):
         motion = states.reshape(len(states), -1, 3)

@@ -10,7 +10,7 @@ from sim.core import Floats
 
 
 class Splitting(NamedTuple):
-    """A symmetric composition that starts and ends with a drift.
+    """Holds a symmetric composition that starts and ends with a drift.
 
     Attributes:
         drifts: (n_kicks + 1,) coefficients.
@@ -53,7 +53,7 @@ BLANES_MOAN = blanes_moan()
 
 
 class Tableau(NamedTuple):
-    """A stiffly accurate method with an explicit first stage and one diagonal coefficient.
+    """Holds a stiffly accurate method with an explicit first stage and one diagonal coefficient.
 
     Attributes:
         stages: (n_stages, n_stages) coefficients; the last row gives the step's end.

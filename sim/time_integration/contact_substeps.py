@@ -1,4 +1,4 @@
-"""Compiled flight of the units between two kicks, with contact on void angles, and its reverse.
+"""Moves the units between two kicks, with contact on void angles, and back; compiled.
 
 Units fly straight on but where a void is closed to its cutoff: there the barrier turns them back,
 the faster the deeper they are. This part of the motion is local and needs no ligament's force, so
@@ -27,7 +27,7 @@ MOST = 4096
 
 
 class Pace(NamedTuple):
-    """The splitting of the finer steps.
+    """Holds the splitting of the finer steps.
 
     Attributes:
         drifts, kicks: its coefficients.
@@ -104,7 +104,7 @@ def _agility(unit: int, system: System) -> float:
 
 @inlined
 def _finer_steps(tau: float, pace: Pace, system: System, flight: Flight) -> int:
-    """How many finer steps follow the barrier where the energy of each void can carry it to."""
+    """Counts the finer steps that follow the barrier where the energy of each void can carry it."""
     net, fastest = system.net, 0.0
     for i in range(flight.found[0]):
         k = flight.near[i]

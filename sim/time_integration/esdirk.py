@@ -1,4 +1,4 @@
-"""Compiled integration of a network's motion by diagonally implicit Runge-Kutta steps."""
+"""Integrates a network's motion by diagonally implicit Runge-Kutta steps, compiled."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats,
         u[system.held[i]] = drive[i]
     a[:] = 0.0
     gradient(u, system, work.turn, work.force)
-    for d in system.dofs:
+    for d in system.dofs:  # M a = -dW/du - C v
         a[d] = -(work.force[d] + system.damping[d] * v[d]) / system.mass[d]
 
 

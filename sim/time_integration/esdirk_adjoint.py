@@ -1,4 +1,4 @@
-"""Compiled discrete adjoint of an implicit integration: the derivative of the steps taken.
+"""Sweeps back through an implicit integration: the derivative of the steps taken, compiled.
 
 It factors every stage's tangent anew, so that it does not depend on which factors were kept.
 """
@@ -109,6 +109,7 @@ def adjoint(
             k = h * stages[s, s]
             for i in range(len(system.dofs)):
                 d = system.dofs[i]
+                # (M / k^2 + C / k + K) lambda = du + dv / k + da / k^2
                 work.right[i] = u[s, d] + (v[s, d] + a[s, d] / k) / k
             if not factorise_stage(stage_u[n, s], system, work, k):
                 return False

@@ -1,4 +1,4 @@
-"""Compiled implicit stage of a network's motion, solved by Newton's method.
+"""Solves an implicit stage of a network's motion by Newton's method, compiled.
 
 Equation: M q'' = -dE/dq - C q' on the free dofs, the held ones prescribed. A stage solves
 
@@ -30,7 +30,7 @@ CONVERGED, STALLED, INDEFINITE = 0, 1, 2
 
 
 class Base(NamedTuple):
-    """What a stage starts from: u* and v* (n_dofs,), and k = gamma h."""
+    """Holds what a stage starts from: u* and v* (n_dofs,), and k = gamma h."""
 
     u: Floats
     v: Floats
@@ -70,6 +70,7 @@ def _newton_step(
             work.force[d] += work.product[d]
     for i in range(len(system.dofs)):
         d = system.dofs[i]
+        # residual M (v - v*) / k + C v + dW/du with v = (u - u*) / k
         velocity = (motion[d] - base.u[d]) / base.k
         inertia = system.mass[d] * (velocity - base.v[d]) / base.k
         work.right[i] = -(inertia + system.damping[d] * velocity + work.force[d])

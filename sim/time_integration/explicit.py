@@ -1,4 +1,4 @@
-"""Explicit integration of one case behind the common interface of the solvers."""
+"""Integrates one case explicitly behind the common interface of the solvers."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NONE = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class ExplicitRecord:
-    """What the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs.
 
     Attributes:
         steps: as taken.
@@ -106,13 +106,13 @@ class ExplicitSolver:
         )
 
     def adjoint_memory(self) -> int:
-        """Bytes that checkpoints and one segment's states take at the steps asked for."""
+        """Counts the bytes that checkpoints and one segment's states take."""
         n_dofs, segment = self.topology.n_dofs, _segment(self.n_steps)
         n_states = 2 * -(-self.n_steps // segment) + segment * (3 * len(self.splitting.kicks) + 2)
         return np.dtype(float).itemsize * n_dofs * n_states
 
     def _steps_for(self, frequency: float) -> int:
-        """Steps that are stable at an angular eigenfrequency (rad/s), on a ladder.
+        """Counts the steps that are stable at an angular eigenfrequency (rad/s), on a ladder.
 
         Rungs keep the grid from following every change of a design: the loss would jump.
         """
@@ -122,7 +122,7 @@ class ExplicitSolver:
         return int(np.ceil(self.n_steps * RUNG**rung))
 
     def _steps_in_motion(self, values: ConcreteParameters, states: Floats) -> int:
-        """Steps that are stable in the one of the states whose energy is greatest."""
+        """Counts the steps that are stable in the one of the states whose energy is greatest."""
         seen = observe(self.topology, values, states.reshape(len(states), -1, 3))
         fullest = states[(seen.strain_energy + seen.contact_energy).argmax()]
         return self._steps_for(highest_frequency(self.topology, values, fullest, NONE))

@@ -1,4 +1,4 @@
-"""Implicit integration of one case behind the common interface of the solvers."""
+"""Integrates one case implicitly behind the common interface of the solvers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PATIENCE = 20
 
 @dataclass(frozen=True)
 class ImplicitRecord:
-    """What the reverse sweep of one case needs.
+    """Holds what the reverse sweep of one case needs.
 
     Attributes:
         times: (n_steps + 1,) the grid used, with any step that had to be split.
@@ -75,7 +75,7 @@ class ImplicitSolver:
         return replace(self, times=time_grid.halved(record.times))
 
     def touching(self, values: ConcreteParameters) -> Ints:
-        """Ligaments in which contact is computed."""
+        """Finds the ligaments in which contact is computed."""
         law = self.topology.contact
         if not isinstance(law, VoidAngleContact):
             return np.zeros(0, dtype=np.int64)
@@ -109,7 +109,7 @@ class ImplicitSolver:
         )
 
     def _untouched_voids_close(self, values: ConcreteParameters, record: ImplicitRecord) -> bool:
-        """Whether a void whose contact was skipped came to the cutoff in any stage."""
+        """Tests if a void whose contact was skipped came to the cutoff in any stage."""
         law = self.topology.contact
         if not isinstance(law, VoidAngleContact):
             return False

@@ -1,4 +1,4 @@
-"""Step control for slow drives: finds a grid that meets a tolerance, to be frozen afterwards."""
+"""Controls steps for slow drives: finds a grid that meets a tolerance, to be frozen then."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def adapted(
     first: float = 1e-4,
     largest: float = np.inf,
 ) -> ImplicitSolver:
-    """The solver on a grid on which every step's error estimate stays below ``tolerance``.
+    """Adapts the grid until every step's error estimate stays below ``tolerance``.
 
     The estimate is the difference of the displacement to the embedded method of order 2, as the
     root mean square over the free dofs (rotations times the topology's rotation scale), mm.

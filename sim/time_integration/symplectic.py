@@ -1,4 +1,4 @@
-"""Compiled explicit integration of a network's motion and its exact discrete adjoint.
+"""Integrates a network's motion explicitly, with its exact discrete adjoint; compiled.
 
 A step alternates flights and kicks. A flight of length a h is free but for the barriers of closed
 voids (sim/time_integration/contact_substeps.py); a kick solves, for frozen u and the energy E of
@@ -110,7 +110,7 @@ def _step(
                 u[system.held[i]] = steps.drive[n, m, i]
             strain, contact = gradient(u, system, work.turn, work.force)
             total += strain + contact
-            for d in system.dofs:
+            for d in system.dofs:  # v+ = e v- - g dW/du: the exact flow of M v' + C v = -dW/du
                 v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
     return total
 

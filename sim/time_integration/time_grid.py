@@ -1,4 +1,4 @@
-"""Time grids and dense output."""
+"""Builds time grids and dense output."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def graded(duration: float, first: float, growth: float, largest: float) -> Floa
 
 
 def halved(times: Floats) -> Floats:
-    """The grid with every step cut in two."""
+    """Cuts every step of a grid in two."""
     middles = (times[1:] + times[:-1]) / 2
     return np.sort(np.concatenate([times, middles]))
 
 
 def split_steps(times: Floats, steps: Ints) -> Floats:
-    """The grid with some of its steps cut in two."""
+    """Cuts some of the steps of a grid in two."""
     return np.insert(times, steps + 1, (times[steps] + times[steps + 1]) / 2)
 
 
 def steps_of(times: Floats, output_times: Floats) -> Ints:
-    """The steps (n,) in which the output times lie, each once."""
+    """Finds the steps (n,) in which the output times lie, each once."""
     found = np.searchsorted(times, output_times, side="right") - 1
     return np.unique(np.clip(found, 0, len(times) - 2))
 
@@ -83,7 +83,7 @@ def hermite_stencils(times: Floats, output_times: Floats) -> tuple[np.ndarray, F
 
 
 def hermite_matrices(times: Floats, output_times: Floats) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The same as matrices (n_times, 2 n_times) that act on all values followed by all slopes."""
+    """Builds stencils as matrices (n_times, 2 n_times) that act on all values, then all slopes."""
     interval, value, slope = hermite_stencils(times, output_times)
     n = len(times)
     columns = interval[:, None] + np.array([0, 1, n, n + 1])

@@ -1,4 +1,4 @@
-"""Waves in the unit cell of a periodic lattice: its equilibrium under a strain, and its bands."""
+"""Computes waves in the unit cell of a lattice: its equilibrium under a strain, its bands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,12 @@ from sim.core import Floats, Ints, SimulationError
 from sim.energy import (
     ContactLaw,
     LigamentLaw,
-    Topology,
     contact_energy,
     contact_void_angles,
     ligament_energy,
     ligament_strain,
 )
-from sim.structure import ConcreteParameters, Lattice, VoidAngleContact
+from sim.structure import ConcreteParameters, ContactModel, Lattice, VoidAngleContact
 
 TOLERANCE = 1e-10
 """Of the residual of a strained cell, relative to the axial stiffness times a millimetre."""
@@ -33,7 +32,7 @@ CRUSHED = 0.5
 
 
 class UnitCell(NamedTuple):
-    """What repeats in a lattice. Contact acts on the void angles.
+    """Holds what repeats in a lattice. Contact acts on the void angles.
 
     Attributes:
         unit: (n_units,) ids of the cell's units in the lattice that it is from.
@@ -65,8 +64,8 @@ class UnitCell(NamedTuple):
         return len(self.unit)
 
 
-class Strained(NamedTuple):
-    """Equilibrium of a cell.
+class StrainedCell(NamedTuple):
+    """Holds an equilibrium of a cell.
 
     Attributes:
         motion: (n_units, 3) of the cell's units besides the strain.
@@ -79,15 +78,15 @@ class Strained(NamedTuple):
 
 def cell_of(
     lattice: Lattice,
-    topology: Topology,
+    contact: ContactModel,
     values: ConcreteParameters,
     period: tuple[int, int] = (2, 2),
 ) -> UnitCell:
-    """The cell in the middle of a uniform lattice.
+    """Cuts the cell in the middle out of a uniform lattice.
 
     Args:
         lattice: wider than one period each way.
-        topology: of the lattice.
+        contact: law by which its units touch, on void angles.
         values: its parameters.
         period: lattice steps after which everything repeats.
 
@@ -106,7 +105,6 @@ def cell_of(
     _check(lattice, of_home)
     begin, end = lattice.ligament_units.T
     mine = np.flatnonzero(number[begin] >= 0)
-    contact = topology.contact
     if not isinstance(contact, VoidAngleContact):
         raise ValueError("the unit cell of a lattice knows contact on void angles alone")
     limits = np.tile([contact.barrier, contact.cutoff], (len(mine), 1))
@@ -141,8 +139,8 @@ def _check(lattice: Lattice, of_home: Ints) -> None:
         raise ValueError("the lattice does not repeat: only a uniform one has a unit cell")
 
 
-def strained(cell: UnitCell, gradient: Floats, free: Floats) -> Strained:
-    """Equilibrium of a cell in a lattice that is strained as a whole, followed from rest.
+def strained(cell: UnitCell, gradient: Floats, free: Floats) -> StrainedCell:
+    """Follows the equilibrium of a cell from rest as the whole lattice is strained.
 
     Args:
         cell: the cell.
@@ -176,7 +174,7 @@ def strained(cell: UnitCell, gradient: Floats, free: Floats) -> Strained:
             )
     found = np.array(np.ravel(gradient), dtype=float)
     found[loose] = state[3 * cell.n_units :]
-    made = Strained(state[: 3 * cell.n_units].reshape(-1, 3), found.reshape(2, 2))
+    made = StrainedCell(state[: 3 * cell.n_units].reshape(-1, 3), found.reshape(2, 2))
     if (worst := _crushed(cell, made)) > CRUSHED:
         raise SimulationError(
             f"a ligament of the unit cell would change its length by {worst:.0%}; try a smaller"
@@ -185,7 +183,7 @@ def strained(cell: UnitCell, gradient: Floats, free: Floats) -> Strained:
     return made
 
 
-def _crushed(cell: UnitCell, at: Strained) -> float:
+def _crushed(cell: UnitCell, at: StrainedCell) -> float:
     """Largest change of length of a ligament, as a share of it."""
     ends = zip(_pairs(cell, at), cell.arm, cell.vector, strict=True)
     return max(
@@ -195,7 +193,7 @@ def _crushed(cell: UnitCell, at: Strained) -> float:
     )
 
 
-def _pairs(cell: UnitCell, at: Strained) -> Floats:
+def _pairs(cell: UnitCell, at: StrainedCell) -> Floats:
     """Motion (n_ligaments, 2, 3) of the units at both ends of every ligament."""
     shift = np.pad(cell.image @ at.gradient.T, ((0, 0), (0, 1)))
     first, second = cell.joined.T
@@ -204,7 +202,7 @@ def _pairs(cell: UnitCell, at: Strained) -> Floats:
 
 def _admissible(energy: Callable[[Floats, Array], Array], state: Floats, change: Floats,
                 asked: Array) -> Floats:  # fmt: skip
-    """The state after as much of a change as leaves every void open."""
+    """Takes as much of a change as leaves every void open."""
     for halving in range(30):
         moved = state + change / 2**halving
         if np.isfinite(energy(moved, asked)):
@@ -238,15 +236,15 @@ def _pair_energy(
 _pair_hessians = jax.jit(jax.vmap(jax.hessian(_pair_energy)))
 
 
-def bands(cell: UnitCell, wave_vectors: Floats, at: Strained | None = None) -> Floats:
-    """Squared angular frequencies (n_waves, 3 n_units) of waves in the lattice, ascending.
+def bands(cell: UnitCell, wave_vectors: Floats, at: StrainedCell | None = None) -> Floats:
+    """Computes squared angular frequencies (n_waves, 3 n_units) of waves in the lattice, ascending.
 
     Args:
         cell: the unit cell.
         wave_vectors: (n_waves, 2) in terms of the lattice at rest, rad/mm.
         at: the equilibrium that the waves are about; by default rest.
     """
-    state = Strained(np.zeros((cell.n_units, 3)), np.zeros((2, 2))) if at is None else at
+    state = StrainedCell(np.zeros((cell.n_units, 3)), np.zeros((2, 2))) if at is None else at
     pairs = _pairs(cell, state)
     blocks = _pair_hessians(pairs, cell.arm, cell.vector, cell.void, cell.law, cell.contact)
     return np.array([_squares(cell, np.asarray(blocks), wave) for wave in wave_vectors])
@@ -266,7 +264,7 @@ def _squares(cell: UnitCell, blocks: Floats, wave: Floats) -> Floats:
 
 
 def brillouin_path(cell: UnitCell, points: int) -> tuple[Floats, Ints]:
-    """Wave vectors (n, 2) from the zone's centre to a side, a corner, and back.
+    """Spaces wave vectors (n, 2) from the zone's centre to a side, a corner, and back.
 
     Args:
         cell: the unit cell.

@@ -1,4 +1,4 @@
-"""Highest and lowest eigenfrequency of a structure about a state."""
+"""Computes the highest and lowest eigenfrequency of a structure about a state."""
 
 from __future__ import annotations
 

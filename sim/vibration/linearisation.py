@@ -1,4 +1,4 @@
-"""A structure linearised about a state: small vibrations, resonances, transmission."""
+"""Linearises a structure about a state: small vibrations, resonances, transmission."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Linear(NamedTuple):
 
 
 class Modes(NamedTuple):
-    """Undamped vibrations in ascending order.
+    """Holds undamped vibrations in ascending order.
 
     Attributes:
         square: (count,) squared angular frequency, rad^2/s^2; negative where the state is unstable.
@@ -64,7 +64,7 @@ class Modes(NamedTuple):
 def linearised(
     topology: Topology, values: ConcreteParameters, motion: Floats | None = None
 ) -> Linear:
-    """The structure about a state ``motion`` (n_units, 3); by default about rest."""
+    """Linearises a structure about a state ``motion`` (n_units, 3); by default about rest."""
     whole = replace(topology, held=np.zeros(0, dtype=np.int64))
     place, pattern = number_free_dofs(
         topology.site, topology.coupled_units, whole.held, by_fronts=False
@@ -91,7 +91,7 @@ def linearised(
 
 
 def modes(of: Linear, count: int, near: float = 0.0) -> Modes:
-    """The ``count`` modes whose frequency is nearest to one (rad/s), by shift-invert Lanczos.
+    """Computes the ``count`` modes nearest to a frequency (rad/s), by shift-invert Lanczos.
 
     Raises:
         ValueError: the structure has not so many modes.

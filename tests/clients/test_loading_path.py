@@ -9,7 +9,8 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select
 
-from reports.figures.study_report import publish
+from reports.figures.study_report import study_report
+from reports.page import publish
 from tests.clients.conftest import Open
 from tests.reports import compressed_study
 
@@ -17,9 +18,8 @@ from tests.reports import compressed_study
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    publish(
-        compressed_study.written(tmp_path_factory.mktemp("data"), compressed_study.SMILE), folder
-    )
+    smile = compressed_study.written(tmp_path_factory.mktemp("data"), compressed_study.SMILE)
+    publish(study_report(smile), folder)
     return folder / "index.html"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,8 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from reports.figures import kinds
-from reports.figures.shielding import facts
-from reports.page.report_page import render
+from reports.figures.study_report import study_report
+from reports.page import rendered
 from reports.panels import Animation, AnimationAxis, AnimationClip, ColourField, payload
 from reports.study import from_dataset
 from tests.clients.conftest import Open
@@ -37,9 +37,11 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         [AnimationClip("Cloaked", "#6f3fa0", structure, motion)],
         [ColourField("ux", "u_x", "mm", 1.0, "signed", (-2.0, 2.0))],
     )
-    whole = kinds.kind_of(study.problem).page(study, facts.shielding_facts(study), [], "<svg/>", [])
+    made = study_report(study)
+    player = json.dumps(payload(reel), ensure_ascii=False)
+    values = {**made.values, "player": player}
     path = folder / "index.html"
-    path.write_text(render(dataclasses.replace(whole, player=payload(reel))), encoding="utf-8")
+    path.write_text(rendered(dataclasses.replace(made, values=values), {}), encoding="utf-8")
     return path
 
 

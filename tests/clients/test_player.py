@@ -13,7 +13,8 @@ from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from reports.base.style import MAGNITUDE
-from reports.figures.study_report import publish
+from reports.figures.study_report import study_report
+from reports.page import publish
 from tests.clients.conftest import Open
 from tests.reports import shaken_study
 
@@ -23,7 +24,7 @@ PICTURE = "return document.querySelectorAll('#player .stage canvas')[arguments[0
 @pytest.fixture(scope="session")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    publish(shaken_study.written(tmp_path_factory.mktemp("data")), folder)
+    publish(study_report(shaken_study.written(tmp_path_factory.mktemp("data"))), folder)
     return folder / "index.html"
 
 

@@ -10,8 +10,9 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import Select
 
-from reports.figures.study_report import publish
-from reports.products.index import build
+from reports.__main__ import main
+from reports.figures.study_report import study_report
+from reports.page import publish
 from tests.clients.conftest import Open
 from tests.clients.test_player import choose, complaints, picture, scrub
 from tests.reports import recorded_study, shaken_study
@@ -23,8 +24,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "data").mkdir()
     study = shaken_study.written(folder / "data")
     filmed = recorded_study.with_recordings(study, folder / "fig2/recordings", ("altered", 1))
-    publish(filmed, folder / "fig2/report")
-    assert build.main(["--results", str(folder), "--quiet"]) == 0
+    publish(study_report(filmed), folder / "fig2/report")
+    assert main(["index", "--results", str(folder), "--quiet"]) == 0
     return folder
 
 

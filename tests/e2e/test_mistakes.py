@@ -66,15 +66,11 @@ def test_a_truncated_or_foreign_design(undisturbed: Checkout, tmp_path: Path) ->
         out = tmp_path / "response.nc"
         for module, more in (
             ("pipeline simulate", ("--out", str(out))),
-            ("reports.figures.study_report", ("--out-dir", str(tmp_path / "report"))),
+            ("reports study", ("--out-dir", str(tmp_path / "report"))),
         ):
             results = undisturbed.results
             others = ("--response", str(results / "response.nc"), "--sweep")
-            given = (
-                (*others, str(results / "sweep.nc"))
-                if module == "reports.figures.study_report"
-                else ()
-            )
+            given = (*others, str(results / "sweep.nc")) if module == "reports study" else ()
             ended = undisturbed.stage(module, "--design", str(path), *given, *more)
             assert_one_message(ended, f"file:   {path}")
         assert not out.exists()

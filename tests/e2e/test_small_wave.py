@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from pipeline.runtime import ROOT
-from reports.figures import study_report as report
+from reports.__main__ import main
 from tests.e2e.stages import Built, build, build_verification
 
 PROBLEM = ROOT / "experiments/fig7/problem.yaml"
@@ -36,7 +36,7 @@ def wave(tmp_path_factory: pytest.TempPathFactory) -> Wave:
     files = {name: folder / f"{name}.nc" for name in ("design", "response", "verification")}
     found = build_verification(PROBLEM, "quick", folder)
     given = [word for name, file in files.items() for word in (f"--{name}", str(file))]
-    assert report.main([*study, *given, "--out-dir", str(folder / "report")]) == 0
+    assert main(["study", *study, *given, "--out-dir", str(folder / "report")]) == 0
     return Wave(built, found, folder / "report")
 
 

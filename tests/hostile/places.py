@@ -66,7 +66,7 @@ def stages(out: Path) -> dict[str, list[str]]:
 
 def _run(checkout: Checkout, name: str, words: list[str], first: str = "") -> str:
     """The fault of a stage that must fail in words, or an empty text."""
-    module = "reports.figures.study_report" if name == "report" else f"pipeline {name}"
+    module = "reports study" if name == "report" else f"pipeline {name}"
     ended = checkout.module(module, *words, first=first)
     told = ended.stdout + ended.stderr
     if ended.returncode == 0:
@@ -185,7 +185,8 @@ def no_fonts(checkout: Checkout) -> Iterator[Tried]:
         command = [
             ".venv/bin/python",
             "-m",
-            "reports.figures.study_report",
+            "reports",
+            "study",
             *stages(Path(folder))["report"],
         ]
         environment = {**os.environ, **nowhere}

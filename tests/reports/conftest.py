@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from reports.figures.study_report import publish
+from reports.figures.study_report import study_report
+from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import compressed_study, shaken_study
 
@@ -22,14 +23,14 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
 @pytest.fixture(scope="session")
 def quick_report(quick: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("quick_report")
-    publish(quick, folder)
+    publish(study_report(quick), folder)
     return folder
 
 
 @pytest.fixture(scope="session")
 def report(study: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
-    publish(study, folder)
+    publish(study_report(study), folder)
     return folder
 
 

@@ -138,12 +138,16 @@ def test_the_gradient_of_ones_own_loss_is_that_of_its_differences() -> None:
     step = 1e-3
     ahead, behind = (float(energy(sign * step * direction)) for sign in (1, -1))
     assert slope == pytest.approx((ahead - behind) / (2 * step), rel=1e-5)
-    rows = jax.jacrev(lambda x: sim.simulate(scene(), x, plan=plan).losses)(jnp.asarray(start))
-    np.testing.assert_allclose(rows[0], sim.evaluate(scene(), start)[1], rtol=1e-9, atol=1e-12)
+    by_jax = jax.grad(lambda x: sim.simulate(scene(), x, plan=plan).loss)(jnp.asarray(start))
+    np.testing.assert_allclose(by_jax, sim.evaluate(scene(), start)[1], rtol=1e-9, atol=1e-12)
 
 
 def _loss(x: Any) -> Any:  # noqa: ANN401
     return sim.simulate(scene(), x, plan=sim.make_plan(scene())).losses[0]
+
+
+def _motion(x: Any) -> Any:  # noqa: ANN401
+    return sim.simulate(scene(), x, plan=sim.make_plan(scene())).displacement[0, -1, 12]
 
 
 @pytest.mark.parametrize(
@@ -153,10 +157,11 @@ def _loss(x: Any) -> Any:  # noqa: ANN401
         (lambda x: jax.vmap(_loss)(jnp.stack([x, x])), "cannot be traced"),
         (lambda x: jax.jvp(_loss, (x,), (x,)), "no forward derivative"),
         (jax.jacfwd(_loss), "forward derivative|cannot be traced"),
+        (jax.jacrev(_motion), "cannot be traced"),
         (jax.hessian(_loss), "forward derivative|cannot be traced"),
         (jax.grad(jax.jit(_loss)), "cannot be traced"),
     ],
-    ids=["jit", "vmap", "jvp", "jacfwd", "hessian", "grad of jit"],
+    ids=["jit", "vmap", "jvp", "jacfwd", "jacrev", "hessian", "grad of jit"],
 )
 def test_other_transforms_say_that_they_are_not_supported(
     transformed: Callable[[Any], Any], message: str

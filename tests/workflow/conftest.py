@@ -26,8 +26,7 @@ STAGES = (
     "pipeline/stages/film",
     "pipeline/stages/track",
     "pipeline/stages/compare",
-    "reports/figures/study_report",
-    "reports/figures/several_studies/build",
+    "reports/__main__",
 )
 
 

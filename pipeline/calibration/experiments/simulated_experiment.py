@@ -1,4 +1,4 @@
-"""Measurements that the simulator predicts, with the adjoint's derivatives of them."""
+"""Predicts measurements by the simulator, with the adjoint's derivatives of them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Seen = Callable[[Numbers, Parameters], Array]
 
 
 class KnownDrive(PrescribedMotion):
-    """A drive whose values are computed once: a fit asks for the same ones again and again."""
+    """Drives units by values that are computed once: a fit asks for the same ones often."""
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """See ``sim.solvers.base.PrescribedMotion``."""
@@ -72,7 +72,7 @@ def _followed(
 
 @dataclass(frozen=True)
 class SpecimenSimulation:
-    """A specimen on its measured drive.
+    """Simulates a specimen on its measured drive.
 
     Attributes:
         lattice: its network.
@@ -163,7 +163,7 @@ class SpecimenSimulation:
         return jax.vjp(seen, known.motion)[1](jnp.asarray(bar))[0]
 
     def finer(self) -> SpecimenSimulation:
-        """The same with half the steps in time; of equilibria there are none."""
+        """Halves the steps in time; of equilibria there are none."""
         solver = self.solver
         if isinstance(solver, StaticSolver):
             return self

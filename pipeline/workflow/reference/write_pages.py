@@ -7,9 +7,9 @@ import argparse
 
 def pages() -> dict[str, str]:
     """Makes the pages, by the names of their files."""
-    from pipeline.workflow.reference import dataset_pages, key_pages
+    from pipeline.workflow.reference import api_page, dataset_pages, key_pages
 
-    return {**key_pages.pages(), "datasets.md": dataset_pages.page()}
+    return {**key_pages.pages(), "datasets.md": dataset_pages.page(), "api.md": api_page.page()}
 
 
 def work(args: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""Pictures of the framework: domains with their regions, what is cut, what a camera sees."""
+"""Draws pictures of the framework: domains with their regions, what is cut, what a camera sees."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ INTEREST_TINT, CLOAK_TINT, CLAMP_TINT = "#b9d3ea", "#c9b3e0", "#4a4d52"
 
 
 def domain(axes: Axes, structure: RigidUnits, spacing: float, *, cloaked: bool) -> None:
-    """A lattice with its region of interest, and the region of the cloak if there is one."""
+    """Draws a lattice with its region of interest, and the region of the cloak if there is one."""
     draw_clamps(axes, structure, spacing)
     draw(axes, structure, colours=list(_tints(structure, cloaked=cloaked)))
 
@@ -36,7 +36,7 @@ def _tints(structure: RigidUnits, *, cloaked: bool) -> Iterator[str]:
 
 
 def excitation(axes: Axes, structure: RigidUnits, spacing: float, radius: float) -> None:
-    """A driven unit within the cloak."""
+    """Draws a driven unit within the cloak."""
     domain(axes, structure, spacing, cloaked=True)
     middle = structure.site.mean(axis=0)
     drive_arrows(axes, middle, 45.0, (0.75 * spacing, 2.6 * spacing), style.ALTERED)
@@ -44,7 +44,7 @@ def excitation(axes: Axes, structure: RigidUnits, spacing: float, radius: float)
 
 
 def inclusion(axes: Axes, structure: RigidUnits, spacing: float, radius: float) -> None:
-    """A void within the cloak, and the load on two sides."""
+    """Draws a void within the cloak, and the load on two sides."""
     middle = structure.site.mean(axis=0)
     away = np.linalg.norm(structure.site - middle, axis=1)
     tints = np.where(
@@ -85,7 +85,7 @@ def inclusion(axes: Axes, structure: RigidUnits, spacing: float, radius: float) 
 
 
 def cut(axes: Axes, structure: RigidUnits, window: tuple[Floats, float]) -> None:
-    """Outlines of units and the strips of foil that join them, as they are cut."""
+    """Draws outlines of units and the strips of foil that join them, as they are cut."""
     shapes = [shape[~np.isnan(shape[:, 0])] for shape in structure.vertices[structure.present]]
     axes.add_collection(PolyCollection(shapes, facecolors="#f4ede1", edgecolors="#1a1a1a", lw=0.6))
     units, corners = structure.ligament_unit, structure.ligament_vertex
@@ -102,7 +102,7 @@ def cut(axes: Axes, structure: RigidUnits, window: tuple[Floats, float]) -> None
 def filmed(
     axes: Axes, structure: RigidUnits, displacement: Floats, window: tuple[Floats, float]
 ) -> None:
-    """Dark units on a bright board, the outlines that are found, and how far they moved."""
+    """Draws dark units on a bright board, the outlines that are found, and how far they moved."""
     corners = deformed(structure, displacement)[structure.present]
     shapes = [shape[~np.isnan(shape[:, 0])] for shape in corners]
     axes.add_collection(PolyCollection(shapes, facecolors="#2b2b2b", edgecolors="#35b8c9", lw=0.9))

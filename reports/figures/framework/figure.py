@@ -1,4 +1,4 @@
-"""Figure 1 at a journal's two-column width: problem, model, optimisation, making, comparing."""
+"""Composes Figure 1 at two-column width: problem, model, optimisation, making, comparing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from reports.base import style
 from reports.facts import measures
 from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
-from reports.panels import measured_overlay
+from reports.panels import Panel, PanelFigure, measured_overlay
 from reports.study import CLOAK, RigidUnits, StudyResults, from_dataset, middle_of_top_edge
 
 HEIGHT = 158.0
@@ -20,27 +20,55 @@ SIDE = 43.0
 """Side of a domain in row a, mm."""
 SECOND, THIRD = 61.0, 109.0
 """Tops of rows b and c, mm."""
-SMALL = 34.0
-"""Side of a picture in rows b and c, mm."""
+SMALL, LOOP = 34.0, 112.0
+"""Side of a picture in rows b and c, and where the loop of row a begins, mm."""
 
 
-def draw_framework(study: StudyResults) -> Figure:
-    """The whole figure."""
-    figure = style.page(HEIGHT)
+def framework_figure(study: StudyResults) -> PanelFigure:
+    """Returns the whole figure."""
     scene, design = study.scene, study.design
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     cloaked = from_dataset(design, scene.spacing)
-    _problem(figure, study, initial)
-    _loop(figure, design)
-    _model(figure, cloaked)
-    _kinds(figure, study, initial)
-    _making(figure, study, cloaked)
-    return figure
+    panels = [
+        Panel(
+            ("a", "Mimicking problem", 0.0, 0.8),
+            lambda figure: _problem(figure, study, initial),
+            "A reference lattice and an altered one, in which a cloak (purple) is to undo the "
+            "alteration in the region of interest (blue): a loss measures how far the two "
+            "responses are apart there, and falls as the cloak’s geometry follows the gradient "
+            "that a differentiable simulation of the full nonlinear dynamics gives. The curves "
+            "are those of the study itself.",
+        ),
+        Panel(
+            ("", "Gradient-based optimisation", LOOP - 4.2, 0.8),
+            lambda figure: _loop(figure, design),
+        ),
+        Panel(
+            ("b", "Rigid units, elastic ligaments, contact", 0.0, SECOND),
+            lambda figure: model_panel.ligament_panel(
+                style.place(figure, 0.0, SECOND + 6.0, 58.0, SMALL + 2.0), cloaked, _lying(cloaked)
+            ),
+            "Two units of its lattice: three degrees of freedom each, a ligament that stretches, "
+            "shears and bends, and contact as a void closes.",
+        ),
+        Panel(
+            ("c", "Shield excitations, conceal inclusions", 64.0, SECOND),
+            lambda figure: _kinds(figure, study, initial),
+            "Cloaks shield their surroundings from an excitation, or conceal what was cut out.",
+        ),
+        Panel(
+            ("d", "From the design to the experiment", 0.0, THIRD),
+            lambda figure: _making(figure, study, cloaked),
+            "The optimised cloak, what is cut of it, its units as a camera finds them (cyan "
+            "outlines; orange: how far they moved), and the motion of the middle unit of the top "
+            "edge, without the cloak (orange) and with it (purple).",
+        ),
+    ]
+    return PanelFigure(HEIGHT, panels, remark=measured_overlay.caption(study.recordings))
 
 
 def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
-    """Row a, left: reference and altered domain, and what is compared of them."""
-    style.letter(figure, 0.0, 0.8, "a", "Mimicking problem")
+    """Draws row a, left: reference and altered domain, and what is compared of them."""
     spacing = study.scene.spacing
     top = 11.0
     reference = style.place(figure, 0.0, top, SIDE, SIDE)
@@ -66,9 +94,8 @@ def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
 
 
 def _loop(figure: Figure, design: xr.Dataset) -> None:
-    """Row a, right: the loss falls, its gradient by a differentiable simulation."""
-    left, wide = 112.0, 65.0
-    style.letter(figure, left - 4.2, 0.8, "", "Gradient-based optimisation")
+    """Draws row a, right: the loss falls, its gradient by a differentiable simulation."""
+    left, wide = LOOP, 65.0
     _box(figure, (left, 9.0, wide, 47.0), "#f6f4f9")
     formula = (
         r"$\min_{\xi\in D}\ J(\xi)=\int_t\int_{\Omega_\mathrm{ROI}}"
@@ -98,15 +125,8 @@ def _loop(figure: Figure, design: xr.Dataset) -> None:
     axes.set_xlabel("Evaluation", labelpad=1.0)
 
 
-def _model(figure: Figure, cloaked: RigidUnits) -> None:
-    """Row b, left: one ligament."""
-    style.letter(figure, 0.0, SECOND, "b", "Rigid units, elastic ligaments, contact")
-    axes = style.place(figure, 0.0, SECOND + 6.0, 58.0, SMALL + 2.0)
-    model_panel.ligament_panel(axes, cloaked, _lying(cloaked))
-
-
 def _lying(structure: RigidUnits) -> int:
-    """A ligament along x between two units of the surroundings, near the middle of the bottom."""
+    """Finds a ligament along x in the surroundings, near the middle of the bottom."""
     ends = structure.vertices[structure.ligament_unit, structure.ligament_vertex]
     along = np.abs(ends[:, 1] - ends[:, 0])
     outside = (structure.region[structure.ligament_unit] != CLOAK).all(axis=1)
@@ -117,8 +137,7 @@ def _lying(structure: RigidUnits) -> int:
 
 
 def _kinds(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
-    """Row b, right: what cloaks can do."""
-    style.letter(figure, 64.0, SECOND, "c", "Shield excitations, conceal inclusions")
+    """Draws row b, right: what cloaks can do."""
     spacing, radius = study.scene.spacing, study.scene.radii[-1]
     first = style.place(figure, 70.0, SECOND + 7.0, SMALL, SMALL)
     domain_panels.excitation(first, initial, spacing, radius)
@@ -129,8 +148,7 @@ def _kinds(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
 
 
 def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
-    """Row c: the optimised cloak is made, filmed, tracked and compared."""
-    style.letter(figure, 0.0, THIRD, "d", "From the design to the experiment")
+    """Draws row c: the optimised cloak is made, filmed, tracked and compared."""
     response, spacing = study.response, study.scene.spacing
     case = measures.nearest_case(response, MONITORED)
     motion = response["displacement"].sel(structure="cloaked").isel(case=case)
@@ -153,7 +171,7 @@ def _making(figure: Figure, study: StudyResults, cloaked: RigidUnits) -> None:
 
 
 def _compared(figure: Figure, study: StudyResults, at: tuple[float, float]) -> None:
-    """Motion of one unit as simulated, and as measured where there is a recording."""
+    """Draws motion of one unit as simulated, and as measured where there is a recording."""
     axes = style.place(figure, *at, SMALL + 2.0, SMALL - 9.0)
     series = monitored(study.scene, study.response)
     for name in ("altered", "cloaked"):
@@ -177,7 +195,7 @@ def _say(figure: Figure, x: float, y: float, text: str, **told: str | float) -> 
 def _box(
     figure: Figure, place: tuple[float, float, float, float], colour: str, edge: str = "none"
 ) -> None:
-    """A rounded box: left, top, width and height in mm."""
+    """Draws a rounded box: left, top, width and height in mm."""
     left, top, wide, high = place
     figure.add_artist(
         FancyBboxPatch(
@@ -201,7 +219,7 @@ def _arrow(
     bend: float = 0.0,
     kind: str = "-|>",
 ) -> None:
-    """An arrow between two points in mm from the page's top-left corner."""
+    """Draws an arrow between two points in mm from the page's top-left corner."""
     tail, tip = ((x / style.TWO_COLUMNS, 1 - y / HEIGHT) for x, y in (start, end))
     figure.add_artist(
         FancyArrowPatch(

@@ -1,4 +1,4 @@
-"""The model of one ligament between two rigid units, from the geometry of a design."""
+"""Describes the model of one ligament between two rigid units, from the geometry of a design."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _HALO: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.2, for
 
 
 def ligament_panel(axes: Axes, structure: RigidUnits, ligament: int) -> None:
-    """Two units, the springs between them, their degrees of freedom and the angle of contact."""
+    """Draws two units, the springs between them, their freedoms and the angle of contact."""
     units, corners = structure.ligament_unit[ligament], structure.ligament_vertex[ligament]
     shapes = [structure.vertices[unit] for unit in units]
     ends = np.array([shape[corner] for shape, corner in zip(shapes, corners, strict=True)])
@@ -33,7 +33,7 @@ def ligament_panel(axes: Axes, structure: RigidUnits, ligament: int) -> None:
 
 
 def _freedoms(axes: Axes, centre: Floats) -> None:
-    """Arrows of u_x, u_y and theta at a unit's centroid."""
+    """Draws arrows of u_x, u_y and theta at a unit's centroid."""
     for way, name in (((2.3, 0.0), "$u_x$"), ((0.0, 2.3), "$u_y$")):
         _arrow(axes, centre, centre + np.array(way))
         x, y = centre + 1.28 * np.array(way)
@@ -50,7 +50,7 @@ def _freedoms(axes: Axes, centre: Floats) -> None:
 
 
 def _springs(axes: Axes, ends: Floats) -> None:
-    """The ligament as a spring, and its three stiffnesses."""
+    """Draws the ligament as a spring, and its three stiffnesses."""
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
     across = np.array([-along[1], along[0]]) / length
@@ -70,7 +70,7 @@ def _springs(axes: Axes, ends: Floats) -> None:
 
 
 def _contact(axes: Axes, shapes: list[Floats], corners: Floats, ends: Floats) -> None:
-    """The angle of the void above the ligament, at which units come to touch."""
+    """Draws the angle of the void above the ligament, at which units come to touch."""
     sides = []
     for shape, corner, end in zip(shapes, corners, ends, strict=True):
         known = shape[~np.isnan(shape[:, 0])]

@@ -1,4 +1,4 @@
-"""The path along which a report shows its structures, and what it shows of them."""
+"""Describes the path along which a report shows its structures, and what it shows of them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SECOND = "Cloaked, no overlap"
 
 @dataclass(frozen=True)
 class Abscissa:
-    """Where along the path every sample of a response lies.
+    """Tells where along the path every sample of a response lies.
 
     `values` (n_times,) is the displacement of the driven units along the drive in mm, or the time
     in s; `strain` is a paper's label of the last value (a fraction of one), `shown` are the samples
@@ -35,11 +35,11 @@ class Abscissa:
 
     @property
     def label(self) -> str:
-        """Of an axis."""
+        """Labels an axis."""
         return f"{self.name} {self.symbol} ({self.unit})"
 
     def at(self, sample: int) -> str:
-        """The value at a sample in words, with the paper's label of it."""
+        """Returns the value at a sample in words, with the paper's label of it."""
         words = f"{self.values[sample]:.3g} {self.unit}"
         if self.strain is None:
             return words
@@ -47,8 +47,8 @@ class Abscissa:
         return f"{words} ({share:.2g} %)"
 
 
-def course(problem: Problem, response: xr.Dataset) -> Abscissa:
-    """The path of a response."""
+def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
+    """Returns the path of a response."""
     static = problem.static
     values = driven_displacement(response) if static else response["time"].values
     paper = problem.report.paper
@@ -64,7 +64,7 @@ def course(problem: Problem, response: xr.Dataset) -> Abscissa:
 
 
 def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
-    """Displacement (n_times,) of the driven units along the drive's direction, mm."""
+    """Returns displacement (n_times,) of the driven units along the drive's direction, mm."""
     motion = response["displacement"].isel(structure=0, case=case)
     driven = response["support"].values == 2
     angle = np.radians(float(response["direction"][case]))
@@ -74,20 +74,20 @@ def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
 
 
 def _samples(values: Floats, wanted: tuple[float, ...]) -> tuple[int, ...]:
-    """Samples nearest to the wanted values; at thirds of the way where none are."""
+    """Returns samples nearest to the wanted values; at thirds of the way where none are."""
     targets = wanted or tuple(np.linspace(values[0], values[-1], 4))
     found = (int(np.argmin(np.abs(values - target))) for target in targets)
     return tuple(dict.fromkeys(found))
 
 
 def structures(response: xr.Dataset) -> tuple[str, ...]:
-    """Names of the structures of a response, in the order in which they are shown."""
+    """Returns names of the structures of a response, in the order in which they are shown."""
     held = {str(name) for name in response["structure"].values}
     return tuple(name for name in ORDER if name in held)
 
 
 def display_name(problem: Problem, structure: str) -> str:
-    """What a figure calls a structure."""
+    """Tells what a figure calls a structure."""
     if structure != "altered":
         return structure.capitalize()
     if getattr(problem, "void", None) is not None:
@@ -98,7 +98,7 @@ def display_name(problem: Problem, structure: str) -> str:
 
 
 def lattice_size(lattice: Lattice) -> str:
-    """How many units a lattice has, in words."""
+    """Tells how many units a lattice has, in words."""
     if isinstance(lattice, Quads):
         return f"{lattice.columns} × {lattice.rows}"
     if isinstance(lattice, Kagome):

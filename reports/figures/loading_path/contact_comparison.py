@@ -1,4 +1,4 @@
-"""Both laws of contact: every structure under either, and the design for contact on distance."""
+"""Compares both laws of contact: every structure under either, and the second design."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def contact_facts(study: StudyResults) -> Iterator[Fact]:
         return
     names = [name for name in structures(study.response) if name != "intact"]
     yield from _by_law(study.response, names)
-    if study.again is not None:
-        yield from _again(study, study.again)
+    if study.redesign is not None:
+        yield from _again(study, study.redesign)
 
 
 def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iterator[Fact]:
@@ -49,14 +49,14 @@ def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iter
 
 
 def overlapping(count: int) -> str:
-    """Number of pairs of units that overlap, in words."""
+    """Returns number of pairs of units that overlap, in words."""
     if count == 0:
         return "none overlap"
     return "1 pair of units overlaps" if count == 1 else f"{count} pairs of units overlap"
 
 
 def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
-    """The design for contact on distance, in a lattice that obeys it too."""
+    """Yields the design for contact on distance, in a lattice that obeys it too."""
     note = "for contact on distance, so that no units overlap"
     words = "the same: its losses by both laws are alike"
     if again.changed:

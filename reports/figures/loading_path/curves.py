@@ -1,4 +1,4 @@
-"""Panels of curves along the path: the measure, contraction, reaction, and imperfect copies."""
+"""Draws curves along the path: the measure, contraction, reaction, imperfect copies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from pipeline.problem import Problem
 from reports.base import style
 from reports.facts import JUMPED
 from reports.figures.loading_path import measured, measures, monte_carlo
-from reports.figures.loading_path.abscissa import SECOND, Abscissa, course, display_name, structures
+from reports.figures.loading_path.abscissa import (
+    SECOND,
+    Abscissa,
+    abscissa_of,
+    display_name,
+    structures,
+)
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
 from reports.study import RedesignResults, StudyResults
@@ -22,31 +28,30 @@ BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""
 
 
-def path_axes(axes: Axes, course: Abscissa, label: str) -> None:
-    """An x axis along the path, with a paper's label of the load above it if there is one."""
-    axes.set(xlabel=course.label, ylabel=label, xlim=(course.values[0], course.values[-1]))
+def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
+    """Draws an x axis along the path, with a paper's label of the load above it if there is one."""
+    axes.set(xlabel=path.label, ylabel=label, xlim=(path.values[0], path.values[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 3, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(5))
-    if course.strain is None:
+    if path.strain is None:
         return
-    ratio = 100.0 * course.strain / float(course.values[-1])
+    ratio = 100.0 * path.strain / float(path.values[-1])
     above = axes.secondary_xaxis(
-        "top",
-        functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio)),
+        "top", functions=(lambda x: np.multiply(x, ratio), lambda x: np.divide(x, ratio))
     )
     above.set_xlabel("paper’s label ε (%)", labelpad=2.5, fontsize=style.SMALL)
-    above.xaxis.set_major_locator(FixedLocator(list(ratio * course.values[list(course.shown)])))
+    above.xaxis.set_major_locator(FixedLocator(list(ratio * path.values[list(path.shown)])))
     above.xaxis.set_major_formatter(lambda value, _: f"{value:.2g}")
 
 
 def structure_curves(
-    axes: Axes, problem: Problem, course: Abscissa, values: xr.DataArray, names: Iterable[str]
+    axes: Axes, problem: Problem, path: Abscissa, values: xr.DataArray, names: Iterable[str]
 ) -> None:
-    """Values (structure, case, time) of some structures, the mean of their load cases."""
+    """Draws values (structure, case, time) of some structures, the mean of their load cases."""
     mean = over_cases(problem, values)
     for name in names:
         axes.plot(
-            course.values,
+            path.values,
             mean.sel(structure=name),
             color=style.STRUCTURE_COLOURS[name],
             lw=1.8 if name == "intact" else 1.2,
@@ -56,54 +61,54 @@ def structure_curves(
 
 
 def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
-    """Weighted mean over the load cases."""
+    """Returns weighted mean over the load cases."""
     weights = xr.DataArray(np.array(problem.drive.case_weights), dims="case")
     mean: xr.DataArray = (values * weights).sum("case", skipna=False) / float(weights.sum())
     return mean
 
 
-def measure_panel(axes: Axes, study: StudyResults, course: Abscissa, measure: Measure) -> None:
-    """What the cloak should keep small, with the bands of the cloak's imperfect copies."""
+def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Measure) -> None:
+    """Tells what the cloak should keep small, with the bands of the cloak's imperfect copies."""
     problem, response = study.problem, study.response
-    path_axes(axes, course, measure.symbol)
+    path_axes(axes, path, measure.symbol)
     names = [name for name in structures(response) if name != "intact"]
     values = measure.of(response)
-    structure_curves(axes, problem, course, values, names)
-    _jumps(axes, course, over_cases(problem, values), response)
-    if study.again is not None and study.again.changed:
-        _second(axes, study, measure, study.again)
+    structure_curves(axes, problem, path, values, names)
+    _jumps(axes, path, over_cases(problem, values), response)
+    if study.redesign is not None and study.redesign.changed:
+        _second(axes, study, measure, study.redesign)
     if problem.objective.target == "rest":
-        axes.plot(course.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
+        axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
     if study.scatter is not None:
-        _bands(axes, study, course, measure, study.scatter)
+        _bands(axes, study, path, measure, study.scatter)
     measured.bands(axes, study, measure.key)
-    measured.measured_curves(axes, study, course, measure.of, names)
+    measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
     axes.set_ylim(0, (1.1 + 0.1 * len(legend.get_texts())) * axes.get_ylim()[1])
 
 
 def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignResults) -> None:
-    """The design for contact on distance."""
-    way = course(study.problem, again.response)
+    """Draws the design for contact on distance."""
+    way = abscissa_of(study.problem, again.response)
     values = over_cases(study.problem, measure.of(again.response)).sel(structure="cloaked")
     dashes = (0, (3.0, 1.5))
     axes.plot(way.values, values, color=style.CLOAKED, lw=1.0, ls=dashes, label=SECOND)
 
 
-def _jumps(axes: Axes, course: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
-    """Crosses where a structure came to another branch of equilibria."""
+def _jumps(axes: Axes, path: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
+    """Draws crosses where a structure came to another branch of equilibria."""
     jumped = (response["stability"] == JUMPED).any("case")
     for name in structures(response):
         at = jumped.sel(structure=name).values
         colour = style.STRUCTURE_COLOURS[name]
-        axes.plot(course.values[at], mean.sel(structure=name).values[at], "x", color=colour, ms=4)
+        axes.plot(path.values[at], mean.sel(structure=name).values[at], "x", color=colour, ms=4)
 
 
 def _bands(
-    axes: Axes, study: StudyResults, course: Abscissa, measure: Measure, copies: xr.Dataset
+    axes: Axes, study: StudyResults, path: Abscissa, measure: Measure, copies: xr.Dataset
 ) -> None:
-    """The 5 % to 95 % percentiles of every kind of noise, laid over one another."""
-    along = np.interp([0.0, *copies["time"].values], study.response["time"], course.values)
+    """Draws the 5 % to 95 % percentiles of every kind of noise, laid over one another."""
+    along = np.interp([0.0, *copies["time"].values], study.response["time"], path.values)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
     for noise in copies["noise"].values:
         low, high = np.nanpercentile(values.sel(noise=noise), BAND, axis=0)
@@ -112,7 +117,7 @@ def _bands(
 
 
 def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: xr.Dataset) -> None:
-    """The measure at the end of the path: median and percentiles of every kind of noise."""
+    """Draws the measure at the end of the path: median and percentiles of every kind of noise."""
     ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
     found = monte_carlo.spreads(values, copies)
@@ -132,28 +137,28 @@ def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: 
     axes.xaxis.set_major_locator(MaxNLocator(4))
 
 
-def contraction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None:
-    """How much nearer top and bottom rows come."""
+def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Tells how much nearer top and bottom rows come."""
 
     def of(response: xr.Dataset) -> xr.DataArray:
         return measures.contraction(study.problem, response)
 
-    _plain_panel(axes, study.problem, course, of(study.response), "contraction (mm)")
+    _plain_panel(axes, study.problem, path, of(study.response), "contraction (mm)")
     measured.bands(axes, study, "contraction")
-    measured.measured_curves(axes, study, course, of, structures(study.response))
+    measured.measured_curves(axes, study, path, of, structures(study.response))
     _sides(axes, study)
 
 
-def reaction_panel(axes: Axes, study: StudyResults, course: Abscissa) -> None:
-    """Force of the drive, and of the load cell where there is one."""
-    _plain_panel(axes, study.problem, course, measures.reaction(study.response), "force (N)")
+def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws force of the drive, and of the load cell where there is one."""
+    _plain_panel(axes, study.problem, path, measures.reaction(study.response), "force (N)")
     measured.forces(axes, study)
     if study.problem.objective.target == "rest":  # or another panel has told it
         _sides(axes, study)
 
 
 def _sides(axes: Axes, study: StudyResults) -> None:
-    """Which curves are measured, and which simulated."""
+    """Tells which curves are measured, and which simulated."""
     if study.recordings:
         told = measured_overlay.handles(study.recordings)
         axes.legend(handles=told, loc="upper left", handlelength=1.6)
@@ -161,10 +166,10 @@ def _sides(axes: Axes, study: StudyResults) -> None:
 
 
 def _plain_panel(
-    axes: Axes, problem: Problem, course: Abscissa, values: xr.DataArray, label: str
+    axes: Axes, problem: Problem, path: Abscissa, values: xr.DataArray, label: str
 ) -> None:
-    """A curve of every structure."""
-    path_axes(axes, course, label)
+    """Draws a curve of every structure."""
+    path_axes(axes, path, label)
     names = structures(values.to_dataset(name="values"))
-    structure_curves(axes, problem, course, values, names)
+    structure_curves(axes, problem, path, values, names)
     axes.axhline(0.0, color=style.PALE, lw=0.5, zorder=1)

@@ -1,4 +1,4 @@
-"""The numbers of a report along a path, each computed from the datasets.
+"""Describes the numbers of a report along a path, each computed from the datasets.
 
 A publication's words for them stand in the problem, under `report.paper.values`, by their key.
 """
@@ -16,7 +16,7 @@ from reports.facts import Fact, checks, grouped, number, recording_facts, share,
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
     Abscissa,
-    course,
+    abscissa_of,
     display_name,
     lattice_size,
     structures,
@@ -26,8 +26,8 @@ from reports.study import StudyResults, from_dataset
 
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
-    """All facts, under headings."""
-    path = course(study.problem, study.response)
+    """Returns all facts, under headings."""
+    path = abscissa_of(study.problem, study.response)
     return [
         *grouped("Scene", scene_facts(study, path)),
         *grouped("Result", measure_facts(study, path)),
@@ -46,7 +46,7 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
 
 
 def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """The problem as it was run."""
+    """Yields the problem as it was run."""
     problem, response = study.problem, study.response
     lattice, paper = problem.lattice, problem.report.paper
     if paper is not None and paper.variant:
@@ -75,7 +75,7 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def _radii(problem: Problem) -> Iterator[Fact]:
-    """How far round regions reach."""
+    """Tells how far round regions reach."""
     spacing = problem.lattice.spacing
     for key, label, region in (
         ("interest_radius", "Radius of the region of interest", problem.objective.region),
@@ -93,7 +93,7 @@ def _radii(problem: Problem) -> Iterator[Fact]:
 
 
 def _cloak_width(problem: Problem) -> float | None:
-    """Of a cloak around something round, mm."""
+    """Finds the width of a cloak around something round, mm."""
     if problem.cloak.around is not None:
         return problem.cloak.around.distance
     cloak = problem.cloak.bounds
@@ -120,14 +120,14 @@ def _strain_fact(lattice: Lattice, path: Abscissa) -> Fact:
 
 
 def _drive_facts(problem: Problem) -> Iterator[Fact]:
-    """Of a harmonic drive."""
+    """Yields amplitude and frequency of a harmonic drive."""
     if isinstance(problem.drive, HarmonicDrive | RampHarmonicDrive):
         yield number("amplitude", "Amplitude A", problem.drive.amplitude, "mm")
         yield number("frequency", "Frequency f", problem.drive.frequency, "Hz")
 
 
 def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """The measure at the end of the path, and its reduction by the cloak."""
+    """Yields the measure at the end of the path, and its reduction by the cloak."""
     measure = measures.measure_of(study.problem)
     values = over_cases(study.problem, measure.of(study.response))
     where = f"at {path.at(-1)}" if path.static else "at the end"
@@ -156,7 +156,7 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def loss_facts(study: StudyResults) -> Iterator[Fact]:
-    """The loss that was minimised, before and after."""
+    """Yields the loss that was minimised, before and after."""
     unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
     loss = over_cases(study.problem, study.response["loss"])
     start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
@@ -168,7 +168,7 @@ def loss_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Change of the vertical distance between top and bottom rows."""
+    """Yields change of the vertical distance between top and bottom rows."""
     if not path.static:
         return
     nearer = over_cases(study.problem, measures.contraction(study.problem, study.response)).isel(
@@ -189,7 +189,7 @@ def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Force of the drive at the end of the path."""
+    """Yields force of the drive at the end of the path."""
     if not path.static:
         return
     force = over_cases(study.problem, measures.reaction(study.response)).isel(time=-1)
@@ -201,7 +201,7 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def robustness_facts(study: StudyResults) -> Iterator[Fact]:
-    """Spread of the measure over the imperfect copies."""
+    """Yields spread of the measure over the imperfect copies."""
     copies = study.scatter
     if copies is None:
         return

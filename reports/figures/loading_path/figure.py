@@ -1,100 +1,217 @@
-"""The figure of structures along a path, at a journal's two-column width."""
+"""Composes the report along a path: panels with tables, text of the page, animation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from typing import Literal
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.base import style
-from reports.figures.loading_path import curves, measures
+from pipeline.problem.sections import Paper
+from reports.base import Table, style
+from reports.facts import JUMPED, Fact
+from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
     Abscissa,
-    course,
+    abscissa_of,
     display_name,
     lattice_size,
     structures,
 )
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
-from reports.figures.loading_path.structure_panels import rest_panel
-from reports.panels import loss_history
-from reports.study import StudyResults, draft
+from reports.figures.loading_path.structure_panels import rest_panel, shade_of
+from reports.page import PageText, study_text
+from reports.panels import (
+    Animation,
+    AnimationAxis,
+    AnimationClip,
+    ColourField,
+    Panel,
+    PanelFigure,
+    case_labels,
+    loss_history,
+    measured_overlay,
+    signed_field,
+    structure_clip,
+    with_recordings,
+)
+from reports.study import StudyResults
 
 TALLEST_SNAPSHOTS = 116.0
 """Height that all snapshots may take, mm."""
+_SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
+_HISTORY = (
+    "Loss against evaluation; rejected evaluations are dots, infeasible ones pale, the circle is "
+    "the best feasible design."
+)
 
-Panel = tuple[str, Callable[[Axes], None]]
+_KEYS: tuple[Literal["ux", "uy", "theta"], ...] = ("ux", "uy", "theta")
+Curve = tuple[str, Callable[[Axes], None], str, Sequence[Table]]
 
 
-def draw_loading_path(study: StudyResults) -> Figure:
-    """The whole figure."""
-    path = course(study.problem, study.response)
-    names = structures(study.response)
+def loading_path_figure(study: StudyResults) -> PanelFigure:
+    """Returns the whole figure."""
+    problem, path = study.problem, abscissa_of(study.problem, study.response)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
     head = 11.5 if study.recordings else 8.5
     low = top + head + grid.lines * grid.side + 2.0
-    figure = style.page(low + 48.0)
-    at_rest(figure, study, names)
-    style.letter(figure, 123.0, 0.8, "b", "Optimisation")
-    loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, loss_label(study))
-    style.letter(figure, 0.0, top, "c", "Response, true to scale")
-    snapshots(figure, study, grid, top + head)
-    _curves(figure, _panels(study, path), low)
-    if study.draft:
-        draft.mark(figure)
-    return figure
+    colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
+    symbol = "Loss (N mm)" if problem.objective.kind == "strain_energy" else r"Loss $J$"
+    clamped = (
+        "The structures at rest: dark units are clamped, orange ones driven along the arrows, "
+        "purple ones redesigned"
+        + (", grey ones stiffened" if problem.inclusion is not None else "")
+        + (", green ones of interest." if problem.objective.region != "surroundings" else ".")
+    )
+    panels = [
+        *design_panels(study, symbol, clamped),
+        Panel(
+            ("c", "Response, true to scale", 0.0, top),
+            lambda figure: snapshots(figure, study, grid, top + head),
+            f"Snapshots at true size, coloured by {colours}.",
+        ),
+        *_side_by_side(list(_curves(study, path)), low),
+    ]
+    remark = measured_overlay.caption(study.recordings)
+    return PanelFigure(low + 48.0, panels, study.draft, remark)
 
 
-def loss_label(study: StudyResults) -> str:
-    """Symbol and unit of the loss."""
-    return "Loss (N mm)" if study.problem.objective.kind == "strain_energy" else r"Loss $J$"
+def design_panels(
+    study: StudyResults, symbol: str, caption: str, overlay: Callable[[Axes], None] | None = None
+) -> list[Panel]:
+    """Lists panels a, the structures with an `overlay` on each, and b, how the loss fell."""
+
+    def at_rest(figure: Figure) -> None:
+        for axes in _at_rest(figure, study):
+            if overlay is not None:
+                overlay(axes)
+
+    def optimisation(figure: Figure) -> None:
+        loss_history(style.place(figure, 133.5, 8.5, 43.5, 31.5), study.design, symbol)
+
+    design, history = tables.of_design(study)
+    return [
+        Panel(("a", "", 0.0, 0.8), at_rest, caption, [design]),
+        Panel(("b", "Optimisation", 123.0, 0.8), optimisation, _HISTORY, [history]),
+    ]
 
 
-def at_rest(figure: Figure, study: StudyResults, names: tuple[str, ...]) -> list[Axes]:
-    """Panel a: the structures side by side, and how large and how driven they are."""
-    style.letter(figure, 0.0, 0.8, "a")
-    side = 40.0
+def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
+    """Yields the structures side by side, and how large and how driven they are."""
+    side, names = 40.0, structures(study.response)
     lattice, drive = study.problem.lattice, study.problem.drive
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
     notes = [size, f"$A$ = {drive.amplitude:g} mm" if hasattr(drive, "amplitude") else "", ""]
     left = (3 - len(names)) * (side + 0.6) / 2
-    panels = []
     for k, name in enumerate(names):
         x = left + k * (side + 0.6)
         axes = style.place(figure, x, 6.0, side, side)
         rest_panel(axes, study.problem, study.response, name)
-        colour = style.STRUCTURE_COLOURS[name]
-        axes.set_title(
-            display_name(study.problem, name), color=colour, fontsize=style.TITLE, pad=2.0
-        )
+        title, colour = display_name(study.problem, name), style.STRUCTURE_COLOURS[name]
+        axes.set_title(title, color=colour, fontsize=style.TITLE, pad=2.0)
         style.write(figure, x + side / 2, 46.6, notes[k], ha="center", fontsize=style.SMALL)
-        panels.append(axes)
-    return panels
+        yield axes
 
 
-def _panels(study: StudyResults, path: Abscissa) -> list[Panel]:
-    """Curves below the snapshots, left to right."""
+def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
+    """Titles, curves, sentences and tables of what stands below the snapshots, left to right."""
     problem, measure = study.problem, measures.measure_of(study.problem)
-    panels: list[Panel] = [
-        (measure.label, lambda axes: curves.measure_panel(axes, study, path, measure))
-    ]
+    way = [Table("path.csv", "every structure along the path", tables.path(study))]
+    words = f"{measure.label}{marks([study])}."
+    yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
     if path.static and problem.objective.target != "rest":
-        panels.append(
-            ("Lateral contraction", lambda axes: curves.contraction_panel(axes, study, path))
+        words = "Loss of distance between the top and the bottom row, mean over the middle columns."
+        yield (
+            "Lateral contraction",
+            lambda axes: curves.contraction_panel(axes, study, path),
+            words,
+            (),
         )
-    panels.append(("Reaction", lambda axes: curves.reaction_panel(axes, study, path)))
+    words = "Force of the drive along its direction."
+    yield "Reaction", lambda axes: curves.reaction_panel(axes, study, path), words, ()
     if (copies := study.scatter) is not None:
+        words = (
+            "The measure of panel d at the end of the path over imperfect cloaks: median and 5 % "
+            "to 95 %; dashed without, dotted with the perfect cloak."
+        )
+        table = Table(
+            "robustness.csv", "imperfect copies, one a line", tables.copies(study, copies)
+        )
         title = f"{copies['sample'].size} imperfect cloaks"
-        panels.append((title, lambda axes: curves.robustness_panel(axes, study, measure, copies)))
-    return panels
+        panel = curves.robustness_panel
+        yield title, lambda axes: panel(axes, study, measure, copies), words, [table]
 
 
-def _curves(figure: Figure, panels: list[Panel], top: float) -> None:
-    """The panels side by side, lettered from d."""
-    whole = style.TWO_COLUMNS / len(panels)
-    for k, (title, draw) in enumerate(panels):
-        left = k * whole
-        style.letter(figure, left, top, "defg"[k], title)
-        draw(style.place(figure, left + 11.0, top + 11.5, whole - 14.0, 27.0))
+def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
+    """Yields the panels of curves, lettered from d."""
+    width = style.TWO_COLUMNS / len(shown)
+    for k, (title, draw, words, data) in enumerate(shown):
+        left = k * width
+
+        def placed(figure: Figure, left: float = left, draw: Callable[[Axes], None] = draw) -> None:
+            draw(style.place(figure, left + 11.0, top + 11.5, width - 14.0, 27.0))
+
+        yield Panel(("defg"[k], title, left, top), placed, words, data)
+
+
+def marks(studies: Sequence[StudyResults]) -> str:
+    """Tells what else is drawn with the curves of the measure, each after a semicolon."""
+    bands = any(study.scatter is not None for study in studies)
+    jumps = any((study.response["stability"] == JUMPED).any() for study in studies)
+    second = any(study.redesign is not None and study.redesign.changed for study in studies)
+    return (
+        ("; the bands hold 90 % of the imperfect cloaks" if bands else "")
+        + ("; crosses mark jumps to another branch" if jumps else "")
+        + (_SECOND if second else "")
+    )
+
+
+def loading_path_animation(study: StudyResults) -> Animation:
+    """Returns every structure along the path, with its recordings."""
+    path, response = abscissa_of(study.problem, study.response), study.response
+    clips: list[AnimationClip] = []
+    for name in structures(response):
+        clip = structure_clip(display_name(study.problem, name), study, name)
+        clips += with_recordings(clip, study, name, path.values)
+    pad = study.problem.lattice.spacing
+    return Animation(axis(path), case_labels(response), clips, fields(study), pad=pad)
+
+
+def axis(path: Abscissa) -> AnimationAxis:
+    """Returns what the slider runs over: once through the path in six seconds."""
+    pace = float(path.values[-1] - path.values[0]) / 6.0
+    digits = max(0, 3 - int(np.ceil(np.log10(max(path.values[-1], 1e-9)))))
+    symbol = path.symbol.strip("$")
+    speeds = {"once in 6 s": pace, "3 s": 2 * pace, "12 s": pace / 2}
+    return AnimationAxis(symbol, path.unit, path.values, digits, not path.static, speeds)
+
+
+def fields(study: StudyResults) -> list[ColourField]:
+    """Lists what may colour the units; that of the figure first."""
+    first = shade_of(study.problem, study.response).field
+    motion = study.response["displacement"].values
+    return [first, *(signed_field(key, motion) for key in _KEYS if key != first.key)]
+
+
+def loading_path_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
+    """Returns what the page says of itself."""
+    key = measures.measure_of(study.problem).key
+    headline = (f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction")
+    return study_text(
+        study, caption, facts, credit=credit(study.problem.report.paper), headline=headline
+    )
+
+
+def credit(paper: Paper | None) -> str:
+    """Tells which figure of the paper a study follows, and with which of its values."""
+    source = ""
+    if paper is not None:
+        variant = f" Run with its values: {paper.variant}." if paper.variant else ""
+        source = (
+            f"After Figure {paper.figure} of Bordiga et al., “Nonlinear mechanical metamaterial "
+            f"cloaks”.{variant} "
+        )
+    return f"{source}Every number here is computed from the datasets."

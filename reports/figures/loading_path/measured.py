@@ -1,4 +1,4 @@
-"""Recordings along the path: in the form of responses, as curves, and as numbers."""
+"""Describes recordings along the path: in the form of responses, as curves, and as numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SIDES = ("measured", "simulated")
 
 
 def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> xr.Dataset:
-    """A recording in the form of the study's response, the simulated intact structure beside it."""
+    """Forms a recording like the study's response, the simulated intact structure beside it."""
     held = study.response["structure"].values
     names = [name for name in held if name in {"intact", recording.structure}]
     part = study.response.sel(structure=names).isel(case=[recording.case])
@@ -39,7 +39,7 @@ def response(study: StudyResults, path: Abscissa, recording: RecordedMotion) -> 
 
 
 def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of) -> Floats:
-    """What `of` makes of a recording (n_times,), NaN where nothing was recorded."""
+    """Tells what `of` makes of a recording (n_times,), NaN where nothing was recorded."""
     made = response(study, path, recording)
     values = of(made).sel(structure=recording.structure).isel(case=0)
     motion = made["displacement"].sel(structure=recording.structure).isel(case=0)
@@ -51,7 +51,7 @@ def curve(study: StudyResults, path: Abscissa, recording: RecordedMotion, of: Of
 def measured_curves(
     axes: Axes, study: StudyResults, path: Abscissa, of: Of, names: Collection[str]
 ) -> None:
-    """The same of every recording of these structures, dashed with markers."""
+    """Draws the same of every recording of these structures, dashed with markers."""
     for each in study.recordings:
         if each.structure not in names:
             continue
@@ -60,27 +60,27 @@ def measured_curves(
 
 
 def bands(axes: Axes, study: StudyResults, key: str) -> None:
-    """Prediction bands of a quantity, where comparisons have them."""
+    """Draws prediction bands of a quantity, where comparisons have them."""
     for each in study.recordings if key in _NAMES else ():
         low, high = (each.values(_followed(each, key, "simulated", end)) for end in _ENDS)
         measured_overlay.band(axes, each.along, low, high, style.STRUCTURE_COLOURS[each.structure])
 
 
 def _followed(recording: RecordedMotion, key: str, source: str, estimate: str) -> xr.DataArray:
-    """A quantity (time,) of a comparison, in the unit of the report."""
+    """Returns a quantity (time,) of a comparison, in the unit of the report."""
     values = recording.data[_NAMES[key]].sel(source=source, estimate=estimate)
     return np.degrees(values) if key == "rotation" else values  # type: ignore[return-value]
 
 
 def _at_the_end(recording: RecordedMotion, path: Abscissa, key: str, source: str) -> Floats:
-    """Value, lower and upper end of its interval (3,) at the end of the path."""
+    """Returns value, lower and upper end of its interval (3,) at the end of the path."""
     estimates = ("value", *_ENDS)
     found = [_followed(recording, key, source, estimate) for estimate in estimates]
     return np.array([recording.at(values, path.values)[-1] for values in found])
 
 
 def forces(axes: Axes, study: StudyResults) -> None:
-    """Forces of the load cell with the prediction bands, of the recordings that have one."""
+    """Draws forces of the load cell with the prediction bands, of the recordings that have one."""
     for each in study.recordings:
         force, low, high = (
             each.values(each.data[name]) for name in ("load_force", "force_low", "force_high")
@@ -92,7 +92,7 @@ def forces(axes: Axes, study: StudyResults) -> None:
 
 
 def measured_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """The measure and the contraction at the end of the path, as they were measured."""
+    """Yields the measure and the contraction at the end of the path, as they were measured."""
     measure = measures.measure_of(study.problem)
     yield from _measure_facts(study, path, measure)
     if not path.static:
@@ -136,7 +136,7 @@ def _measure_facts(study: StudyResults, path: Abscissa, measure: Measure) -> Ite
 
 
 def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
-    """The interval of a quantity at the end of the path, and what was predicted, in words."""
+    """Finds the interval of a quantity at the end of the path, and what was predicted, in words."""
     if key not in _NAMES:
         return ""
     measured, predicted = (_at_the_end(recording, path, key, side) for side in _SIDES)
@@ -146,7 +146,7 @@ def _interval(recording: RecordedMotion, path: Abscissa, key: str) -> str:
 def _change(
     study: StudyResults, path: Abscissa, key: str, between: tuple[str, str], sign: int = 1
 ) -> str:
-    """The same of what the second of two structures takes from a quantity of the first."""
+    """Returns the same of what the second of two structures takes from a quantity of the first."""
     if key not in _NAMES:
         return ""
     ends = []

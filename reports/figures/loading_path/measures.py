@@ -1,4 +1,4 @@
-"""How far structures are from what they should do, along the path; contraction and reaction."""
+"""Measures how far structures are from what they should do; contraction and reaction."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from reports.study import DRIVEN
 
 @dataclass(frozen=True)
 class Measure:
-    """A number along the path that should be small, of every structure and load case.
+    """Describes a number along the path that should be small, of every structure and load case.
 
     `of` maps a response to (structure, case, time); `symbol` stands on axes.
     """
@@ -28,7 +28,7 @@ class Measure:
 
 
 def measure_of(problem: Problem) -> Measure:
-    """The measure that goes with a problem's objective."""
+    """Returns the measure that goes with a problem's objective."""
     scale = scales(problem)
     if problem.objective.kind == "strain_energy":
         symbol = r"mean $|\theta|$ (°)"
@@ -48,14 +48,14 @@ def measure_of(problem: Problem) -> Measure:
 
 
 def rotation(response: xr.Dataset) -> xr.DataArray:
-    """Mean |theta| over the region of interest, degrees."""
+    """Returns mean |theta| over the region of interest, degrees."""
     turn: xr.DataArray = np.abs(interest(response).sel(dof="theta"))  # type: ignore[assignment]
     mean: xr.DataArray = turn.mean("unit")
     return np.degrees(mean)  # type: ignore[return-value]
 
 
 def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataArray:
-    """Root mean square of |U|, U = (ux/s, uy/s, theta), over the region of interest."""
+    """Returns root mean square of |U|, U = (ux/s, uy/s, theta), over the region of interest."""
     mean: xr.DataArray = squares(interest(response), scale).mean("unit")
     return mean**0.5
 
@@ -63,7 +63,7 @@ def motion(response: xr.Dataset, scale: tuple[float, float, float]) -> xr.DataAr
 def mismatch(
     response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
 ) -> xr.DataArray:
-    """Norm of U - U_intact over the region of interest, over what ``size_of_intact`` is."""
+    """Returns norm of U - U_intact over the region of interest, over what ``size_of_intact`` is."""
     inside = interest(response)
     intact = inside.sel(structure="intact")
     apart: xr.DataArray = squares(inside - intact, scale).sum("unit") ** 0.5
@@ -73,24 +73,24 @@ def mismatch(
 def size_of_intact(
     response: xr.Dataset, scale: tuple[float, float, float], static: bool = True
 ) -> xr.DataArray:
-    """Norm (case,) of U_intact over the region of interest: at the end of a path, most in time."""
+    """Finds the norm (case,) of U_intact over the region of interest: at the end, most in time."""
     intact = interest(response).sel(structure="intact")
     size: xr.DataArray = squares(intact, scale).sum("unit") ** 0.5
     return size.isel(time=-1) if static else size.max("time")
 
 
 def scales(problem: Problem) -> tuple[float, float, float]:
-    """Divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
+    """Returns divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
     return problem.lattice.spacing, problem.lattice.spacing, 1.0
 
 
 def interest(response: xr.Dataset) -> xr.DataArray:
-    """Displacements of the units of the region of interest."""
+    """Returns displacements of the units of the region of interest."""
     return response["displacement"].isel(unit=response["roi"].values.astype(bool))
 
 
 def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr.DataArray:
-    """Sum of squares of dimensionless displacements (..., dof)."""
+    """Returns sum of squares of dimensionless displacements (..., dof)."""
     divisors = xr.DataArray(np.array(scale), dims="dof", coords={"dof": displacement["dof"]})
     squares: xr.DataArray = ((displacement / divisors) ** 2).sum("dof")
     return squares
@@ -105,7 +105,7 @@ def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
 
 
 def reaction(response: xr.Dataset) -> xr.DataArray:
-    """Force in N that the drive exerts along its direction, on all driven units together."""
+    """Finds force in N that the drive exerts along its direction, on all driven units together."""
     held = response["reaction_force"].isel(unit=response["support"].values == DRIVEN)
     total = held.sum("unit")
     angle = np.radians(response["direction"])

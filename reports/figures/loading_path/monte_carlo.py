@@ -1,4 +1,4 @@
-"""Imperfect copies of the design, in the terms of the report's measure."""
+"""Describes imperfect copies of the design, in the terms of the report's measure."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from reports.figures.loading_path.measures import Measure, scales, size_of_intac
 
 @dataclass(frozen=True)
 class Spread:
-    """Percentiles of a number over the copies with one kind of noise, and how many there are."""
+    """Holds percentiles of a number over the copies with one kind of noise, and their counts."""
 
     noise: str
     low: float
@@ -27,7 +27,7 @@ class Spread:
 def copy_curves(
     problem: Problem, measure: Measure, response: xr.Dataset, copies: xr.Dataset
 ) -> xr.DataArray:
-    """The measure (noise, sample, time) of every copy, NaN where it failed."""
+    """Returns the measure (noise, sample, time) of every copy, NaN where it failed."""
     if measure.key == "rotation":
         turned: xr.DataArray = np.degrees(copies["rotation"])  # type: ignore[assignment]
         return turned
@@ -39,7 +39,7 @@ def copy_curves(
 
 
 def spreads(values: xr.DataArray, copies: xr.Dataset) -> list[Spread]:
-    """Spread of values (noise, sample) of every kind of noise; 5 %, 50 % and 95 % percentiles."""
+    """Spreads values (noise, sample) of every kind of noise: 5 %, 50 % and 95 % percentiles."""
     found = []
     for noise in copies["noise"].values:
         part = copies.sel(noise=noise)

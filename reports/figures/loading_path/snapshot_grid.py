@@ -1,4 +1,4 @@
-"""Structures along the path, true to scale, side by side and above one another."""
+"""Describes structures along the path, true to scale, side by side and above one another."""
 
 from __future__ import annotations
 
@@ -13,7 +13,13 @@ from matplotlib.ticker import MaxNLocator
 
 from pipeline.problem import Problem
 from reports.base import style
-from reports.figures.loading_path.abscissa import SECOND, Abscissa, course, display_name, structures
+from reports.figures.loading_path.abscissa import (
+    SECOND,
+    Abscissa,
+    abscissa_of,
+    display_name,
+    structures,
+)
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
 from reports.panels import draw
 from reports.study import StudyResults, from_dataset
@@ -28,7 +34,7 @@ Label = tuple[str, str]
 
 @dataclass(frozen=True)
 class SnapshotStructure:
-    """One structure among the snapshots: its name, the colour of that, and what it does."""
+    """Holds one structure among the snapshots: its name, the colour of that, and what it does."""
 
     label: str
     colour: str
@@ -36,9 +42,9 @@ class SnapshotStructure:
 
 
 def rows(study: StudyResults) -> list[SnapshotStructure]:
-    """The structures of a study, recordings above them, and a design for contact on distance."""
+    """Lists the structures of a study, recordings above them, and the second design."""
     response, problem = study.response, study.problem
-    along, found = course(problem, response).values, []
+    along, found = abscissa_of(problem, response).values, []
     for name in structures(response):
         label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
         filmed = [each for each in study.recordings if each.structure == name]
@@ -47,24 +53,24 @@ def rows(study: StudyResults) -> list[SnapshotStructure]:
             found.append(SnapshotStructure(f"{label}\n{each.source}", colour, part))
         label = f"{label}\nsimulation" if filmed else label
         found.append(SnapshotStructure(label, colour, response.sel(structure=name)))
-    if study.again is not None and study.again.changed:
-        part = study.again.response.sel(structure="cloaked")
+    if study.redesign is not None and study.redesign.changed:
+        part = study.redesign.response.sel(structure="cloaked")
         found.append(SnapshotStructure(SECOND, style.CLOAKED, part))
     return found
 
 
 @dataclass(frozen=True)
 class SnapshotLayout:
-    """How the snapshots are laid out: structures above one another or side by side; mm."""
+    """Tells how the snapshots are laid out: structures above one another or side by side; mm."""
 
     rows: list[SnapshotStructure]
-    course: Abscissa
+    path: Abscissa
     side: float
     beside: bool
 
     @classmethod
     def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> SnapshotLayout:
-        """The layout that shows them larger."""
+        """Returns the layout that shows them larger."""
         kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR
 
@@ -76,21 +82,21 @@ class SnapshotLayout:
 
     @property
     def lines(self) -> int:
-        """Number of snapshots above one another."""
-        return len(self.course.shown) if self.beside else len(self.rows)
+        """Returns number of snapshots above one another."""
+        return len(self.path.shown) if self.beside else len(self.rows)
 
     @property
     def columns(self) -> int:
-        """Number of snapshots side by side."""
-        return len(self.rows) if self.beside else len(self.course.shown)
+        """Returns number of snapshots side by side."""
+        return len(self.rows) if self.beside else len(self.path.shown)
 
     @property
     def left(self) -> float:
-        """Where the snapshots begin so that all of them are in the middle."""
+        """Tells where the snapshots begin so that all of them are in the middle."""
         return LABEL + (style.TWO_COLUMNS - LABEL - BAR - self.columns * self.side) / 2
 
     def at(self, row: int, load: int) -> tuple[int, int]:
-        """Line and column of a snapshot."""
+        """Returns line and column of a snapshot."""
         return (load, row) if self.beside else (row, load)
 
 
@@ -104,10 +110,10 @@ def snapshots(
     top: float,
     overlay: Overlay | None = None,
 ) -> None:
-    """Every structure at every load shown, from ``top`` (mm) on, with an ``overlay`` on each."""
+    """Draws all structures at all loads shown, from ``top`` (mm) on, an ``overlay`` on each."""
     shade, side = shade_of(study.problem, study.response), grid.side
     for k, row in enumerate(grid.rows):
-        for m, sample in enumerate(grid.course.shown):
+        for m, sample in enumerate(grid.path.shown):
             line, column = grid.at(k, m)
             axes = style.place(
                 figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
@@ -115,7 +121,7 @@ def snapshots(
             snapshot(axes, study.problem, row.part, sample, shade)
             if overlay is not None:
                 overlay(axes, row, sample)
-    loads = [f"{grid.course.symbol} = {grid.course.at(sample)}" for sample in grid.course.shown]
+    loads = [f"{grid.path.symbol} = {grid.path.at(sample)}" for sample in grid.path.shown]
     kinds = [(row.label, row.colour) for row in grid.rows]
     values = [(load, style.INTACT) for load in loads]
     _labels(figure, grid, top, *((kinds, values) if grid.beside else (values, kinds)))
@@ -126,7 +132,7 @@ def snapshots(
 def _labels(
     figure: Figure, grid: SnapshotLayout, top: float, above: Sequence[Label], left: Sequence[Label]
 ) -> None:
-    """Words with their colours above the columns and left of the lines."""
+    """Draws words with their colours above the columns and left of the lines."""
     for k, (text, colour) in enumerate(above):
         x = grid.left + (k + 0.5) * grid.side - GAP / 2
         style.write(
@@ -144,7 +150,7 @@ def _labels(
 def snapshot(
     axes: Axes, problem: Problem, part: xr.Dataset, sample: int, shade: UnitColouring, case: int = 0
 ) -> None:
-    """One structure at one sample of its path, true to scale."""
+    """Draws one structure at one sample of its path, true to scale."""
     structure = from_dataset(part, problem.lattice.spacing)
     frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
     draw(
@@ -158,7 +164,7 @@ def snapshot(
 
 
 def colour_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:
-    """The bar of the snapshots, in `place`: mm from the left and the top, and height."""
+    """Draws the bar of the snapshots, in `place`: mm from the left and the top, and height."""
     left, top, height = place
     bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
     figure.colorbar(ScalarMappable(shade.norm, shade.colours), cax=bar).set_label(

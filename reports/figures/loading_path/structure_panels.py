@@ -1,4 +1,4 @@
-"""Panels that show structures: at rest with their regions, and along the path."""
+"""Describes panels that show structures: at rest with their regions, and along the path."""
 
 from __future__ import annotations
 
@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from pipeline.problem import Problem
 from pipeline.problem.sections import Region
 from reports.base import style
-from reports.panels import ColourField, draw, draw_clamps, round_up, scalar
+from reports.panels import (
+    ColourField,
+    draw,
+    draw_clamps,
+    scalar,
+    signed_field,
+    size_field,
+    turn_field,
+)
 from reports.study import CLAMPED, CLOAK, DRIVEN, INCLUSION, RigidUnits, from_dataset
 from sim.core import Floats
 
@@ -25,41 +33,35 @@ INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
 
 @dataclass(frozen=True)
 class UnitColouring:
-    """How a displacement (n_units, 3) colours the units."""
+    """Tells how a displacement (n_units, 3) colours the units."""
 
     field: ColourField
     label: str
     colours: Colormap
 
     def values(self, displacement: Floats) -> Floats:
-        """The number (n_units,) that each unit shows."""
+        """Returns the number (n_units,) that each unit shows."""
         return scalar(self.field, displacement)
 
     @property
     def norm(self) -> Normalize:
-        """From the lowest to the highest colour."""
+        """Spans the lowest to the highest colour."""
         return Normalize(*self.field.limits)
 
 
 def shade_of(problem: Problem, response: xr.Dataset) -> UnitColouring:
-    """What colours the snapshots: |theta|, u_y or |U|, by what the cloak is for."""
+    """Returns what colours the snapshots: |theta|, u_y or |U|, by what the cloak is for."""
     free = response["displacement"].isel(unit=response["support"].values == 0).values
     if problem.objective.kind == "strain_energy":
-        most = round_up(float(np.degrees(np.nanmax(np.abs(free[..., 2])))))
-        field = ColourField("turn", "|θ|", "°", 180.0 / np.pi, "magnitude", (0.0, most))
-        return UnitColouring(field, r"$|\theta|$ (°)", style.MAGNITUDE)
+        return UnitColouring(turn_field(free), r"$|\theta|$ (°)", style.MAGNITUDE)
     if problem.objective.target != "rest":
-        most = round_up(float(np.nanmax(np.abs(free[..., 1]))))
-        field = ColourField("uy", "u_y", "mm", 1.0, "signed", (-most, most))
-        return UnitColouring(field, "$u_y$ (mm)", style.SIGNED)
-    scale = (problem.lattice.spacing, problem.lattice.spacing, 1.0)
-    most = round_up(float(np.nanmax(np.linalg.norm(free / np.array(scale), axis=-1))))
-    field = ColourField("norm", "|U|", "", 1.0, "magnitude", (0.0, most), scale)
+        return UnitColouring(signed_field("uy", free), "$u_y$ (mm)", style.SIGNED)
+    field = size_field(free, problem.lattice.spacing)
     return UnitColouring(field, r"$\|\mathbf{U}\|$", style.MAGNITUDE)
 
 
 def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) -> None:
-    """One structure at rest: what is clamped, driven, looked at and redesigned."""
+    """Draws one structure at rest: what is clamped, driven, looked at and redesigned."""
     structure = from_dataset(response.sel(structure=name), problem.lattice.spacing)
     interest = np.zeros(structure.n_units, dtype=bool)
     if isinstance(problem.objective.region, Region):
@@ -87,7 +89,7 @@ def _tints(structure: RigidUnits, interest: NDArray[np.bool_], name: str) -> Ite
 
 
 def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
-    """Arrows onto some of the driven units, along the drive."""
+    """Draws arrows onto some of the driven units, along the drive."""
     ends = structure.centroid[structure.present & (structure.support == DRIVEN)]
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))

@@ -1,36 +1,22 @@
-"""Data tables of the path: what its curves show, as plain CSV."""
+"""Describes data tables of the path: what its curves show, as plain CSV."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from reports.base import Table
-from reports.facts import history, vertices
+from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
-from reports.figures.loading_path.abscissa import course, structures
+from reports.figures.loading_path.abscissa import abscissa_of, structures
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults
 
-Columns = dict[str, NDArray[Any]]
-
-
-def loading_path_tables(study: StudyResults) -> list[Table]:
-    """All tables, in the order of the panels."""
-    tables = [*of_design(study), Table("path.csv", "every structure along the path", path(study))]
-    if study.scatter is not None:
-        tables.append(
-            Table("robustness.csv", "imperfect copies, one a line", copies(study, study.scatter))
-        )
-    return tables
-
 
 def of_design(study: StudyResults) -> list[Table]:
-    """The design and how it was found."""
+    """Returns the design and how it was found."""
     text = "vertices of the cloaked and of the initial design"
     return [
         Table("design.csv", text, vertices(study.design)),
@@ -39,7 +25,7 @@ def of_design(study: StudyResults) -> list[Table]:
 
 
 def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Columns:
-    """A column for each series of a response and each structure, one row a sample."""
+    """Returns a column for each series of a response and each structure, one row a sample."""
     columns: Columns = {}
     for label, values in series.items():
         mean = over_cases(study.problem, values)
@@ -49,9 +35,9 @@ def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Col
 
 
 def path(study: StudyResults) -> Columns:
-    """One row a sample: the measure, contraction, reaction, energies, voids of each structure."""
+    """Lists per sample the measure, contraction, reaction, energies, voids of each structure."""
     problem, response = study.problem, study.response
-    way = course(problem, response)
+    way = abscissa_of(problem, response)
     measure = measures.measure_of(problem)
     columns: Columns = {"time_s": response["time"].values}
     if way.static:
@@ -68,7 +54,7 @@ def path(study: StudyResults) -> Columns:
 
 
 def copies(study: StudyResults, made: xr.Dataset) -> Columns:
-    """One row a copy."""
+    """Returns one row a copy."""
     measure = measures.measure_of(study.problem)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, made).isel(time=-1)
     noise, sample = np.meshgrid(made["noise"].values, made["sample"].values, indexing="ij")

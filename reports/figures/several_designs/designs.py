@@ -1,4 +1,4 @@
-"""The designs of a problem with the parameter that they differ by, and how well each shields."""
+"""Reads the designs of a problem with the parameter that they differ by."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RADIUS = "cloak.disc.radius"
 
 @dataclass(frozen=True)
 class SeriesDesign:
-    """One of the designs: the value of the parameter, in words, and its study."""
+    """Describes one of the designs: the value of the parameter, in words, and its study."""
 
     number: int
     word: SettingValue
@@ -31,42 +31,42 @@ class SeriesDesign:
 
     @property
     def scene(self) -> ReportScene:
-        """The shaken lattice."""
+        """Returns the shaken lattice."""
         return self.study.scene
 
     @property
     def units(self) -> int:
-        """Number of units in the cloak."""
+        """Returns number of units in the cloak."""
         return int((self.study.design["region"] == CLOAK).sum())
 
     @cached_property
     def _reached(self) -> xr.DataArray:
-        """Largest |U| over the loss's time (structure, case, unit)."""
+        """Returns largest |U| over the loss's time (structure, case, unit)."""
         scene, moved = self.scene, self.study.response["displacement"]
         window = moved.sel(time=slice(None, scene.horizon * measures.LAST_SAMPLE))
         return measures.magnitude(window, scene.scale).max("time")
 
     @property
     def peak(self) -> xr.DataArray:
-        """Largest |U| over the loss's time (structure, unit), mean over the load cases."""
+        """Returns largest |U| over the loss's time (structure, unit), mean over the load cases."""
         return self.scene.mean(self._reached)
 
     @property
     def boundary(self) -> xr.DataArray:
-        """Largest |U| of a unit of the outer rows and columns (structure), mean over the cases."""
+        """Finds the largest |U| of a unit of the outer rows and columns, mean over the cases."""
         i, j = (self.study.response[name].values for name in ("i", "j"))
         scene = self.scene
         outer = np.isin(i, (0, scene.columns - 1)) | np.isin(j, (0, scene.rows - 1))
         return scene.mean(self._reached.isel(unit=outer).max("unit"))
 
     def loss(self, structure: str) -> float:
-        """The loss, mean over the load cases."""
+        """Returns the loss, mean over the load cases."""
         return float(self.scene.mean(self.study.response["loss"].sel(structure=structure)))
 
 
 @dataclass(frozen=True)
 class DesignSeries:
-    """All designs of a problem, in their order.
+    """Describes all designs of a problem, in their order.
 
     `target` builds them; `problem` asks for them; `key` is the parameter that they differ by.
     """
@@ -79,7 +79,7 @@ class DesignSeries:
 
     @property
     def axis(self) -> tuple[Floats, str]:
-        """Values of the parameter and what they are, for an axis; a radius in spacings."""
+        """Returns values of the parameter and what they are, for an axis; a radius in spacings."""
         found = [split_value(design.word) for design in self.designs]
         values = np.array([number for number, _ in filter(None, found)])
         unit = next((unit for _, unit in filter(None, found)), "")
@@ -88,13 +88,13 @@ class DesignSeries:
         return values, f"{self.key} ({unit})" if unit else self.key
 
     def label(self, design: SeriesDesign) -> str:
-        """What one design is called beside the others."""
+        """Tells what one design is called beside the others."""
         value = self.axis[0][self.designs.index(design)]
         return f"R = {value:g}s" if self.key == RADIUS else f"{self.key} = {design.word}"
 
 
 def load(path: Path, preset: str | None, results: Path) -> DesignSeries:
-    """All designs with their datasets.
+    """Returns all designs with their datasets.
 
     Raises:
         UserError: the problem asks for one design only, or not for numbers to tell them by, or a
@@ -102,9 +102,7 @@ def load(path: Path, preset: str | None, results: Path) -> DesignSeries:
     """
     asked = problem.load(path, preset)
     if asked.designs is None:
-        remedy = (
-            "list the values of a parameter below `designs`, or use reports.figures.study_report"
-        )
+        remedy = "list the values of a parameter below `designs`, or make the report of a study"
         raise UserError("the problem asks for one design", file=path, key="designs", remedy=remedy)
     ((key, words),) = asked.designs.items()
     if any(split_value(word) is None for word in words):

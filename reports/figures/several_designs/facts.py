@@ -1,4 +1,4 @@
-"""Numbers of several designs: how well each shields the boundary, and how that goes on."""
+"""States numbers of several designs: how well each shields the boundary, and how that goes on."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from reports.study import from_dataset
 
 
 def design_series_facts(family: DesignSeries) -> list[Fact]:
-    """All facts: the setting, the trend, and each design."""
+    """Returns all facts: the setting, the trend, and each design."""
     return [
         *grouped("Setting", _setting(family)),
         *grouped("Trend", _trend(family)),

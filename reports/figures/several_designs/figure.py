@@ -1,4 +1,4 @@
-"""How well each design shields, and the designs themselves, at a journal's two-column width."""
+"""Composes the figure of several designs: how well each shields, and the designs."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from reports.base import style
-from reports.figures.several_designs.designs import DesignSeries, SeriesDesign
-from reports.panels import draw, draw_clamps, outline
-from reports.study import draft, from_dataset
+from reports.figures.several_designs.designs import RADIUS, DesignSeries, SeriesDesign
+from reports.panels import Panel, PanelFigure, draw, draw_clamps, outline
+from reports.study import from_dataset
 
 PER_ROW = 3
 """Panels in a row; the first is the curve."""
@@ -20,29 +20,43 @@ PER_ROW = 3
 LEFT, BAR, GAP, HEAD = 2.0, 16.0, 2.0, 11.0
 
 
-def draw_design_series(family: DesignSeries) -> Figure:
-    """The whole figure: curve and altered structure, then the designs, coloured alike."""
+def design_series_figure(family: DesignSeries) -> PanelFigure:
+    """Returns the figure: curve and altered structure, then the designs, coloured alike."""
     side = (style.TWO_COLUMNS - LEFT - BAR) / PER_ROW - GAP
+    rows = -(-(2 + len(family.designs)) // PER_ROW)
+    over = "the size of the cloak" if family.key == RADIUS else family.key
+    panels = [
+        Panel(
+            ("a", "Shielding of the boundary", 0.0, 0.8),
+            lambda figure: _curve(style.place(figure, 13.0, HEAD, side - 9.0, side - 12.0), family),
+            f"Largest |U| of a unit of the outer rows and columns against {over}: altered "
+            "(dashed) and cloaked structures, mean over the load angles of the greatest in time.",
+        ),
+        Panel(
+            ("b", "Peak displacement", side + GAP, 0.8),
+            lambda figure: _structures(figure, family, side, rows),
+            "Altered and cloaked structures, coloured by the largest |U| of each unit in time, "
+            "mean over the load angles; |U| counts displacements in spacings, rotations in "
+            "radians. Dashed circles bound the cloaks, hatched pads clamp the corners.",
+        ),
+    ]
+    draft = [reason for design in family.designs for reason in design.study.draft]
+    return PanelFigure(rows * (side + HEAD), panels, draft)
+
+
+def _structures(figure: Figure, family: DesignSeries, side: float, rows: int) -> None:
     shown = [(family.designs[0], "altered"), *((each, "cloaked") for each in family.designs)]
-    rows = -(-(1 + len(shown)) // PER_ROW)
-    figure = style.page(rows * (side + HEAD))
     norm = Normalize(0.0, _limit(family))
-    style.letter(figure, 0.0, 0.8, "a", "Shielding of the boundary")
-    _curve(style.place(figure, 13.0, HEAD, side - 9.0, side - 12.0), family)
-    style.letter(figure, side + GAP, 0.8, "b", "Peak displacement")
     for k, (design, name) in enumerate(shown, start=1):
         left = LEFT + (k % PER_ROW) * (side + GAP)
         top = HEAD + (k // PER_ROW) * (side + HEAD)
         axes = style.place(figure, left, top, side, side)
         _structure(axes, family, design, name, norm)
     _bar(figure, norm, LEFT + PER_ROW * (side + GAP), HEAD, rows * (side + HEAD) - HEAD)
-    if any(design.study.draft for design in family.designs):
-        draft.mark(figure)
-    return figure
 
 
 def _limit(family: DesignSeries) -> float:
-    """Largest peak outside the cloaks, rounded up: one range of colours for all."""
+    """Returns largest peak outside the cloaks, rounded up: one range of colours for all."""
     largest = 0.0
     for design in family.designs:
         outside = design.study.response["roi"].values.astype(bool)

@@ -1,7 +1,5 @@
-from . import content as content
 from . import facts as facts
 from . import figure as figure
-from . import tables as tables
 from .facts import MONITORED as MONITORED
 from .facts import monitored as monitored
 from .facts import monitored_recordings as monitored_recordings

@@ -1,4 +1,4 @@
-"""Panels of Figure 2 that show curves: loss (b), motion of one unit (d), robustness map (e)."""
+"""Draws panels of Figure 2: loss (b), motion of one unit (d), robustness map (e)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sim.core import Floats
 
 
 def loss_panel(axes: Axes, design: xr.Dataset, quoted: bool) -> None:
-    """Panel (b): the histories, with the paper's reduction where the study is the paper's."""
+    """Draws panel (b): the histories, with the paper's reduction where the study is the paper's."""
     loss_history(axes, design)
     if quoted:
         _paper_line(axes, design)
@@ -50,7 +50,7 @@ def motion_panel(
     rows: list[SnapshotRow],
     recordings: Sequence[RecordedMotion],
 ) -> None:
-    """Panel (d): u_y of the middle unit of the top edge; peak-to-peak values and reduction."""
+    """Draws panel (d): u_y of the middle unit of the top edge, peak-to-peak, reduction."""
     series = monitored(scene, response)
     time = series["time"].values
     span = measures.peak_to_peak(series, float(time[-1]))
@@ -97,7 +97,7 @@ def motion_panel(
 
 
 def _measured(axes: Axes, recording: RecordedMotion, unit: int) -> None:
-    """Measured u_y of a unit and the prediction band behind it."""
+    """Draws measured u_y of a unit and the prediction band behind it."""
     colour = style.STRUCTURE_COLOURS[recording.structure]
     motion = recording.data.isel(unit=unit).sel(dof="uy")
     low, high, curve = (
@@ -108,7 +108,7 @@ def _measured(axes: Axes, recording: RecordedMotion, unit: int) -> None:
 
 
 def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) -> None:
-    """Bar from the lowest to the highest value of a curve, with its length."""
+    """Draws bar from the lowest to the highest value of a curve, with its length."""
     low, high = float(curve.min()), float(curve.max())
     caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (at, high), (at, low), arrowprops=caps | {"color": colour, "lw": 0.8})
@@ -125,7 +125,7 @@ def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) 
 
 
 def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: xr.Dataset) -> None:
-    """Panel (e): loss over loading angle and frequency, stars at the loads designed for."""
+    """Draws panel (e): loss over loading angle and frequency, stars at the loads designed for."""
     loss = sweep["loss"].transpose("frequency", "direction")
     angle, rate = sweep["direction"].values, sweep["frequency"].values
     top = float(loss.max())

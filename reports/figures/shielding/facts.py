@@ -1,4 +1,4 @@
-"""The numbers that the paper quotes on shielding dynamic excitations, beside ours, each computed.
+"""Computes the numbers that the paper quotes on shielding dynamic excitations.
 
 Paper: Bordiga et al., "Nonlinear mechanical metamaterial cloaks", section "Shielding dynamic
 excitations" and the caption of its Figure 2.
@@ -46,7 +46,7 @@ PAPER_REDUCTION = 0.7
 
 
 def shielding_facts(study: StudyResults) -> list[Fact]:
-    """All facts of Figure 2, under headings."""
+    """Returns all facts of Figure 2, under headings."""
     scene, design, response, sweep = (
         study.scene,
         study.design,
@@ -67,7 +67,7 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
 
 
 def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
-    """The problem as it was run."""
+    """Yields the problem as it was run."""
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     size = f"{scene.columns} × {scene.rows}"
     yield Fact("units", "Units", initial.n_units, "1", size, "15 × 15")
@@ -89,7 +89,7 @@ def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
 
 
 def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
-    """Reduction of |U| and the loss before and after."""
+    """Yields reduction of |U| and the loss before and after."""
     everything = float(response["time"][-1])
     for suffix, label, until, paper in (
         ("", "Mean |U| reduced by", scene.horizon, "≈ 70 %"),
@@ -112,12 +112,12 @@ def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
 
 
 def loss_fact(key: str, label: str, value: float, paper: str = ABSENT, note: str = "") -> Fact:
-    """Fact of a loss, to four decimals."""
+    """Returns fact of a loss, to four decimals."""
     return Fact(key, label, value, "1", f"{value:.4f}", paper, note)
 
 
 def mean_loss(scene: ReportScene, response: xr.Dataset, variable: str, structure: str) -> float:
-    """Mean loss of a structure over its load cases."""
+    """Returns mean loss of a structure over its load cases."""
     return float(scene.mean(response[variable].sel(structure=structure)))
 
 
@@ -127,7 +127,7 @@ def paper_loss(start: float) -> float:
 
 
 def history_facts(design: xr.Dataset) -> Iterator[Fact]:
-    """Evaluations and best feasible loss of every method."""
+    """Yields evaluations and best feasible loss of every method."""
     for method in design["method"].values:
         history = design.sel({"method": method})
         loss = history["loss"].values
@@ -147,7 +147,7 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
 
 
 def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
-    """Four-fold symmetry and porosity of the design."""
+    """Yields four-fold symmetry and porosity of the design."""
     structure = from_dataset(design, scene.spacing)
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     distances = measures.asymmetry(structure, scene.middle)
@@ -179,7 +179,7 @@ def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
 
 
 def motion_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
-    """Peak-to-peak u_y of the unit in the middle of the top edge."""
+    """Yields peak-to-peak u_y of the unit in the middle of the top edge."""
     series = monitored(scene, response)
     angle = float(series["direction"])
     yield number("monitored_angle", "Loading angle α of it", angle, "deg")
@@ -202,20 +202,20 @@ def motion_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
 
 
 def monitored(scene: ReportScene, response: xr.Dataset) -> xr.DataArray:
-    """Displacement u_y (structure, time) in mm of the middle unit of the top edge."""
+    """Returns displacement u_y (structure, time) in mm of the middle unit of the top edge."""
     unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
     case = measures.nearest_case(response, MONITORED)
     return response["displacement"].isel(case=case, unit=unit).sel(dof="uy")
 
 
 def monitored_recordings(study: StudyResults) -> list[RecordedMotion]:
-    """The recordings under the load at which the motion of one unit is shown."""
+    """Returns the recordings under the load at which the motion of one unit is shown."""
     case = measures.nearest_case(study.response, MONITORED)
     return [each for each in study.recordings if each.case == case]
 
 
 def recorded_facts(study: StudyResults) -> Iterator[Fact]:
-    """Peak-to-peak u_y of the same unit as it was measured."""
+    """Yields peak-to-peak u_y of the same unit as it was measured."""
     unit = middle_of_top_edge(from_dataset(study.response.isel(structure=0), study.scene.spacing))
     spans: dict[str, list[Floats]] = {}
     for each in monitored_recordings(study):
@@ -261,7 +261,7 @@ def map_facts(sweep: xr.Dataset) -> Iterator[Fact]:
 
 
 def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
-    """Margins of the constraints, geometry and estimated errors of the shipped design."""
+    """Yields margins of the constraints, geometry and estimated errors of the shipped design."""
     yield from checks.design_facts(design)
     cloaked = response.sel(structure="cloaked")
     motion = "cloaked, all load cases and times, by geometry"

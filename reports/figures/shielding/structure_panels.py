@@ -1,4 +1,4 @@
-"""Panels of Figure 2 that show structures: the problem (a) and the snapshots (c)."""
+"""Describes panels of Figure 2 that show structures: the problem (a) and the snapshots (c)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CLOAK_TINT, UNIT_TINT, CLAMP_TINT = "#c9b3e0", "#c3c7cc", "#4a4d52"
 
 @dataclass(frozen=True)
 class SnapshotRow:
-    """One row of snapshots: a structure at several times.
+    """Describes one row of snapshots: a structure at several times.
 
     displacement (n_times, n_units, 3) in mm, mm, rad; NaN for units without data. `time` in s.
     """
@@ -54,7 +54,7 @@ class SnapshotRow:
 def problem_panel(
     axes: Axes, scene: ReportScene, structure: RigidUnits, name: str, direction: float
 ) -> None:
-    """One structure of panel (a), "reference", "altered" or "cloaked", driven in `direction`."""
+    """Draws a structure of panel (a), "reference", "altered" or "cloaked", and the drive."""
     draw_clamps(axes, structure, scene.spacing)
     draw(axes, structure, colours=list(_colours(structure, name)))
     middle = np.array(scene.middle)
@@ -69,7 +69,7 @@ def problem_panel(
 
 
 def _direction(axes: Axes, scene: ReportScene, direction: float) -> None:
-    """The loading angle in degrees, between the x axis and the drive."""
+    """Draws the loading angle in degrees, between the x axis and the drive."""
     x, y = scene.middle
     halo: list[effects.AbstractPathEffect] = [effects.withStroke(linewidth=2.0, foreground="white")]
     radius = 0.2 * scene.columns * scene.spacing
@@ -98,7 +98,7 @@ def _colours(structure: RigidUnits, name: str) -> Iterator[str]:
 
 
 def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Floats:
-    """When the snapshots are, over the last whole drive cycle, s."""
+    """Tells when the snapshots are, over the last whole drive cycle, s."""
     end = response["time"].values[-1]
     start = (np.floor(end * scene.frequency * measures.LAST_SAMPLE) - 1.0) * scene.period
     wanted: Floats = start + np.array(PHASES) * scene.period
@@ -106,7 +106,7 @@ def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Floats:
 
 
 def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow]:
-    """Snapshots of the altered and the cloaked structure over the last whole drive cycle."""
+    """Finds snapshots of the altered and the cloaked structure over the last whole drive cycle."""
     case = measures.nearest_case(response, MONITORED)
     wanted, rows = snapshot_times(scene, response), []
     for name in ("altered", "cloaked"):
@@ -127,7 +127,7 @@ def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow
 def recorded_rows(
     scene: ReportScene, response: xr.Dataset, recordings: Sequence[RecordedMotion]
 ) -> list[SnapshotRow]:
-    """The recordings at the same times."""
+    """Returns the recordings at the same times."""
     wanted = snapshot_times(scene, response)
     return [
         SnapshotRow(
@@ -144,7 +144,7 @@ def recorded_rows(
 def snapshots_panel(
     figure: Figure, scene: ReportScene, rows: Sequence[SnapshotRow], top: float, height: float
 ) -> None:
-    """Panel (c): as many rows as there are, all at one scale, coloured by |U| with one bar."""
+    """Draws panel (c): all rows at one scale, coloured by |U| with one bar."""
     count = max(len(row.time) for row in rows)
     label, bar, gap = 9.0, 14.0, 1.2
     side = min((style.TWO_COLUMNS - label - bar) / count, height / len(rows))
@@ -174,7 +174,7 @@ def snapshots_panel(
 
 
 def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:
-    """Largest |U| outside the source, rounded up to a tenth."""
+    """Returns largest |U| outside the source, rounded up to a tenth."""
     sizes = [
         np.linalg.norm(row.displacement[:, row.structure.support != DRIVEN] / scene.scale, axis=-1)
         for row in rows

@@ -1,4 +1,4 @@
-"""A sweep over direction and frequency of the drive as a map."""
+"""Describes a sweep over direction and frequency of the drive as a map."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAPPED = {DIRECTIONS: "direction", "drive.frequency": "frequency"}
 
 
 def frequency_map(sweep: xr.Dataset) -> xr.Dataset:
-    """The results of a sweep over its two axes (direction in deg, frequency in Hz).
+    """Returns the results of a sweep over its two axes (direction in deg, frequency in Hz).
 
     Points are where both lists of values cross, whatever the order of the cases.
     """

@@ -1,4 +1,4 @@
-"""Which voids of a structure are closed to contact, and when."""
+"""Tells which voids of a structure are closed to contact, and when."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sim.core import Floats, Ints, Mask
 
 
 def smaller_angles(problem: Problem, part: xr.Dataset) -> Floats:
-    """The smaller void angle beside each ligament of a structure under one load case, rad.
+    """Returns the smaller void angle beside each ligament of a structure under one load case, rad.
 
     Returns:
         (n_times, n_ligaments) in the order of ``from_dataset``.
@@ -25,12 +25,12 @@ def smaller_angles(problem: Problem, part: xr.Dataset) -> Floats:
 
 
 def closed(problem: Problem, part: xr.Dataset) -> Mask:
-    """Whether a void beside each ligament (n_times, n_ligaments) is closed to the cutoff."""
+    """Tells whether a void beside each ligament (n_times, n_ligaments) is closed to the cutoff."""
     return np.asarray(smaller_angles(problem, part) < problem.contact.cutoff_angle)
 
 
 def rest_angles(structure: RigidUnits) -> Floats:
-    """The two void angles (n_ligaments, 2) beside every ligament at rest, rad."""
+    """Returns the two void angles (n_ligaments, 2) beside every ligament at rest, rad."""
     (a, b), (p, q) = structure.ligament_unit.T, structure.ligament_vertex.T
     one = _angle(_edge(structure, b, q, -1), _edge(structure, a, p, 1))
     other = _angle(_edge(structure, a, p, -1), _edge(structure, b, q, 1))
@@ -38,7 +38,7 @@ def rest_angles(structure: RigidUnits) -> Floats:
 
 
 def _edge(structure: RigidUnits, unit: Ints, vertex: Ints, way: int) -> Floats:
-    """Vectors (n, 2) from vertices to their neighbours, counter-clockwise if ``way`` is 1."""
+    """Finds vectors (n, 2) from vertices to their neighbours, counter-clockwise if ``way`` is 1."""
     corners = structure.vertices[unit]
     sides = np.isfinite(corners[..., 0]).sum(axis=1)
     each = np.arange(len(unit))
@@ -46,27 +46,27 @@ def _edge(structure: RigidUnits, unit: Ints, vertex: Ints, way: int) -> Floats:
 
 
 def _angle(start: Floats, end: Floats) -> Floats:
-    """Angle from one vector to another, between -90 and 270 degrees."""
+    """Returns angle from one vector to another, between -90 and 270 degrees."""
     cross = start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]
     angle = np.arctan2(cross, (start * end).sum(axis=1))
     return np.where(angle < -np.pi / 2, angle + 2 * np.pi, angle)
 
 
 def on_edges(structure: RigidUnits) -> Mask:
-    """Which ligaments (n_ligaments,) run along the top or the bottom edge."""
+    """Tells which ligaments (n_ligaments,) run along the top or the bottom edge."""
     height = structure.site[structure.ligament_unit, 1]
     ends = structure.site[:, 1].min(), structure.site[:, 1].max()
     return np.asarray(np.isin(height, ends).all(axis=1) & (np.ptp(height, axis=1) == 0.0))
 
 
 def middles(structure: RigidUnits, vertices: Floats) -> Floats:
-    """Middles (n_ligaments, 2) of the ligaments between vertices (n_units, n_vertices, 2), mm."""
+    """Finds the middles (n_ligaments, 2) of ligaments between vertices (n_units, n_vertices, 2)."""
     ends = vertices[structure.ligament_unit, structure.ligament_vertex]
     return np.asarray(ends.mean(axis=1))
 
 
 def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """The smaller void angle (structure, case, time, ligament) along the top and bottom edges."""
+    """Finds the smaller void angle (structure, case, time, ligament) along the edges."""
     whole = from_dataset(response.isel(structure=0), problem.lattice.spacing)
     n_edge = int(on_edges(whole).sum())
     angles = np.full(
@@ -83,7 +83,7 @@ def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
 
 
 def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """Number (structure, case, time) of closed voids along the top and bottom edges."""
+    """Returns number (structure, case, time) of closed voids along the top and bottom edges."""
     contacts: xr.DataArray = (along_edges(problem, response) < problem.contact.cutoff_angle).sum(
         "ligament"
     )

@@ -1,4 +1,4 @@
-"""The numbers of a report on waves, each computed from the datasets."""
+"""Describes the numbers of a report on waves, each computed from the datasets."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.problem.sections import RampHarmonicDrive
 from reports.facts import Fact, checks, grouped, number, share, within, worded
 from reports.figures.loading_path import (
-    course,
+    abscissa_of,
     display_name,
     loss_facts,
     measures,
@@ -25,8 +25,8 @@ from reports.study import StudyResults
 
 
 def wave_facts(study: StudyResults) -> list[Fact]:
-    """All facts, under headings."""
-    path = course(study.problem, study.response)
+    """Returns all facts, under headings."""
+    path = abscissa_of(study.problem, study.response)
     return [
         *grouped("Scene", (*scene_facts(study, path), *drive_facts(study))),
         *grouped("Result", error_facts(study)),
@@ -41,7 +41,7 @@ def wave_facts(study: StudyResults) -> list[Fact]:
 
 
 def drive_facts(study: StudyResults) -> Iterator[Fact]:
-    """How the drive is switched on."""
+    """Tells how the drive is switched on."""
     drive = study.problem.drive
     if isinstance(drive, RampHarmonicDrive):
         note = "A (1 + tanh((t − delay)/rise))/2 sin(2πf (t − delay))"
@@ -50,7 +50,7 @@ def drive_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def error_facts(study: StudyResults) -> Iterator[Fact]:
-    """Relative error over the whole history, and the largest mimicking error."""
+    """Yields relative error over the whole history, and the largest mimicking error."""
     error = over_cases(study.problem, relative_error(study.problem, study.response))
     most = over_cases(study.problem, measures.measure_of(study.problem).of(study.response))
     for name in ("altered", "cloaked"):
@@ -66,7 +66,7 @@ def error_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def sum_facts(study: StudyResults) -> Iterator[Fact]:
-    """The loss as the authors sum it."""
+    """Yields the loss as the authors sum it."""
     count = study.problem.horizon.samples
     loss = over_cases(study.problem, study.response["loss_samples"])
     for name in ("altered", "cloaked"):
@@ -77,7 +77,7 @@ def sum_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def place_facts(study: StudyResults) -> Iterator[Fact]:
-    """How far u_y is from that of the intact structure at the marked places."""
+    """Tells how far u_y is from that of the intact structure at the marked places."""
     rise = over_cases(study.problem, study.response["displacement"].sel(dof="uy"))
     for k, place in enumerate(places(study.problem, study.response)):
         curves = rise.isel(unit=place.unit)
@@ -95,7 +95,7 @@ def _largest(series: xr.DataArray) -> str:
 
 
 def edge_facts(study: StudyResults) -> Iterator[Fact]:
-    """Closed voids along the top and bottom edges."""
+    """Yields closed voids along the top and bottom edges."""
     counts = over_cases(study.problem, edge_contacts(study.problem, study.response))
     for name in structures(study.response):
         words = display_name(study.problem, name).lower()

@@ -1,20 +1,24 @@
-"""The figure of structures that waves run through, at a journal's two-column width."""
+"""Composes the figure of structures that waves run through: its panels and their tables."""
 
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from reports.base import style
+from reports.base import Table, style
+from reports.facts import Columns
 from reports.figures.loading_path import (
     TALLEST_SNAPSHOTS,
     SnapshotLayout,
     SnapshotStructure,
-    at_rest,
-    course,
+    abscissa_of,
+    by_structure,
+    design_panels,
     measure_panel,
     measures,
     path_axes,
@@ -24,8 +28,8 @@ from reports.figures.loading_path import (
 )
 from reports.figures.wave import closed_voids
 from reports.figures.wave.monitored_places import MonitoredUnit, first_structure, places
-from reports.panels import loss_history
-from reports.study import StudyResults, deformed, draft, from_dataset
+from reports.panels import Panel, PanelFigure, measured_overlay
+from reports.study import StudyResults, deformed, from_dataset
 
 CONTACT = "#e3342f"
 """Colour of marks: of contacts, and of places, as in the paper."""
@@ -33,43 +37,73 @@ ROOM = 8.5
 """Between the letter of a row and its panels, mm."""
 
 
-def draw_wave(study: StudyResults) -> Figure:
-    """The whole figure."""
-    path = course(study.problem, study.response)
+def wave_figure(study: StudyResults) -> PanelFigure:
+    """Returns the whole figure."""
+    path, half = abscissa_of(study.problem, study.response), style.TWO_COLUMNS / 2
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
     middle = top + ROOM + grid.lines * grid.side + 1.5
     low = middle + 44.0
-    figure = style.page(low + 46.0)
-    for axes in at_rest(figure, study, structures(study.response)):
-        _mark_places(axes, study)
-    style.letter(figure, 123.0, 0.8, "b", "Optimisation")
-    loss_history(style.place(figure, 133.5, ROOM, 43.5, 31.5), study.design)
-    style.letter(figure, 0.0, top, "c", "Response, true to scale; red dots: closed voids")
-    snapshots(figure, study, grid, top + ROOM, partial(_contacts, study))
-    _places(figure, study, middle)
-    _whole(figure, study, low)
-    if study.draft:
-        draft.mark(figure)
-    return figure
+    steps = study.verification
+    lattices = (
+        "The structures at rest: orange units are driven along the arrows, purple ones are "
+        "redesigned; red marks are the places of panel d."
+    )
+
+    def error(figure: Figure) -> None:
+        axes = style.place(figure, 11.0, low + ROOM, half - 14.0, 27.0)
+        measure_panel(axes, study, path, measures.measure_of(study.problem))
+
+    panels = [
+        *design_panels(study, r"Loss $J$", lattices, partial(_mark_places, study)),
+        Panel(
+            ("c", "Response, true to scale; red dots: closed voids", 0.0, top),
+            lambda figure: snapshots(figure, study, grid, top + ROOM, partial(_contacts, study)),
+            "Snapshots at true size, coloured by u<sub>y</sub>; red dots are ligaments beside "
+            "which a void is closed to contact.",
+        ),
+        Panel(
+            ("d", "Vertical displacement where marked in a", 0.0, middle),
+            lambda figure: _places(figure, study, middle + ROOM),
+            "Vertical displacement of the marked units.",
+            [Table("waves.csv", "every structure over time (panels d to f)", _over_time(study))],
+        ),
+        Panel(
+            ("e", "Mimicking error", 0.0, low),
+            error,
+            "Distance of the surroundings' motion to the intact one, over the largest size of "
+            "that in time.",
+        ),
+        Panel(
+            ("f", "Smallest void angle along the top and bottom edges", half, low),
+            lambda figure: _edges(
+                style.place(figure, half + 11.0, low + ROOM, half - 14.0, 27.0), study
+            ),
+            "Smallest void angle along the top and bottom edges; in the red band the units touch.",
+            [Table("steps.csv", "loss and error with shorter steps", _steps(steps))]
+            if steps is not None
+            else [],
+        ),
+    ]
+    remark = measured_overlay.caption(study.recordings)
+    return PanelFigure(low + 46.0, panels, study.draft, remark)
 
 
-def _mark_places(axes: Axes, study: StudyResults) -> None:
+def _mark_places(study: StudyResults, axes: Axes) -> None:
     sites = first_structure(study.problem, study.response).site
     for place in places(study.problem, study.response):
-        _mark(axes, place, *sites[place.unit])
+        x, y = sites[place.unit]
+        axes.plot(x, y, clip_on=False, zorder=9, **_mark(place, 3.6))
 
 
-def _mark(axes: Axes, place: MonitoredUnit, x: float, y: float) -> None:
-    size = 6.0 if isinstance(place.mark, tuple) else 3.6
-    axes.plot(
-        x, y, ls="", marker=place.mark, ms=size, mfc=CONTACT, mec="white", mew=0.5, zorder=9,
-        clip_on=False,
-    )  # fmt: skip
+def _mark(place: MonitoredUnit, size: float) -> dict[str, Any]:
+    """Returns arguments of a plot of the place's mark, `size` points wide; stars are larger."""
+    width = 6.0 if isinstance(place.mark, tuple) else size
+    return {"ls": "", "marker": place.mark, "ms": width, "mfc": CONTACT, "mec": "white", "mew": 0.5}
 
 
 def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: int) -> None:
-    """Dots on the ligaments beside which a void is closed."""
+    """Draws dots on the ligaments beside which a void is closed."""
     part = row.part.isel(case=0)
     structure = from_dataset(row.part, study.problem.lattice.spacing)
     frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
@@ -79,44 +113,66 @@ def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: i
 
 
 def _places(figure: Figure, study: StudyResults, top: float) -> None:
-    """u_y over time at each place, side by side."""
+    """Draws u_y over time at each place, side by side."""
     shown = places(study.problem, study.response)
-    path, rise = course(study.problem, study.response), study.response["displacement"].sel(dof="uy")
-    style.letter(figure, 0.0, top, "d", "Vertical displacement where marked in a")
-    whole = style.TWO_COLUMNS / max(len(shown), 1)
+    path, rise = (
+        abscissa_of(study.problem, study.response),
+        study.response["displacement"].sel(dof="uy"),
+    )
+    width = style.TWO_COLUMNS / max(len(shown), 1)
     for k, place in enumerate(shown):
-        axes = style.place(figure, k * whole + 11.0, top + ROOM, whole - 14.0, 25.0)
+        axes = style.place(figure, k * width + 11.0, top, width - 14.0, 25.0)
         path_axes(axes, path, "$u_y$ (mm)" if k == 0 else "")
         curves = rise.isel(unit=place.unit)
         structure_curves(axes, study.problem, path, curves, structures(study.response))
         reach = 1.25 * float(np.abs(curves).max())
         axes.set_ylim(-reach, reach)
-        size = 6.0 if isinstance(place.mark, tuple) else 4.0
-        axes.plot(
-            0.05, 0.9, ls="", marker=place.mark, ms=size, mfc=CONTACT, mec="white", mew=0.5,
-            transform=axes.transAxes,
-        )  # fmt: skip
+        axes.plot(0.05, 0.9, transform=axes.transAxes, **_mark(place, 4.0))
         if k == 0:
             axes.legend(loc="lower left", handlelength=1.2, borderaxespad=0.2)
 
 
-def _whole(figure: Figure, study: StudyResults, top: float) -> None:
-    """Mimicking error, and contacts on the edges, over time."""
-    path, half = course(study.problem, study.response), style.TWO_COLUMNS / 2
-    style.letter(figure, 0.0, top, "e", "Mimicking error")
-    error = style.place(figure, 11.0, top + ROOM, half - 14.0, 27.0)
-    measure_panel(error, study, path, measures.measure_of(study.problem))
-    style.letter(figure, half, top, "f", "Smallest void angle along the top and bottom edges")
-    edges = style.place(figure, half + 11.0, top + ROOM, half - 14.0, 27.0)
-    path_axes(edges, path, "angle (°)")
+def _edges(axes: Axes, study: StudyResults) -> None:
+    """Draws smallest void angle on the edges over time, and when that is contact."""
+    path_axes(axes, abscissa_of(study.problem, study.response), "angle (°)")
     angles = 180.0 / np.pi * closed_voids.along_edges(study.problem, study.response).min("ligament")
-    structure_curves(edges, study.problem, path, angles, structures(study.response))
-    cutoff, barrier = np.degrees(
-        [study.problem.contact.cutoff_angle, study.problem.contact.barrier_angle]
-    )
-    edges.axhspan(barrier, cutoff, color=CONTACT, alpha=0.18, lw=0, zorder=1)
-    edges.set_ylim(barrier - 4.0, 1.1 * float(angles.max()))
-    edges.text(
-        0.01, barrier + 0.5 * (cutoff - barrier), "contact", color=CONTACT, fontsize=style.SMALL,
-        va="center", transform=edges.get_yaxis_transform(),
+    structure_curves(
+        axes, study.problem, abscissa_of(study.problem, study.response), angles,
+        structures(study.response),
     )  # fmt: skip
+    contact = study.problem.contact
+    cutoff, barrier = np.degrees([contact.cutoff_angle, contact.barrier_angle])
+    axes.axhspan(barrier, cutoff, color=CONTACT, alpha=0.18, lw=0, zorder=1)
+    axes.set_ylim(barrier - 4.0, 1.1 * float(angles.max()))
+    axes.text(
+        0.01, barrier + 0.5 * (cutoff - barrier), "contact", color=CONTACT, fontsize=style.SMALL,
+        va="center", transform=axes.get_yaxis_transform(),
+    )  # fmt: skip
+
+
+def _over_time(study: StudyResults) -> Columns:
+    """Returns one row a sample: u_y where marked, mimicking error, void angles, energies."""
+    problem, response = study.problem, study.response
+    rise = response["displacement"].sel(dof="uy")
+    series = {
+        f"uy_{k + 1}_mm": rise.isel(unit=place.unit)
+        for k, place in enumerate(places(problem, response))
+    }
+    series |= {
+        "mimicking_error": measures.measure_of(problem).of(response),
+        "edge_void_angle_rad": closed_voids.along_edges(problem, response).min("ligament"),
+        "strain_energy_Nmm": response["strain_energy"],
+        "contact_energy_Nmm": response["contact_energy"],
+        "min_void_angle_rad": response["min_void_angle"],
+    }
+    return {"time_s": response["time"].values} | by_structure(study, series)
+
+
+def _steps(verification: xr.Dataset) -> Columns:
+    """Returns one row a check and structure."""
+    checks, names = verification["check"].values, verification["structure"].values
+    check, structure = np.meshgrid(checks, names, indexing="ij")
+    columns: Columns = {"check": check.ravel(), "structure": structure.ravel()}
+    for field in ("time_step", "loss", "error", "departure", "min_void_angle", "gap", "overlaps"):
+        columns[field] = verification[field].values.ravel()
+    return columns

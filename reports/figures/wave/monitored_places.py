@@ -1,4 +1,4 @@
-"""How a wave goes on in each structure: at some places, and against the intact one."""
+"""Tells how a wave goes on in each structure: at some places, and against the intact one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MARKS: tuple[Mark, ...] = ("o", "D", (4, 1, 0))
 
 @dataclass(frozen=True)
 class MonitoredUnit:
-    """A unit whose motion is shown over time, with its mark."""
+    """Describes a unit whose motion is shown over time, with its mark."""
 
     unit: int
     mark: Mark
@@ -27,7 +27,7 @@ class MonitoredUnit:
 
 
 def places(problem: Problem, response: xr.Dataset) -> list[MonitoredUnit]:
-    """The places that the problem names."""
+    """Returns the places that the problem names."""
     structure = first_structure(problem, response)
     found = []
     for mark, point in zip(MARKS, problem.report.places, strict=False):
@@ -38,12 +38,12 @@ def places(problem: Problem, response: xr.Dataset) -> list[MonitoredUnit]:
 
 
 def first_structure(problem: Problem, response: xr.Dataset) -> RigidUnits:
-    """The intact structure."""
+    """Returns the intact structure."""
     return from_dataset(response.sel(structure="intact"), problem.lattice.spacing)
 
 
 def relative_error(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """Relative L2 error (structure, case) of the surroundings' motion over the whole history."""
+    """Finds the relative L2 error (structure, case) of the surroundings over the whole history."""
     inside, scale = interest(response), scales(problem)
     intact = inside.sel(structure="intact")
     missed = squares(inside - intact, scale).sum("unit").integrate("time")

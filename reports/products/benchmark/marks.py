@@ -1,4 +1,4 @@
-"""How a method is drawn, the same on every picture."""
+"""Tells how a method is drawn, the same on every picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DIFFRAX, SCIPY, NEWTON = "#2f86b4", "#8a5a2b", "#a3304a"
 
 
 class Mark(NamedTuple):
-    """Colour and marker; open markers for a second way to solve the same equations."""
+    """Describes colour and marker; open markers for a second way to solve the same equations."""
 
     colour: str
     marker: str
@@ -44,12 +44,12 @@ MARKS = {
 
 
 def mark(method: str) -> Mark:
-    """The mark of a method; grey crosses for one that has none of its own."""
+    """Returns the mark of a method; grey crosses for one that has none of its own."""
     return MARKS.get(method, Mark(style.GREY, "x"))
 
 
 def handles(methods: Iterable[str]) -> list[Line2D]:
-    """Entries of a legend."""
+    """Returns entries of a legend."""
     return [
         Line2D([], [], label=method, linewidth=0.8, markersize=3.5, **drawn(method))
         for method in methods
@@ -57,10 +57,6 @@ def handles(methods: Iterable[str]) -> list[Line2D]:
 
 
 def drawn(method: str) -> dict[str, Any]:
-    """Arguments of a line of that method."""
+    """Returns arguments of a line of that method."""
     colour, marker, filled = mark(method)
-    return {
-        "color": colour,
-        "marker": marker,
-        "markerfacecolor": colour if filled else "white",
-    }
+    return {"color": colour, "marker": marker, "markerfacecolor": colour if filled else "white"}

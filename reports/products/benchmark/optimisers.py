@@ -32,7 +32,7 @@ _HIGH, _ROW = 36.0, 52.0
 
 
 def draw_optimisers(scenes: Mapping[str, xr.Dataset]) -> Figure:
-    """A row a scene, and the profile over all."""
+    """Draws a row a scene, and the profile over all."""
     figure = style.page(len(scenes) * _ROW + 62.0)
     for row, (name, data) in enumerate(scenes.items()):
         for column, (along, what, label) in enumerate(_AXES):
@@ -67,7 +67,7 @@ def _courses(axes: Axes, data: xr.Dataset, along: str, what: str) -> None:
 
 
 def costs(scenes: Mapping[str, xr.Dataset]) -> dict[str, list[float]]:
-    """Evaluations that each optimiser needs for every scene and level; infinite if never."""
+    """Finds evaluations that each optimiser needs for every scene and level; infinite if never."""
     found: dict[str, list[float]] = {}
     for data in scenes.values():
         best = data["best_loss"]
@@ -81,7 +81,7 @@ def costs(scenes: Mapping[str, xr.Dataset]) -> dict[str, list[float]]:
 
 
 def _profile(axes: Axes, scenes: Mapping[str, xr.Dataset]) -> None:
-    """Share of the problems solved within so many times the evaluations of the fastest."""
+    """Draws share of the problems solved within so many times the evaluations of the fastest."""
     found = costs(scenes)
     fastest = np.min(list(found.values()), axis=0)
     most = 32.0

@@ -1,4 +1,4 @@
-"""Points of a benchmark in rows: for the page and as CSV."""
+"""Describes points of a benchmark in rows: for the page and as CSV."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from reports.base import Table
 
 
 class Failure(NamedTuple):
-    """A point without figures."""
+    """Describes a point without figures."""
 
     method: str
     setting: str
@@ -21,7 +21,7 @@ class Failure(NamedTuple):
 
 
 def table(name: str, data: xr.Dataset) -> Table:
-    """Every point of a benchmark, or every optimiser of a contest."""
+    """Returns every point of a benchmark, or every optimiser of a contest."""
     if "optimiser" in data.dims:
         return _contest(name, data)
     if "video" in data.dims:
@@ -64,7 +64,7 @@ def _contest(name: str, data: xr.Dataset) -> Table:
 
 
 def _points(name: str, data: xr.Dataset) -> Table:
-    """Times, spread, errors and work."""
+    """Returns times, spread, errors and work."""
     times = data["cpu_time"].values
     known = np.isfinite(times).any(axis=1)
     figures = np.full((4, len(times)), np.nan)
@@ -91,7 +91,7 @@ def _points(name: str, data: xr.Dataset) -> Table:
 
 
 def rows(of: Table) -> Iterator[list[str]]:
-    """Its rows for the page, figures to three digits."""
+    """Yields its rows for the page, figures to three digits."""
     for row in zip(*of.columns.values(), strict=True):
         yield [_cell(value) for value in row]
 
@@ -103,7 +103,7 @@ def _cell(value: object) -> str:
 
 
 def failures(data: xr.Dataset) -> list[Failure]:
-    """The points (or optimisers) that have no figures, with the reason."""
+    """Returns the points (or optimisers) that have no figures, with the reason."""
     if "outcome" not in data:
         return []
     (dim,) = data["outcome"].dims

@@ -1,4 +1,4 @@
-"""Pictures of written files: sheets from DXF, plates from 3MF, the whole specimen from STL."""
+"""Draws written files: sheets from DXF, plates from 3MF, the specimen from STL."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BED_HEIGHT = 1.0  # mm
 
 
 def sheet(path: Path) -> bytes:
-    """PNG of a drawing: parts filled, layers in their colours."""
+    """Returns PNG of a drawing: parts filled, layers in their colours."""
     drawing = read_drawing(path)
     points = np.concatenate([curve.points for curve in drawing.curves])
     low, high = points.min(axis=0) - _RIM, points.max(axis=0) + _RIM
@@ -50,7 +50,7 @@ def sheet(path: Path) -> bytes:
 
 
 def _draw(axes: Axes, layer: str, curves: list[Curve]) -> None:
-    """One layer; outer cuts are filled, holes are white."""
+    """Draws one layer; outer cuts are filled, holes are white."""
     closed = [curve.points for curve in curves if curve.closed]
     fill = {"CUT_OUTER": PALE, "CUT_INNER": "white"}.get(layer, "none")
     order = list(PENS).index(layer) if layer != "CUT_OUTER" else 0.5
@@ -66,14 +66,14 @@ def _draw(axes: Axes, layer: str, curves: list[Curve]) -> None:
 
 
 def plate(path: Path, bed: tuple[float, float], colour: str) -> bytes:
-    """PNG of a printer's plate on its bed."""
+    """Returns PNG of a printer's plate on its bed."""
     solids = read_3mf(path)
     board = _board(bed)
     return _png(picture([board, *(_body(solid, colour) for solid in solids)], WIDTH))
 
 
 def assembled(path: Path, colour: str) -> bytes:
-    """PNG of the whole specimen."""
+    """Returns PNG of the whole specimen."""
     return _png(picture([_body(read_stl(path), colour)], WIDTH))
 
 
@@ -82,7 +82,7 @@ def _body(solid: MeshBody, colour: str) -> Body:
 
 
 def _board(bed: tuple[float, float]) -> Body:
-    """The bed as a thin board below the parts."""
+    """Returns the bed as a thin board below the parts."""
     width, depth = bed
     corners = np.array([[0.0, 0.0], [width, 0.0], [width, depth], [0.0, depth]])
     top = np.column_stack([corners, np.full(4, -0.01)])
@@ -98,7 +98,7 @@ def _png(pixels: np.ndarray) -> bytes:
 
 
 def _small(image: Image.Image) -> bytes:
-    """A PNG with a palette of its own: a third of the bytes, and no difference to see."""
+    """Returns a PNG with a palette of its own: a third of the bytes, and no difference to see."""
     stream = io.BytesIO()
     image.convert("RGB").quantize(96, dither=Image.Dither.NONE).save(stream, format="PNG")
     return stream.getvalue()

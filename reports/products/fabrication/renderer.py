@@ -28,7 +28,7 @@ _RIM = 12  # pixels around the picture
 
 @dataclass(frozen=True)
 class Body:
-    """Triangles (m, 3) of vertices (n, 3) in mm, in one colour."""
+    """Describes triangles (m, 3) of vertices (n, 3) in mm, in one colour."""
 
     vertices: Floats
     triangles: Integers
@@ -37,7 +37,7 @@ class Body:
 
 @dataclass(frozen=True)
 class View:
-    """Right, up and towards the eye, as rows of a rotation; pixels per mm; pixel of the origin."""
+    """Holds right, up and towards the eye, as rows of a rotation; pixels per mm; the origin."""
 
     axes: Floats
     scale: float
@@ -45,7 +45,7 @@ class View:
 
 
 def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Image:
-    """Image (height, width, 3) of bodies on white.
+    """Returns image (height, width, 3) of bodies on white.
 
     Args:
         bodies: what is seen.
@@ -66,7 +66,7 @@ def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Ima
 
 
 def _axes(azimuth: float, elevation: float) -> Floats:
-    """Unit vectors to the right, upwards and to the eye."""
+    """Returns unit vectors to the right, upwards and to the eye."""
     a, e = np.radians([azimuth, elevation])
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -74,7 +74,7 @@ def _axes(azimuth: float, elevation: float) -> Floats:
 
 
 def _fitted(bodies: list[Body], axes: Floats, width: int) -> tuple[View, tuple[int, int]]:
-    """The view that fills an image of this width, and the image's rows and columns."""
+    """Returns the view that fills an image of this width, and the image's rows and columns."""
     seen = np.concatenate([body.vertices for body in bodies]) @ axes[:2].T
     low, high = seen.min(axis=0), seen.max(axis=0)
     rim = _RIM * _SAMPLES
@@ -85,7 +85,7 @@ def _fitted(bodies: list[Body], axes: Floats, width: int) -> tuple[View, tuple[i
 
 
 def _draw(body: Body, view: View, depth: Floats, face: Integers, drawn: int) -> Floats:
-    """Put a body's visible triangles into the buffers, counted from `drawn`; their normals."""
+    """Puts a body's visible triangles into the buffers, counted from `drawn`; their normals."""
     corners = body.vertices[body.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(across, axis=1)
@@ -107,7 +107,7 @@ def _draw(body: Body, view: View, depth: Floats, face: Integers, drawn: int) -> 
 def _covered(
     at: Floats, away: Floats, shape: tuple[int, ...]
 ) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
-    """Triangle, row, column and depth of every pixel inside of a triangle, in chunks."""
+    """Yields triangle, row, column and depth of every pixel inside of a triangle, in chunks."""
     low = np.floor(at.min(axis=1)).astype(np.int64)
     size = np.ceil(at.max(axis=1)).astype(np.int64) - low + 1
     ends = np.cumsum(size.prod(axis=1))
@@ -134,7 +134,7 @@ def _inside(
     column: Integers,
     shape: tuple[int, ...],
 ) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
-    """Those pixels whose middle lies in their triangle, with y turned down."""
+    """Yields those pixels whose middle lies in their triangle, with y turned down."""
     a, b, c = (at[which, k] for k in range(3))
     point = np.stack([column, row], axis=1) + 0.5
     area = _cross(b - a, c - a)
@@ -155,7 +155,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _shaded(depth: Floats, face: Integers, normals: Floats, colours: Floats) -> Floats:
-    """Colours in the light, darker at edges."""
+    """Returns colours in the light, darker at edges."""
     light = _LIGHT / np.linalg.norm(_LIGHT)
     bright = _AMBIENT + (1.0 - _AMBIENT) * np.clip(normals @ light, 0.0, 1.0)
     lit = np.vstack([colours * bright[:, None], np.ones((1, 3))]).astype(np.float32)
@@ -165,7 +165,7 @@ def _shaded(depth: Floats, face: Integers, normals: Floats, colours: Floats) -> 
 
 
 def _edges(depth: Floats, face: Integers, normals: Floats) -> NDArray[np.bool_]:
-    """Pixels of a body next to a jump in depth or a bend of the surface."""
+    """Returns pixels of a body next to a jump in depth or a bend of the surface."""
     facing = np.vstack([normals, np.zeros((1, 3))]).astype(np.float32)[face]
     flat = np.where(face >= 0, depth, np.float32(-1e3))
     edge = np.zeros(depth.shape, dtype=bool)
@@ -176,7 +176,7 @@ def _edges(depth: Floats, face: Integers, normals: Floats) -> NDArray[np.bool_]:
 
 
 def _reduced(fine: Floats) -> Image:
-    """The mean of the samples of each pixel, as bytes."""
+    """Returns the mean of the samples of each pixel, as bytes."""
     rows, columns = fine.shape[0] // _SAMPLES, fine.shape[1] // _SAMPLES
     blocks = fine.reshape(rows, _SAMPLES, columns, _SAMPLES, 3)
     return np.round(255.0 * blocks.mean(axis=(1, 3))).astype(np.uint8)

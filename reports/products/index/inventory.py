@@ -1,4 +1,4 @@
-"""What has been built below a folder of results: reports with their datasets, packages, recordings.
+"""Lists what has been built below a folder of results: reports, datasets, packages.
 
 Only what is there counts; nothing of the problems is read, so the index is of these very files.
 """
@@ -23,7 +23,7 @@ FIGURE = re.compile(r"fig\d+")
 
 @dataclass(frozen=True)
 class Link:
-    """A file, as seen from the folder of results; `note` tells more of it."""
+    """Describes a file, as seen from the folder of results; `note` tells more of it."""
 
     address: str
     text: str
@@ -32,7 +32,7 @@ class Link:
 
 @dataclass(frozen=True)
 class BuiltDataset:
-    """Where a dataset is from: its file's hash, and what it says of itself."""
+    """Tells where a dataset is from: its file's hash, and what it says of itself."""
 
     address: str
     sha256: str
@@ -42,7 +42,7 @@ class BuiltDataset:
 
 @dataclass(frozen=True)
 class BuiltReport:
-    """One report, with what lies around it."""
+    """Describes one report, with what lies around it."""
 
     name: str
     title: str
@@ -55,19 +55,19 @@ class BuiltReport:
 
     @property
     def figure(self) -> bool:
-        """Whether it is a figure of the paper, and not a variant or another study."""
+        """Tells whether it is a figure of the paper, and not a variant or another study."""
         return FIGURE.fullmatch(self.name) is not None
 
 
 def reports(results: Path) -> list[BuiltReport]:
-    """All reports in `results`: the paper's figures first, then others, by name."""
+    """Returns all reports in `results`: the paper's figures first, then others, by name."""
     pages = sorted(results.glob("*/report/index.html"))
     found = [_built(page, results) for page in pages]
     return sorted(found, key=lambda built: (not built.figure, built.draft, built.name))
 
 
 def others(results: Path, folder: str, pattern: str) -> list[Link]:
-    """Files of a folder of results, by name."""
+    """Returns files of a folder of results, by name."""
     paths = sorted((results / folder).glob(pattern))
     return [Link(_seen(path, results), path.name) for path in paths]
 
@@ -95,14 +95,14 @@ def _built(page: Path, results: Path) -> BuiltReport:
 
 
 def _datasets(page: Path, text: str) -> list[Path]:
-    """The datasets that a page links to, as far as they are there."""
+    """Returns the datasets that a page links to, as far as they are there."""
     addresses = re.findall(r'href="([^":]*\.nc)"', text)
     files = (Path(os.path.normpath(page.parent / address)) for address in addresses)
     return [file for file in files if file.is_file()]
 
 
 def _around(folder: Path, results: Path) -> list[Link]:
-    """What is built of a study, and its recordings: their quality, and whether they were filmed."""
+    """Lists what is built of a study, and its recordings, with whether they were filmed."""
     package = folder / "fabrication/index.html"
     found = [Link(_seen(package, results), "fabrication files")] if package.is_file() else []
     for page in sorted(folder.glob("recordings/*/index.html")):

@@ -1,4 +1,4 @@
-"""The frames of a movie: every structure true to scale, coloured by what its figure shows."""
+"""Draws the frames of a movie: every structure true to scale, coloured by what its figure shows."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _CLOCK = (260, 40)
 
 
 def images(reel: Animation, title: str, note: str) -> Iterator[Image]:
-    """The frames (rows, columns, 3), at the first of the reel's speeds.
+    """Yields the frames (rows, columns, 3), at the first of the reel's speeds.
 
     Args:
         reel: what plays.
@@ -59,7 +59,7 @@ def images(reel: Animation, title: str, note: str) -> Iterator[Image]:
 
 
 def instants(reel: Animation) -> Floats:
-    """Where along the axis the frames are."""
+    """Tells where along the axis the frames are."""
     first, last = float(reel.axis.values[0]), float(reel.axis.values[-1])
     seconds = (last - first) / next(iter(reel.axis.speeds.values()))
     return np.linspace(first, last, max(2, round(seconds * RATE)))
@@ -105,7 +105,7 @@ def _units(
 
 
 def _motion(cell: MovieCell, samples: Floats, at: float) -> Floats:
-    """Displacement (n_units, 3) between two samples; NaN where it is not known."""
+    """Returns displacement (n_units, 3) between two samples; NaN where it is not known."""
     motion = cell.clip.motion[cell.case]
     place = float(np.interp(at, samples, np.arange(len(samples))))
     low = min(int(place), len(samples) - 2)
@@ -114,7 +114,7 @@ def _motion(cell: MovieCell, samples: Floats, at: float) -> Floats:
 
 
 def _colours(field: ColourField, motion: Floats) -> NDArray[np.uint8]:
-    """Colours (n_units, 3); white where nothing is known."""
+    """Returns colours (n_units, 3); white where nothing is known."""
     low, high = field.limits
     values = scalar(field, motion)
     rgba = COLOUR_MAPS[field.colours](np.clip((values - low) / (high - low), 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""Where everything stands in the frames of a movie, and what does not move in them."""
+"""Tells where everything stands in the frames of a movie, and what does not move in them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_COLUMNS = 4
 
 
 class MovieCell(NamedTuple):
-    """One structure under one load case, at `row` and `column`."""
+    """Describes one structure under one load case, at `row` and `column`."""
 
     clip: AnimationClip
     case: int
@@ -36,7 +36,7 @@ class MovieCell(NamedTuple):
 
 @dataclass(frozen=True)
 class MovieLayout:
-    """The cells, and how millimetres become pixels in them.
+    """Describes the cells, and how millimetres become pixels in them.
 
     Attributes:
         cells: what moves.
@@ -55,14 +55,14 @@ class MovieLayout:
     above: float
 
     def origin(self, cell: MovieCell) -> NDArray[np.float64]:
-        """Where a cell's corner lies in the frame (x, y), pixels."""
+        """Tells where a cell's corner lies in the frame (x, y), pixels."""
         return np.array(
             [SIDE + cell.column * self.pixels[0], TOP + cell.row * self.pixels[1]], dtype=float
         )
 
 
 def layout(reel: Animation) -> MovieLayout:
-    """Load cases in columns and structures in rows; of a single case, structures side by side."""
+    """Places load cases in columns and structures in rows; of a single case, side by side."""
     several = len(reel.cases) > 1
     columns = len(reel.cases) if several else min(len(reel.clips), MOST_COLUMNS)
     cells = [
@@ -88,7 +88,7 @@ def _extent(clips: Sequence[AnimationClip]) -> tuple[NDArray[np.float64], NDArra
 
 
 def background(reel: Animation, placed: MovieLayout, title: str, note: str) -> Image:
-    """A frame (rows, columns, 3) with the words and the bar of colours.
+    """Returns a frame (rows, columns, 3) with the words and the bar of colours.
 
     Args:
         reel: what plays.
@@ -106,7 +106,7 @@ def background(reel: Animation, placed: MovieLayout, title: str, note: str) -> I
 
 
 def rendered(figure: Figure) -> Image:
-    """Pixels (rows, columns, 3) of a figure."""
+    """Returns pixels (rows, columns, 3) of a figure."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = canvas.buffer_rgba()  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""The cases of a sweep as a picture shows them: along axes of numbers or of words."""
+"""Describes the cases of a sweep as a picture shows them: along axes of numbers or of words."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sim.core import Floats
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """A parameter of a sweep.
+    """Describes a parameter of a sweep.
 
     Attributes:
         label: its keys and unit.
@@ -28,12 +28,12 @@ class SweepAxis:
 
     @property
     def distinct(self) -> Floats:
-        """Every value once, ascending."""
+        """Returns every value once, ascending."""
         return np.unique(self.places)
 
 
 def axes(data: xr.Dataset) -> list[SweepAxis]:
-    """The parameters of a sweep, in its order."""
+    """Returns the parameters of a sweep, in its order."""
     return [_axis(data.sel(parameter=key)) for key in data["parameter"].values]
 
 
@@ -47,29 +47,29 @@ def _axis(data: xr.Dataset) -> SweepAxis:
 
 
 def ordered(sweep: Sweep) -> bool:
-    """Whether the cases are points of a curve, one beside the other."""
+    """Tells whether the cases are points of a curve, one beside the other."""
     return sweep.random is None and len(sweep.keys) == 1
 
 
 def mapped(sweep: Sweep) -> bool:
-    """Whether the cases are the points of a map: all combinations of two parameters."""
+    """Tells whether the cases are the points of a map: all combinations of two parameters."""
     return sweep.grid is not None and len(sweep.keys) == 2
 
 
 def good(data: xr.Dataset) -> NDArray[np.bool_]:
-    """(case) whether a case has results."""
+    """Returns (case) whether a case has results."""
     return (data["status"] == "ok").values
 
 
 def ratio(data: xr.Dataset) -> Floats:
-    """(case) loss of the cloaked structure over that of the altered one; NaN for failed cases."""
+    """Divides (case) loss of the cloaked by that of the altered structure; NaN where failed."""
     with np.errstate(divide="ignore", invalid="ignore"):
         quotient: Floats = (data["loss"] / data["loss_altered"]).values
     return np.where(np.isfinite(quotient), quotient, np.nan)
 
 
 def failures(data: xr.Dataset) -> list[tuple[str, int]]:
-    """Why cases failed, and how many for each reason, the most frequent first."""
+    """Tells why cases failed, and how many for each reason, the most frequent first."""
     reasons, counts = np.unique(data["status"].values[~good(data)], return_counts=True)
     found = [(str(reason), int(count)) for reason, count in zip(reasons, counts, strict=True)]
     return sorted(found, key=lambda entry: -entry[1])

@@ -1,4 +1,4 @@
-"""The figure of a sweep: curves over one parameter, maps over two, points over more.
+"""Describes the figure of a sweep: curves over one parameter, maps over two, points over more.
 
 Points are drawn where the cases are not all combinations of two parameters, however many there are.
 """
@@ -28,7 +28,7 @@ _BINS, _FEWEST = 10, 200  # of medians; below so many cases there are none
 
 
 class SweepMeasure(NamedTuple):
-    """What is shown of every case: values (case) of one structure or of several, by colour."""
+    """Holds what is shown of every case: values (case) of structures, by colour."""
 
     title: str
     label: str
@@ -37,7 +37,7 @@ class SweepMeasure(NamedTuple):
 
 
 def measures(data: xr.Dataset) -> list[SweepMeasure]:
-    """What a sweep gathers, in the order of the panels."""
+    """Tells what a sweep gathers, in the order of the panels."""
     units = data["loss"].attrs["units"]
     loss = "Loss $J$" if units == "1" else f"Loss $J$ ({units})"
     both = {style.ALTERED: data["loss_altered"].values, style.CLOAKED: data["loss"].values}
@@ -55,7 +55,7 @@ def measures(data: xr.Dataset) -> list[SweepMeasure]:
 
 
 def draw_sweep(data: xr.Dataset, sweep: Sweep) -> Figure:
-    """The figure at two-column width.
+    """Draws the figure at two-column width.
 
     Args:
         data: the dataset of the sweep.
@@ -106,7 +106,7 @@ def _against(axes: Axes, axis: SweepAxis, measure: SweepMeasure, *, joined: bool
 
 
 def _is_wide(measure: SweepMeasure) -> bool:
-    """Whether a measure is positive and spans more than a factor of ten."""
+    """Tells whether a measure is positive and spans more than a factor of ten."""
     level = [] if measure.level is None else [measure.level]
     values = np.concatenate([*measure.values.values(), level])
     values = values[np.isfinite(values)]
@@ -114,7 +114,7 @@ def _is_wide(measure: SweepMeasure) -> bool:
 
 
 def _median(axes: Axes, places: Floats, values: Floats, colour: str) -> None:
-    """Medians of equally many cases each, along the axis."""
+    """Draws medians of equally many cases each, along the axis."""
     there = np.isfinite(values)
     if there.sum() < _FEWEST:
         return
@@ -126,7 +126,7 @@ def _median(axes: Axes, places: Floats, values: Floats, colour: str) -> None:
 
 
 def _mark_failures(axes: Axes, places: Floats) -> None:
-    """Crosses at the lower edge where cases failed."""
+    """Draws crosses at the lower edge where cases failed."""
     axes.plot(
         places, np.full(len(places), 0.02), "x", color=style.INTACT, markersize=3,
         markeredgewidth=0.7, transform=axes.get_xaxis_transform(), clip_on=False,
@@ -134,7 +134,7 @@ def _mark_failures(axes: Axes, places: Floats) -> None:
 
 
 def _name(axes: Axes, axis: SweepAxis, which: str) -> None:
-    """Labels an axis, with words in place of numbers where the values are words."""
+    """Draws labels an axis, with words in place of numbers where the values are words."""
     getattr(axes, f"set_{which}label")(axis.label)
     if axis.words:
         getattr(axes, f"set_{which}ticks")(range(len(axis.words)), axis.words)
@@ -172,7 +172,7 @@ def _maps(data: xr.Dataset, along: Sequence[SweepAxis], shown: Sequence[SweepMea
 
 
 def _on_grid(first: SweepAxis, second: SweepAxis, values: Floats) -> Floats:
-    """Values (second, first) of the cases at the crossings of two axes."""
+    """Returns values (second, first) of the cases at the crossings of two axes."""
     spread = np.full((len(second.distinct), len(first.distinct)), np.nan)
     rows, columns = (np.searchsorted(axis.distinct, axis.places) for axis in (second, first))
     spread[rows, columns] = values
@@ -180,7 +180,7 @@ def _on_grid(first: SweepAxis, second: SweepAxis, values: Floats) -> Floats:
 
 
 def _edges(values: Floats) -> Floats:
-    """Edges of cells about ascending values: halfway between neighbours."""
+    """Returns edges of cells about ascending values: halfway between neighbours."""
     if len(values) == 1:
         return values[0] + np.array([-0.5, 0.5])
     middle = (values[1:] + values[:-1]) / 2

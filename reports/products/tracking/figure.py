@@ -1,4 +1,4 @@
-"""The figure of a quality report: residuals and uncertainty over the specimen, and over time."""
+"""Draws the figure of a quality report: residuals and uncertainty, in space and time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SIZE, _TOP = 50.0, 9.0
 
 
 def draw_quality(track: xr.Dataset, found: TrackQuality, load_axis: str) -> Figure:
-    """Maps above, courses below: over time, or over the displacement of the driven units."""
+    """Draws maps above, courses below: over time, or over the displacement of the driven units."""
     drawn = style.page(132.0)
     if track.attrs["synthetic"] == "yes":
         drawn.text(0.99, 0.005, SYNTHETIC_LABEL, ha="right", va="bottom", color=style.ALTERED)
@@ -86,7 +86,7 @@ def _arrows(axes: Axes, specimen: SpecimenOutlines, residual: np.ndarray) -> Non
 
 
 def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:
-    """What the courses are drawn over (frames,), and its label."""
+    """Tells what the courses are drawn over (frames,), and its label."""
     if load_axis == "time":
         return track["time"].values, "time, s"
     moved = track["drive_displacement"].values

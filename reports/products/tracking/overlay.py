@@ -1,4 +1,4 @@
-"""The video with what was found in it: units coloured by their motion, ids, lost units hatched."""
+"""Draws on a video what was found: units coloured by their motion, ids, lost ones hatched."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Painter(NamedTuple):
 
 
 def painter(track: xr.Dataset, shown: str) -> Painter:
-    """The painter of a track.
+    """Returns the painter of a track.
 
     Args:
         track: the dataset.
@@ -90,7 +90,7 @@ def painter(track: xr.Dataset, shown: str) -> Painter:
 
 
 def of_track(track: xr.Dataset) -> SpecimenOutlines:
-    """The units of a track; who is joined to whom it does not say."""
+    """Returns the units of a track; who is joined to whom it does not say."""
     nobody = np.empty((0, 2), int)
     ends = ("ligament", "end")
     return outlines_of_design(
@@ -99,7 +99,7 @@ def of_track(track: xr.Dataset) -> SpecimenOutlines:
 
 
 def images(painted: Painter, frames: Iterable[Frame]) -> Iterator[Image]:
-    """The frames (rows, columns, 3) with everything drawn on them."""
+    """Yields the frames (rows, columns, 3) with everything drawn on them."""
     last = np.zeros_like(painted.pose[0])
     legend = _legend(painted)
     for index, frame in zip(range(len(painted.pose)), frames, strict=False):
@@ -137,7 +137,7 @@ def _units(painted: Painter, image: Image, index: int, pose: Floats) -> Image:
 
 
 def _corners(painted: Painter, pose: Floats) -> list[NDArray[np.int32]]:
-    """Outlines of the units in the picture, in cv2's fixed point."""
+    """Returns outlines of the units in the picture, in cv2's fixed point."""
     out = []
     for unit in range(painted.specimen.count):
         cos, sin = np.cos(pose[unit, 2]), np.sin(pose[unit, 2])
@@ -152,7 +152,7 @@ def _pixels(painted: Painter, points: Floats) -> NDArray[np.int32]:
 
 
 def _hatch(image: Image, polygon: NDArray[np.int32]) -> None:
-    """Slanted lines within the outline."""
+    """Draws slanted lines within the outline."""
     mask = np.zeros(image.shape[:2], np.uint8)
     cv2.fillPoly(mask, [polygon], 1, cv2.LINE_8, _SHIFT)
     rows, columns = np.nonzero(mask)
@@ -173,7 +173,7 @@ def _ids(painted: Painter, image: Image, places: NDArray[np.int32]) -> None:
 
 
 def _legend(painted: Painter) -> Image:
-    """The band below the picture: colour bar and what it shows."""
+    """Returns the band below the picture: colour bar and what it shows."""
     band = np.full((_BAND, painted.camera.size[0] * painted.scale, 3), 255, np.uint8)
     bar = np.repeat(painted.colours[None], 14, axis=0)
     low, high = (f"{limit:.3g}" for limit in painted.limits)

@@ -1,4 +1,4 @@
-"""What a track and its video say about the quality of a recording."""
+"""Tells what a track and its video say about the quality of a recording."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _WHITE = 234
 
 
 class ExposureStatistics(NamedTuple):
-    """The brightness of some frames.
+    """Describes the brightness of some frames.
 
     Attributes:
         bright: the 99th percentile, of the range.
@@ -42,14 +42,14 @@ class ExposureStatistics(NamedTuple):
 
 
 class StreamProperties(NamedTuple):
-    """How the file holds its frames: the codec's name, and the part of them that stand alone."""
+    """States how the file holds its frames: the codec's name, and the part standing alone."""
 
     codec: str
     alone: float
 
 
 class TrackQuality(NamedTuple):
-    """Everything that page and advice are made of.
+    """Describes everything that page and advice are made of.
 
     Attributes:
         pixel: size in the specimen's plane, mm.
@@ -126,7 +126,7 @@ def measured(track: xr.Dataset, images: Iterable[Image], stream: StreamPropertie
 
 
 def pixel_size(track: xr.Dataset) -> float:
-    """Size of a pixel in the middle of the specimen's plane, mm, without distortion."""
+    """Returns size of a pixel in the middle of the specimen's plane, mm, without distortion."""
     h = track["camera_homography"].values
     x, y = of_track(track).centre.mean(axis=0)
     depth = h[2] @ np.array([x, y, 1.0])
@@ -134,7 +134,7 @@ def pixel_size(track: xr.Dataset) -> float:
 
 
 def stream_of(video: Path) -> StreamProperties:
-    """Codec of a video, and how many of its frames stand alone; a folder of pictures has none."""
+    """Reads the codec of a video, and how many frames stand alone; pictures have none."""
     if video.is_dir():
         return StreamProperties("pictures", 1.0)
     with av.open(str(video)) as container:
@@ -146,21 +146,21 @@ def stream_of(video: Path) -> StreamProperties:
 
 
 def sampled(track: xr.Dataset) -> set[int]:
-    """Numbers of the frames whose brightness is looked at."""
+    """Returns numbers of the frames whose brightness is looked at."""
     count = track.sizes["time"]
     chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(int))
     return set(track["frame"].values[chosen].tolist())
 
 
 def _spacing(centre: Floats) -> float:
-    """Median distance of the nearest neighbour, mm."""
+    """Returns median distance of the nearest neighbour, mm."""
     apart = np.linalg.norm(centre[:, None] - centre[None], axis=-1)
     np.fill_diagonal(apart, np.inf)
     return float(np.median(apart.min(axis=1)))
 
 
 def _resting(pose: Floats, sigma: Floats) -> int:
-    """Length of the run of frames in the beginning that show no motion."""
+    """Returns length of the run of frames in the beginning that show no motion."""
     with np.errstate(invalid="ignore"):
         away = np.sqrt(np.nanmean((pose / np.maximum(sigma, 1e-12)) ** 2, axis=(1, 2)))
     moving = np.flatnonzero(~(away < _RESTING))
@@ -169,7 +169,7 @@ def _resting(pose: Floats, sigma: Floats) -> int:
 
 
 def _floor(pose: Floats) -> Floats:
-    """Scatter (3,) of units at rest about their own means."""
+    """Returns scatter (3,) of units at rest about their own means."""
     known = np.isfinite(pose).all(axis=(0, 2))
     return np.asarray(np.sqrt(np.mean(np.var(pose[:, known], axis=0, ddof=1), axis=0)))
 
@@ -186,6 +186,6 @@ def _light(images: Iterable[Image]) -> ExposureStatistics:
 
 
 def _clipped(image: Image) -> float:
-    """Part of the pixels at the end of the range, which in a video may be 235."""
+    """Returns part of the pixels at the end of the range, which in a video may be 235."""
     top = image.max()
     return float((image == top).mean()) if top >= _WHITE else 0.0

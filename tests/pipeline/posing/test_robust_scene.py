@@ -15,7 +15,7 @@ from pipeline.__main__ import run_stage
 from pipeline.posing import design_scene
 from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import UserError
-from reports.products.robust_gains import build
+from reports.__main__ import main
 from sim.solvers import Harmonic
 from tests.pipeline.static import HOLE, write
 
@@ -94,7 +94,7 @@ def test_the_gain_of_a_preset_is_over_the_studys_own_design(
     assert float(made["price"]) == float(made["loss_drive"]) == pytest.approx(best, rel=1e-4)
     assert made["price"].attrs["units"] == "1"
     page = tmp_path / "page"
-    assert build.main([*words[:3], "--gains", str(out), "--out-dir", str(page)]) == 0
+    assert main(["robust-gains", *words[:3], "--gains", str(out), "--out-dir", str(page)]) == 0
     text = (page / "index.html").read_text(encoding="utf-8")
     assert "<td>tolerant</td>" in text
     assert "<td>0.0%</td>" in text

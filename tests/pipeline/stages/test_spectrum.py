@@ -10,7 +10,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
-from reports.products.spectrum import build
+from reports.__main__ import main
 from tests.pipeline.static import HOLE, write
 
 ASKED = """
@@ -86,7 +86,7 @@ def test_the_page_holds_the_figure_and_its_curves(design: Path, tmp_path: Path) 
     for name in ("one", "two"):
         out = tmp_path / name
         words = [*options(tmp_path), "--spectrum", str(made), "--out-dir", str(out)]
-        assert build.main(words) == 0
+        assert main(["spectrum", *words]) == 0
         pages.append({path.name: path.read_bytes() for path in out.iterdir()})
     assert pages[0] == pages[1]
     assert b"<svg" in pages[0]["index.html"]
@@ -99,5 +99,5 @@ def test_a_spectrum_of_another_problem_is_refused(
 ) -> None:
     made = analysed(design, tmp_path)
     words = [*options(tmp_path, modes=3), "--spectrum", str(made), "--out-dir", str(tmp_path)]
-    assert build.main(words) == 2
+    assert main(["spectrum", *words]) == 2
     assert "another problem" in capsys.readouterr().err

@@ -10,7 +10,7 @@ from pipeline.__main__ import run_stage
 from pipeline.runtime import ROOT
 from pipeline.workflow.reference.write_pages import pages
 
-NAMES = ("datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
+NAMES = ("api.md", "datasets.md", "keys.md", "keys_calibrations.md", "keys_recordings.md")
 
 
 @pytest.mark.parametrize("name", NAMES)

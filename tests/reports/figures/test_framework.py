@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from reports.base import style
-from reports.figures.framework import build, figure
+from reports.figures.framework import figure
+from reports.figures.framework.framework_report import framework_report
+from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import figure_assertions, recorded_study
 from tests.reports.page.test_report_page import Links
@@ -21,13 +23,13 @@ def filmed(study: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Stu
 @pytest.fixture(scope="module")
 def folder(filmed: StudyResults, tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("framework")
-    build.publish(filmed, made)
+    publish(framework_report(filmed), made)
     return made
 
 
 def test_it_is_legible_and_tells_of_every_step(study: StudyResults) -> None:
     with style.styled():
-        made = figure_assertions.drawn(figure.draw_framework(study))
+        made = figure_assertions.drawn(figure.framework_figure(study).draw())
     figure_assertions.assert_legible(made)
     wanted = {"Reference", "Altered", "simulate", "optimised cloak", "filmed and tracked", *"abcd"}
     assert wanted <= figure_assertions.words(made)
@@ -42,5 +44,5 @@ def test_its_page_works_from_disk(folder: Path) -> None:
 
 
 def test_it_is_the_same_again(filmed: StudyResults, folder: Path, tmp_path: Path) -> None:
-    for path in build.publish(filmed, tmp_path):
+    for path in publish(framework_report(filmed), tmp_path):
         assert path.read_bytes() == (folder / path.name).read_bytes()

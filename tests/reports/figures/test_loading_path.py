@@ -13,10 +13,11 @@ from pipeline.runtime import UserError
 from reports.base import style
 from reports.facts import checks, fact_records
 from reports.figures import kinds
-from reports.figures.loading_path import abscissa, content, figure, measures, monte_carlo
+from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.shielding import facts as shielding
-from reports.figures.study_report import publish
+from reports.figures.study_report import study_report
+from reports.page import publish
 from reports.panels import payload
 from reports.study import StudyResults
 from tests.reports import compressed_study, figure_assertions
@@ -26,7 +27,7 @@ S = 15.0
 
 def made(study: StudyResults) -> Figure:
     with style.styled():
-        return figure_assertions.drawn(figure.draw_loading_path(study))
+        return figure_assertions.drawn(figure.loading_path_figure(study).draw())
 
 
 def values(study: StudyResults) -> dict[str, fact_records.Fact]:
@@ -89,7 +90,7 @@ def test_reaction_is_the_sum_over_the_driven_units_along_the_drive(smile: StudyR
 
 
 def test_the_axis_is_the_displacement_of_the_driven_units(shield: StudyResults) -> None:
-    way = abscissa.course(shield.problem, shield.response)
+    way = abscissa.abscissa_of(shield.problem, shield.response)
     np.testing.assert_allclose(way.values, np.linspace(0, 15, 9), atol=1e-12)
     assert [way.at(k) for k in way.shown] == [
         "0 mm (0 %)", "5.62 mm (3.8 %)", "11.2 mm (7.5 %)", "15 mm (10 %)",
@@ -184,7 +185,7 @@ def test_the_second_design_is_told_of_and_drawn(shield: StudyResults) -> None:
     assert values(shield)["jumps_second_design"].value == 0
     measure = made(shield).axes[-3]
     assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
-    assert "dashed" in content.caption(shield)
+    assert "dashed" in figure.loading_path_figure(shield).caption
 
 
 def test_a_kept_design_is_not_drawn_twice(shield: StudyResults) -> None:
@@ -193,7 +194,7 @@ def test_a_kept_design_is_not_drawn_twice(shield: StudyResults) -> None:
     kept = dataclasses.replace(shield, datasets=shield.datasets | {"geometric_design": alone})
     assert values(kept)["second_design"].ours.startswith("the same")
     assert "contact_angle_second" not in values(kept)
-    assert "dashed purple" not in content.caption(kept)
+    assert "dashed purple" not in figure.loading_path_figure(kept).caption
     assert not any(
         line.get_label() == "Cloaked, no overlap" for axes in made(kept).axes for line in axes.lines
     )
@@ -210,12 +211,12 @@ def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
     ]
     points = np.concatenate([np.asarray(line.get_xydata()) for line in crosses])
     np.testing.assert_allclose(points, [[7.5, 0.1 * values(shield)["rotation_altered"].value / 2]])
-    assert "crosses mark jumps" in content.caption(jumped)
-    assert "crosses" not in content.caption(shield)
+    assert "crosses mark jumps" in figure.loading_path_figure(jumped).caption
+    assert "crosses" not in figure.loading_path_figure(shield).caption
 
 
 def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:
-    intact, voided, _ = payload(content.loading_path_animation(smile))["structures"]
+    intact, voided, _ = payload(figure.loading_path_animation(smile))["structures"]
     count = [len(part["owner"]) for part in (intact, voided)]
     assert count[0] - count[1] == pytest.approx(18 * 4 * 4 * 4 / 3, abs=4)  # base64 of int32
     assert voided["name"] == "Voided"
@@ -225,14 +226,14 @@ def test_a_motion_in_time_has_a_report_of_its_own(study: StudyResults, tmp_path:
     plain = dict(study.datasets)
     del plain["sweep"]
     without = study.problem.model_copy(update={"sweep": None})
-    publish(dataclasses.replace(study, problem=without, datasets=plain), tmp_path)
+    publish(study_report(dataclasses.replace(study, problem=without, datasets=plain)), tmp_path)
     columns = (tmp_path / "path.csv").read_text(encoding="utf-8").partition("\n")[0].split(",")
     assert "altered_motion_1" in columns
     assert "displacement_mm" not in columns
 
 
 def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
-    names = {path.name for path in publish(shield, tmp_path)}
+    names = {path.name for path in publish(study_report(shield), tmp_path)}
     assert {"path.csv", "robustness.csv", "facts.json", "index.html"} <= names
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "After Figure 4 of Bordiga et al." in html

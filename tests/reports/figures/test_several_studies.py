@@ -9,9 +9,11 @@ import pytest
 
 from pipeline.problem.reading import JointFigure, joint_figure
 from pipeline.runtime import UserError
+from reports.__main__ import main
 from reports.base import style
-from reports.figures.several_studies import build, content, figure, studies
-from reports.page.publishing import publish
+from reports.figures.several_studies import figure
+from reports.figures.several_studies.several_studies_report import load, several_studies_report
+from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import compressed_study, figure_assertions
 
@@ -26,7 +28,7 @@ def pair(smile: StudyResults) -> list[StudyResults]:
 @pytest.fixture(scope="module")
 def report(pair: list[StudyResults], tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("joint")
-    publish(content.parts("fig", ASKED, pair), folder)
+    publish(several_studies_report("fig", ASKED, pair), folder)
     return folder
 
 
@@ -35,7 +37,7 @@ def test_the_figure_is_legible_with_any_number_of_studies(
     pair: list[StudyResults], count: int
 ) -> None:
     with style.styled():
-        made = figure_assertions.drawn(figure.draw_several_studies((pair * 2)[:count]))
+        made = figure_assertions.drawn(figure.several_studies_figure((pair * 2)[:count]).draw())
     figure_assertions.assert_legible(made)
     words = figure_assertions.words(made)
     assert {"Intact", "Voided", "Cloaked", "Smile"} <= words
@@ -68,7 +70,7 @@ def test_command_line(tmp_path: Path) -> None:
     asked = experiments / "fig" / "figure.yaml"
     asked.write_text("title: Two voids\nstudies: [fig_smile, fig_frown]\n")
     words = ["--figure", str(asked), "--results", str(experiments)]
-    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 0
+    assert main(["several-studies", *words, "--out-dir", str(tmp_path / "report")]) == 0
     assert {"fig.pdf", "fig.svg", "fig.png", "index.html", "fig_frown_robustness.csv"} <= {
         path.name for path in (tmp_path / "report").iterdir()
     }
@@ -96,4 +98,4 @@ def test_a_faulty_figure_is_told(tmp_path: Path, text: str, told: str) -> None:
 def test_a_shaken_study_has_no_place_in_it(tmp_path: Path) -> None:
     path = Path(__file__).parents[3] / "experiments/fig2/figure.yaml"
     with pytest.raises(UserError, match="no such dataset"):
-        studies.load(path, JointFigure(studies=("fig2",)), None, tmp_path)
+        load(path, JointFigure(studies=("fig2",)), None, tmp_path)

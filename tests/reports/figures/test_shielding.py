@@ -16,7 +16,7 @@ from tests.reports.figure_assertions import texts
 
 def drawn(study: StudyResults) -> Figure:
     with style.styled():
-        return figure_assertions.drawn(figure.draw_shielding(study))
+        return figure_assertions.drawn(figure.shielding_figure(study).draw())
 
 
 @pytest.fixture(scope="module")

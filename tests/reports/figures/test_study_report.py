@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from pipeline.runtime import UserError
-from reports.figures import study_report
+from reports.__main__ import main
+from reports.figures.study_report import study_report
+from reports.page import publish
 from reports.study import StudyResults
 from tests.reports import shaken_study
 
@@ -18,7 +20,7 @@ def command(paths: tuple[Path, Path, Path], out: Path, preset: str | None) -> li
     names = zip(shaken_study.KINDS, paths, strict=True)
     given = [word for name, path in names for word in (f"--{name}", str(path))]
     chosen = [] if preset is None else ["--preset", preset]
-    return ["--problem", str(shaken_study.PROBLEM), *chosen, *given, "--out-dir", str(out)]
+    return ["study", "--problem", str(shaken_study.PROBLEM), *chosen, *given, "--out-dir", str(out)]
 
 
 def test_report_is_complete(report: Path) -> None:
@@ -29,14 +31,14 @@ def test_report_is_complete(report: Path) -> None:
 
 
 def test_rebuilding_gives_the_same_bytes(study: StudyResults, report: Path, tmp_path: Path) -> None:
-    study_report.publish(study, tmp_path / "again")
+    publish(study_report(study), tmp_path / "again")
     assert contents(tmp_path / "again") == contents(report)
 
 
 def test_command_line(tmp_path: Path) -> None:
     paths = shaken_study.write(tmp_path, "quick")
     out = tmp_path / "report"
-    assert study_report.main(command(paths, out, "quick")) == 0
+    assert main(command(paths, out, "quick")) == 0
     assert (out / "index.html").is_file()
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "design.nc", "report", "response.nc", "sweep.nc"
@@ -47,7 +49,7 @@ def test_datasets_of_another_problem_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     paths = shaken_study.write(tmp_path, "quick")
-    assert study_report.main(command(paths, tmp_path / "report", None)) == 2
+    assert main(command(paths, tmp_path / "report", None)) == 2
     told = capfd.readouterr().err
     assert "the dataset was made from another problem" in told
     assert "design.nc" in told
@@ -65,7 +67,7 @@ def test_a_build_that_fails_leaves_the_old_report(
 
     monkeypatch.setattr("reports.facts.fact_records.write_json", full)
     with pytest.raises(UserError, match="the disk is full"):
-        study_report.publish(quick, quick_report)
+        publish(study_report(quick), quick_report)
     assert contents(quick_report) == before
     assert sorted(quick_report.parent.iterdir()) == beside
 
@@ -75,13 +77,13 @@ def test_what_a_killed_build_left_goes(quick_report: Path, quick: StudyResults) 
     left.mkdir()
     (left / "index.html").write_text("half a page", encoding="utf-8")
     before = contents(quick_report)
-    study_report.publish(quick, quick_report)
+    publish(study_report(quick), quick_report)
     assert contents(quick_report) == before
     assert not left.exists()
 
 
 def test_help_needs_no_libraries(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
-        study_report.main(["--help"])
+        main(["study", "--help"])
     assert end.value.code == 0
     assert "--out-dir" in capsys.readouterr().out

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 from reports.base import Table
-from reports.facts.fact_records import quoted
-from reports.figures import kinds
-from reports.figures.shielding import facts
 from reports.figures.shielding.sweep_map import frequency_map
-from reports.page import report_page
+from reports.figures.study_report import study_report
+from reports.page import rendered
+from reports.page.study_page import LARGEST_PAGE
 from reports.study import StudyResults
 
 
@@ -44,7 +43,7 @@ def html(report: Path) -> str:
 
 
 def test_page_is_small_and_self_contained(html: str) -> None:
-    assert len(html.encode()) < report_page.LARGEST_PAGE
+    assert len(html.encode()) < LARGEST_PAGE
     links = Links(html)
     assert all(address.startswith("data:") for address in links.loaded)
     assert not re.search(r"@import|url\((?!#)|fetch\(|XMLHttpRequest", html)
@@ -110,8 +109,9 @@ def test_page_shows_paper_and_ours(html: str) -> None:
 
 
 def test_without_a_paper_there_is_no_column_for_it(quick: StudyResults) -> None:
-    known = quoted(facts.shielding_facts(quick), None)
-    html = report_page.render(kinds.kind_of(quick.problem).page(quick, known, [], "<svg/>", []))
+    settings = quick.problem.report.model_copy(update={"paper": None})
+    problem = quick.problem.model_copy(update={"report": settings})
+    html = rendered(study_report(dataclasses.replace(quick, problem=problem)), {})
     assert "Paper</th>" not in html
     assert "<span>paper" not in html
 
@@ -127,10 +127,7 @@ def test_words_of_a_problem_are_escaped(quick: StudyResults) -> None:
         quick,
         problem=quick.problem.model_copy(update={"title": "</script><b>&", "doc": "</script><b>"}),
     )
-    made = kinds.kind_of(hostile.problem).page(
-        hostile, facts.shielding_facts(hostile), [], "<svg/>", []
-    )
-    html = report_page.render(made)
+    html = rendered(study_report(hostile), {})
     assert "<title>&lt;/script&gt;&lt;b&gt;&amp;</title>" in html
     assert html.count("</script>") == 2
     data = re.search(r'id="player-data">(.*?)</script>', html, re.DOTALL)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from reports.figures.shielding.content import shielding_animation
+from reports.figures.shielding.figure import shielding_animation
 from reports.panels import (
     Animation,
     AnimationAxis,

@@ -13,8 +13,9 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import Kind
+from reports.__main__ import main
 from reports.base import style
-from reports.products.benchmark import build, growth, optimisers, tables, work_precision
+from reports.products.benchmark import charts, optimisers, tables, work_precision
 
 MACHINE = {
     "processor": "abacus",
@@ -141,7 +142,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         origin = provenance.of_recording("{}", {}, synthetic=False, role="rules")
         datasets.write(data.assign_attrs(about), out / f"{name}.nc", kind, origin)
     files = [str(out / f"{name}.nc") for name in GIVEN]
-    assert build.main(["--datasets", *files, "--out-dir", str(out), "--quiet"]) == 0
+    assert main(["benchmark", "--datasets", *files, "--out-dir", str(out), "--quiet"]) == 0
     return out
 
 
@@ -182,8 +183,8 @@ def test_diagrams_show_medians_against_errors() -> None:
 
 def test_exponents_are_fitted_to_the_larger_sizes() -> None:
     units = np.array([225, 900, 3600])
-    assert growth.exponent(units, 1e-6 * units**1.5, 900) == pytest.approx(1.5)
-    assert np.isnan(growth.exponent(units[:2], np.ones(2), 900))
+    assert charts.exponent(units, 1e-6 * units**1.5, 900) == pytest.approx(1.5)
+    assert np.isnan(charts.exponent(units[:2], np.ones(2), 900))
 
 
 def test_profiles_count_evaluations_to_a_share_of_the_decrease() -> None:

@@ -11,9 +11,9 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.tracking.frames import SYNTHETIC_LABEL
+from reports.__main__ import main
 from reports.base import style
-from reports.products.calibration import build
-from reports.products.calibration.figure import draw_calibration
+from reports.products.calibration import draw_calibration
 from tests.reports.figure_assertions import assert_legible, drawn, words
 
 NAMES = ["bending_stiffness", "damping_ratio"]
@@ -94,11 +94,18 @@ def test_files_are_whole_and_the_same_every_time(tmp_path: Path) -> None:
     source = tmp_path / "calibration.nc"
     datasets.write(calibration().drop_attrs(), source, "calibration", origin | {"warnings": ""})
     for name in ("one", "two"):
-        asked = ["--calibration", str(source), "--out-dir", str(tmp_path / name), "--quiet"]
-        assert build.main(asked) == 0
+        asked = [
+            "calibration",
+            "--calibration",
+            str(source),
+            "--out-dir",
+            str(tmp_path / name),
+            "--quiet",
+        ]
+        assert main(asked) == 0
     files = sorted(path.name for path in (tmp_path / "one").iterdir())
     assert files == ["fit.pdf", "fit.png", "fit.svg"]
     for name in files:
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
     with pytest.raises(SystemExit):
-        build.main(["--calibration", str(source)])
+        main(["calibration", "--calibration", str(source)])

@@ -13,7 +13,8 @@ import pytest
 import trimesh
 from PIL import Image
 
-from reports.products.fabrication import build, pictures
+from reports.__main__ import main
+from reports.products.fabrication import pictures
 from reports.products.fabrication.renderer import Body, picture
 from tests.pipeline.fabrication import built
 
@@ -65,7 +66,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def page(package: Path) -> str:
     out = package.with_name("index.html")
     words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
-    assert build.main([*words, "--quiet"]) == 0
+    assert main(["fabrication", *words, "--quiet"]) == 0
     return out.read_text(encoding="utf-8")
 
 
@@ -94,7 +95,7 @@ def test_it_tells_the_figures_of_the_bill(page: str) -> None:
 def test_the_same_package_gives_the_same_page(package: Path, page: str, tmp_path: Path) -> None:
     out = tmp_path / "again.html"
     words = ["--problem", str(built.PROBLEM), "--packages", str(package), "--out", str(out)]
-    assert build.main([*words, "--quiet"]) == 0
+    assert main(["fabrication", *words, "--quiet"]) == 0
     assert out.read_text(encoding="utf-8") == page
 
 
@@ -114,7 +115,7 @@ def test_a_package_of_another_version_makes_one_message(
     path.write_text(path.read_text(encoding="utf-8").replace(before, after, 1), encoding="utf-8")
     out = tmp_path / "index.html"
     words = ["--problem", str(built.PROBLEM), "--packages", str(folder), "--out", str(out)]
-    assert build.main([*words, "--quiet"]) == 2
+    assert main(["fabrication", *words, "--quiet"]) == 2
     said = capsys.readouterr().err
     assert told in said
     assert "make the package again" in said

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from reports.products.index import build, content, inventory
+from reports.__main__ import main
+from reports.page import templating
+from reports.products.index import index_report, inventory
 from reports.study import StudyResults
 from tests.reports.page.test_report_page import Links
 
@@ -34,8 +36,12 @@ def results(study: StudyResults, report: Path, tmp_path_factory: pytest.TempPath
 
 @pytest.fixture(scope="module")
 def html(results: Path) -> str:
-    assert build.main(["--results", str(results), "--quiet"]) == 0
+    assert main(["index", "--results", str(results), "--quiet"]) == 0
     return (results / "index.html").read_text(encoding="utf-8")
+
+
+def page(results: Path) -> str:
+    return templating.rendered("index.html.j2", index_report.shown(results))
 
 
 def test_it_works_from_disk_and_leads_to_what_is_there(html: str, results: Path) -> None:
@@ -56,7 +62,7 @@ def test_figures_come_first_and_drafts_are_marked(results: Path, html: str) -> N
 def test_claims_are_judged_where_the_study_is_built(html: str) -> None:
     assert "Figure 2: <a" in html
     assert "<code>snakemake fig7</code> builds it" in html
-    tables = {table.name: table for table in content.tables(())}
+    tables = {table.name: table for table in index_report.tables(())}
     assert all(each.simulation.why == "study not built" for each in tables["fig2"].claims)
 
 
@@ -66,11 +72,11 @@ def test_datasets_carry_their_hash(results: Path, html: str) -> None:
 
 
 def test_it_is_the_same_again(results: Path, html: str) -> None:
-    assert content.page(results) == html
+    assert page(results) == html
 
 
 def test_an_empty_folder_has_an_index_too(tmp_path: Path) -> None:
-    assert "None has been built yet" in content.page(tmp_path)
+    assert "None has been built yet" in page(tmp_path)
 
 
 def test_movies_are_held_by_the_page_as_far_as_there_is_room(
@@ -80,11 +86,11 @@ def test_movies_are_held_by_the_page_as_far_as_there_is_room(
     (tmp_path / "movies").mkdir()
     for name, size in (("S1", 50), ("S2", 20), ("S3", 30)):
         (tmp_path / f"movies/{name}.mp4").write_bytes(name.encode() * (size // 2))
-    monkeypatch.setattr(content, "LARGEST_MOVIES", 55)
-    shown = content.page(tmp_path)
+    monkeypatch.setattr(index_report, "LARGEST_MOVIES", 55)
+    shown = page(tmp_path)
     for name in ("S2", "S3"):
         data = base64.b64encode((tmp_path / f"movies/{name}.mp4").read_bytes()).decode()
         assert f'src="data:video/mp4;base64,{data}"' in shown
     assert 'src="movies/S1.mp4"' in shown
     assert shown.count("Too large for this page") == 1
-    assert content.page(tmp_path) == shown
+    assert page(tmp_path) == shown

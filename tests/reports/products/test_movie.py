@@ -11,11 +11,10 @@ import pytest
 
 from pipeline.problem.sections import Codec
 from pipeline.virtual_lab import encode_video
-from pipeline.workflow import showing
-from pipeline.workflow.movie_list import MOVIES
+from reports.__main__ import main
 from reports.base import style
 from reports.panels import Animation, AnimationAxis, AnimationClip, ColourField
-from reports.products.movie import build
+from reports.paper_figures import movies_of, paper_movies
 from reports.products.movie.frames import RATE, images, instants
 from reports.products.movie.layout import HEIGHT, WIDTH, layout
 from reports.study import RigidUnits
@@ -88,7 +87,7 @@ def test_a_movie_is_built_from_the_results_of_its_studies(
     monkeypatch.setattr("reports.products.movie.frames.RATE", 1.0)
     out = tmp_path / "S2.mp4"
     words = ["--problems", str(folder / "problem.yaml"), "--results", str(tmp_path)]
-    assert build.main([*words, "--out", str(out), "--quiet"]) == 0
+    assert main(["movie", *words, "--out", str(out), "--quiet"]) == 0
     with av.open(str(out)) as video:
         assert video.metadata["title"] == "S2"
         assert sum(1 for _ in video.decode(video=0)) == 6
@@ -96,6 +95,6 @@ def test_a_movie_is_built_from_the_results_of_its_studies(
 
 
 def test_every_movie_of_the_paper_has_its_studies() -> None:
-    assert list(MOVIES) == ["S1", "S2", "S3", "S4"]
-    assert showing(["fig6_heart", "fig6_shamrock"]) == ["S3"]
-    assert showing(["fig2@quick"]) == []
+    assert list(paper_movies()) == ["S1", "S2", "S3", "S4"]
+    assert movies_of(["fig6_heart", "fig6_shamrock"]) == ["S3"]
+    assert movies_of(["fig2@quick"]) == []

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.products.stress import build
+from reports.__main__ import main
 
 FAMILY = {
     "name": "toy",
@@ -36,7 +36,7 @@ def counts(tmp_path: Path) -> Path:
 
 
 def page(counts: Path, folder: Path) -> str:
-    assert build.main(["--counts", str(counts), "--out-dir", str(folder), "--quiet"]) == 0
+    assert main(["stress", "--counts", str(counts), "--out-dir", str(folder), "--quiet"]) == 0
     return (folder / "index.html").read_text(encoding="utf-8")
 
 
@@ -61,6 +61,6 @@ def test_what_the_suite_did_not_write_is_refused(
 ) -> None:
     counts.write_text(content, encoding="utf-8")
     folder = tmp_path / "page"
-    assert build.main(["--counts", str(counts), "--out-dir", str(folder)]) == 2
+    assert main(["stress", "--counts", str(counts), "--out-dir", str(folder)]) == 2
     assert str(counts) in capsys.readouterr().err
     assert not (folder / "index.html").exists()

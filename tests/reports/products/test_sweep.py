@@ -13,7 +13,8 @@ from pipeline.datasets import provenance
 from pipeline.problem.sections import split_value, sweep_cases
 from pipeline.runtime import SweepResult
 from pipeline.stages import sweep as stage
-from reports.products.sweep import build, cases
+from reports.__main__ import main
+from reports.products.sweep import cases
 from tests.pipeline import static
 
 CURVE = "sweep: { grid: { drive.amplitude: { from: 1 mm, to: 3 mm, points: 5 } } }"
@@ -59,7 +60,7 @@ def drawn(folder: Path, text: str) -> Path:
     at, data = paths(folder, text)
     out = folder / "sweep"
     words = ["--problem", str(at), "--sweep", str(data), "--out-dir", str(out)]
-    assert build.main(words) == 0
+    assert main(["sweep", *words]) == 0
     return out
 
 
@@ -118,6 +119,6 @@ def test_a_sweep_of_another_problem_is_refused(
     at, data = paths(tmp_path, CURVE)
     at.write_text(at.read_text().replace("1.19 N/mm", "1.2 N/mm"))
     words = ["--problem", str(at), "--sweep", str(data), "--out-dir", str(tmp_path / "out")]
-    assert build.main(words) != 0
+    assert main(["sweep", *words]) != 0
     assert "made from another problem" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -14,7 +14,8 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.tracking.frames import Frame, import_video
-from reports.products.tracking import advice, build, overlay, track_quality
+from reports.__main__ import main
+from reports.products.tracking import advice, overlay, track_quality
 from reports.products.tracking.track_quality import ExposureStatistics, StreamProperties
 
 NOISE = np.array([0.02, 0.02, 0.001])
@@ -149,7 +150,7 @@ def test_the_page_says_synthetic_and_is_the_same_twice(track: xr.Dataset, tmp_pa
     made = []
     for name in ("first", "second"):
         words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
-        assert build.main([*words, "--out-dir", str(tmp_path / name), "--quiet"]) == 0
+        assert main(["tracking", *words, "--out-dir", str(tmp_path / name), "--quiet"]) == 0
         folder = tmp_path / name
         made.append([(folder / file).read_bytes() for file in ("index.html", "overlay.mp4")])
     assert made[0] == made[1]
@@ -165,6 +166,6 @@ def test_another_video_is_refused(
     datasets.write(track, tmp_path / "track.nc", "track", {"parents": '{"video": "abc"}'})
     (tmp_path / "v.mkv").write_bytes(b"another")
     words = ["--track", str(tmp_path / "track.nc"), "--video", str(tmp_path / "v.mkv")]
-    assert build.main([*words, "--out-dir", str(tmp_path / "report")]) == 2
+    assert main(["tracking", *words, "--out-dir", str(tmp_path / "report")]) == 2
     assert "that of another video" in capsys.readouterr().err
     assert not (tmp_path / "report").exists()

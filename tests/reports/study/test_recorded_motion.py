@@ -13,7 +13,8 @@ from pipeline.runtime import UserError
 from reports.base import style
 from reports.facts import Fact
 from reports.figures import kinds
-from reports.page import report_page
+from reports.figures.study_report import study_report
+from reports.page import rendered
 from reports.panels import payload
 from reports.study import LABEL, StudyResults
 from reports.study.study_results import load
@@ -46,7 +47,7 @@ def filmed(
 def figures(filmed: dict[str, StudyResults]) -> dict[str, Figure]:
     with style.styled():
         return {
-            name: figure_assertions.drawn(kinds.kind_of(study.problem).figure(study))
+            name: figure_assertions.drawn(kinds.kind_of(study.problem).figure(study).draw())
             for name, study in filmed.items()
         }
 
@@ -134,8 +135,7 @@ def test_the_player_shows_it_under_its_own_load_with_the_residual(
 
 def test_pages_say_that_it_is_synthetic(filmed: dict[str, StudyResults]) -> None:
     study = filmed["smile"]
-    kind = kinds.kind_of(study.problem)
-    html = report_page.render(kind.page(study, kind.facts(study), [], "<svg></svg>", []))
+    html = rendered(study_report(study), {})
     assert f"<b>{LABEL}</b>: these recordings were rendered" in html
     for name in ("intact_0", "altered_0", "cloaked_0"):
         assert f'href="../recordings/{name}/index.html"' in html
@@ -146,11 +146,7 @@ def test_a_recording_that_was_filmed_is_not_called_synthetic(
 ) -> None:
     study = filmed["smile"]
     real = {name: data.assign_attrs(synthetic="no") for name, data in study.compared.items()}
-    again = replace(study, compared=real)
-    kind = kinds.kind_of(again.problem)
-    assert LABEL not in report_page.render(
-        kind.page(again, kind.facts(again), [], "<svg></svg>", [])
-    )
+    assert LABEL not in rendered(study_report(replace(study, compared=real)), {})
 
 
 def test_only_the_way_there_is_shown_of_a_load(filmed: dict[str, StudyResults]) -> None:

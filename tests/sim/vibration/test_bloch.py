@@ -6,18 +6,21 @@ import pytest
 
 from benchmarks.scenes import BARRIER, CUTOFF, MATERIAL
 from sim.core import Floats, SimulationError
-from sim.energy import topology
 from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, kagome, parameters, shape
 from sim.vibration import UnitCell, bands, brillouin_path, cell_of, strained
-from tests.sim.structures import NONE, rotating_squares
+from tests.sim.structures import rotating_squares
 
 NO_LOOSE = np.zeros((2, 2))
 
 
 def made(lattice: Lattice, period: tuple[int, int]) -> UnitCell:
-    held = topology(lattice, NONE, VoidAngleContact(BARRIER, CUTOFF))
     values = jax.jit(lambda x: parameters(lattice, shape(lattice, x), MATERIAL))(lattice.vertices)
-    return cell_of(lattice, held, ConcreteParameters(*map(np.asarray, values)), period)
+    return cell_of(
+        lattice,
+        VoidAngleContact(BARRIER, CUTOFF),
+        ConcreteParameters(*map(np.asarray, values)),
+        period,
+    )
 
 
 LATTICES = [

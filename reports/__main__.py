@@ -1,0 +1,38 @@
+"""Makes a report: `python -m reports KIND ...`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from pipeline.runtime import PREFIX, cli
+from reports.catalogue import OPTIONS, REPORTS, ReportCommand
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Makes the report that the first word names; returns the exit code.
+
+    The same datasets give the same bytes.
+    """
+    kind, *words = [*(sys.argv[1:] if argv is None else argv), ""]
+    if kind in REPORTS:
+        return _run(kind, REPORTS[kind], words[:-1])
+    asks = kind in ("", "-h", "--help")
+    lines = [f"  {name:16} {command.description}" for name, command in REPORTS.items()]
+    text = "\n".join(["usage: python -m reports KIND ...; KIND --help tells more", *lines])
+    message = text if asks else f"error: no report is called {kind!r}\n{text}"
+    print(message, file=sys.stdout if asks else sys.stderr)
+    return 0 if asks else 2
+
+
+def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
+    parser = cli.parser(f"reports {kind}", command.description, study=command.study)
+    for word in command.options.split():
+        flag = word.rstrip("?")
+        parser.add_argument(flag, required=word == flag, **OPTIONS[flag])
+    return cli.run(lambda args: import_module(PREFIX + command.module).report(args), parser, words)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,1 +1,0 @@
-"""Shows a calibration: the fit beside the data, and what the data determine."""

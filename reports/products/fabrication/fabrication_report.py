@@ -1,0 +1,164 @@
+"""Makes the page that shows what is built of a study: sheets, plates, specimens.
+
+It reads the packages and nothing else of the study's results, so a picture shows a file and not
+what the file was meant to be. The same packages give the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipeline import problem
+from pipeline.fabrication.papers import read_bill, read_manifest
+from pipeline.fabrication.parts import THIN_WALL
+from pipeline.problem import Problem
+from pipeline.runtime import cli
+from reports.page import write_page
+from reports.products.fabrication import pictures
+
+TITLES = {
+    "intact": "Intact structure",
+    "altered": "Altered structure",
+    "cloaked": "Cloaked structure",
+}
+COLOURS = {"intact": "#8a8f96", "altered": "#f0a042", "cloaked": "#8d62c0"}
+"""Of printed units, lighter than a structure's own colour so that edges show."""
+
+FIXTURE = "#c8ccd0"
+
+
+@dataclass(frozen=True)
+class PackageFact:
+    """Describes a figure in words."""
+
+    value: str
+    label: str
+    note: str
+
+
+@dataclass(frozen=True)
+class FilePicture:
+    """Describes a picture of a file (its path from the page), as base64 of a PNG."""
+
+    file: str
+    caption: str
+    png: str
+
+
+@dataclass(frozen=True)
+class PictureGroup:
+    """Describes pictures under one heading."""
+
+    title: str
+    pictures: Sequence[FilePicture]
+
+
+@dataclass(frozen=True)
+class PackageSection:
+    """Holds one structure's part of the page; `files` are paths in its folder and their hashes."""
+
+    name: str
+    title: str
+    facts: Sequence[PackageFact]
+    groups: Sequence[PictureGroup]
+    files: Sequence[tuple[str, str]]
+
+
+def report(args: argparse.Namespace) -> None:
+    """Makes the page that a command line asks for."""
+    asked = problem.load(args.problem, args.preset)
+    made = []
+    with cli.progress(len(args.packages), "pictures of fabrication") as bar:
+        for folder in args.packages:
+            made.append(package(folder, asked))
+            bar.update()
+    values = {
+        "title": f"{asked.title}: what is built",
+        "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
+        "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
+        "structures": made,
+        "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),
+    }
+    write_page(args.out, "fabrication.html.j2", values)
+
+
+def package(folder: Path, problem: Problem) -> PackageSection:
+    """Tells what the page shows of a package, all of it read from the package's files."""
+    told = read_manifest(folder)
+    name = folder.name
+    return PackageSection(
+        name,
+        TITLES.get(name, name),
+        list(_facts(folder, told)),
+        [PictureGroup(title, list(found)) for title, found in _groups(folder, problem)],
+        sorted(told["files"].items()),
+    )
+
+
+def parameters(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, str]]:
+    """Yields dotted keys and values."""
+    for key, value in values.items():
+        if isinstance(value, dict):
+            yield from parameters(value, f"{above}{key}.")
+        else:
+            listed = value if isinstance(value, list) else [value]
+            yield f"{above}{key}", ", ".join(str(item) for item in listed)
+
+
+def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
+    bill = read_bill(folder / "bom.csv")
+    total = {row["id"]: row for row in bill if row["item"] == "total"}
+    units, shims = total["units"], total["shims"]
+    kinds = len(told["shims"])
+    first, last = told["units"][0], told["units"][-1]
+    yield PackageFact(units["count"], "units", f"{first} to {last}")
+    yield PackageFact(shims["count"], "shims with spares", f"of {kinds} length{'s' * (kinds != 1)}")
+    yield PackageFact(f"{float(units['mass_g']):.0f} g", "mass of the units", units["note"])
+    if thin := told["thin_walls_mm"]:
+        note = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
+        yield PackageFact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", note)
+    if letters := told["letters_for_ids"]:
+        note = ", ".join(f"{letter} is {label}" for label, letter in letters.items())
+        yield PackageFact(f"{len(letters)}", "units with a letter for their id", note)
+    volume = float(units["volume_mm3"]) / 1000.0
+    yield PackageFact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
+    sheets = sum(row["item"] == "sheet" and "_nominal" in row["id"] for row in bill)
+    plates = sum(row["item"] in {"plate", "fixture"} for row in bill)
+    yield PackageFact(
+        f"{sheets} / {plates}", "sheets to cut / plates to print", "fixtures included"
+    )
+
+
+def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, Iterator[FilePicture]]]:
+    colour = COLOURS.get(folder.name, FIXTURE)
+    whole = folder / "print/assembled.stl"
+    seen = _picture(whole, "the specimen as it is assembled", pictures.assembled(whole, colour))
+    yield "The specimen", iter([seen])
+    yield "Sheets for the laser cutter", _sheets(folder)
+    yield "Plates for the printer", _plates(folder, "print", problem, colour)
+    yield "Fixtures", _plates(folder, "fixture", problem, FIXTURE)
+
+
+def _sheets(folder: Path) -> Iterator[FilePicture]:
+    for path in sorted(folder.glob("laser/*_nominal.dxf")):
+        kind, number, _ = path.stem.split("_")
+        told = f"{kind}, sheet {number.removeprefix('sheet')}, at nominal size"
+        yield _picture(path, told, pictures.sheet(path))
+
+
+def _plates(folder: Path, kind: str, problem: Problem, colour: str) -> Iterator[FilePicture]:
+    for path in sorted(folder.glob(f"{kind}/*.3mf")):
+        name, number = path.stem.split("_")
+        told = f"{name}, plate {number.removeprefix('plate')}"
+        yield _picture(path, told, pictures.plate(path, problem.fabrication.print.bed, colour))
+
+
+def _picture(path: Path, caption: str, png: bytes) -> FilePicture:
+    folder = path.parent.parent
+    file = f"{folder.name}/{path.relative_to(folder).as_posix()}"
+    return FilePicture(file, caption, base64.b64encode(png).decode("ascii"))

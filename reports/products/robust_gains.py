@@ -1,0 +1,105 @@
+"""Draws what robust presets gain: losses of the altered structure and of both designs."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from pipeline import datasets, problem
+from reports.base import Table, style
+from reports.page import FigureText, PageTable, figure_page, publish, titled
+
+_CAPTION = (
+    "(a) Loss under all loads and imperfect copies that a preset asks for: of the altered"
+    " structure, of the study's own design, and of the preset's. The copies are others than those"
+    " that the design was made with. (b) How the loss changes from the study's own design to the"
+    " preset's, under what the preset asks for, and under the study's own drive: the price."
+)
+_COLUMNS = (
+    "preset", "asks for", "loads", "copies", "loss of the study's own design",
+    "loss of the preset's design", "gain", "loss under the study's own drive",
+)  # fmt: skip
+_ROW, _LEFT, _WIDE, _GAP = 11.0, 42.0, 60.0, 10.0
+_AGAINST = {
+    "loss_altered": ("altered", style.ALTERED, "D"),
+    "loss_plain": ("study's design", style.GREY, "o"),
+    "loss_own": ("preset's design", style.CLOAKED, "o"),
+}
+
+
+def report(args: argparse.Namespace) -> None:
+    """Makes the report that a command line asks for."""
+    data = datasets.read(args.gains, "gains")
+    columns = {str(name): data[name].values for name in data.variables if data[name].dims}
+    lead = (
+        "Designs that hold against more than the study's own drive, and what each gains over"
+        f" the study's own design, whose loss is {float(data['loss_drive']):.4g}."
+    )
+    title = titled(problem.load(args.problem), args.problem)
+    text = FigureText(title, "designs that hold against more", lead, _CAPTION)
+    tables = [Table("gains.csv", "losses of every preset", columns)]
+    rows = [_row(data.sel(preset=name)) for name in data["preset"].values]
+    shown = PageTable(_COLUMNS, rows)
+    made = figure_page("gains", text, lambda: draw_robust_gains(data), tables, data, shown=shown)
+    publish(made, args.out_dir)
+
+
+def _row(data: xr.Dataset) -> tuple[str, ...]:
+    plain, own, price = (float(data[name]) for name in ("loss_plain", "loss_own", "price"))
+    words = (str(data[name].item()) for name in ("preset", "asks", "loads", "copies"))
+    return *words, f"{plain:.4g}", f"{own:.4g}", f"{1 - own / plain:.1%}", f"{price:.4g}"
+
+
+def draw_robust_gains(data: xr.Dataset) -> Figure:
+    """Draws the figure at two-column width.
+
+    Args:
+        data: the gains.
+    """
+    high = _ROW * data.sizes["preset"]
+    figure = style.page(16.0 + high + 11.0)
+    style.letter(figure, 1.0, 1.0, "a", "Loss under what the preset asks for")
+    right = _LEFT + _WIDE + _GAP
+    style.letter(figure, right - 6.0, 1.0, "b", "Against the study's own design")
+    _losses(style.place(figure, _LEFT, 16.0, _WIDE, high), data)
+    _changes(style.place(figure, right, 16.0, _WIDE, high), data)
+    return figure
+
+
+def _rows(axes: Axes, data: xr.Dataset) -> np.ndarray:
+    place = np.arange(data.sizes["preset"])
+    axes.set(ylim=(len(place) - 0.5, -0.5), yticks=place)
+    axes.tick_params(axis="y", length=0)
+    return place
+
+
+def _losses(axes: Axes, data: xr.Dataset) -> None:
+    place = _rows(axes, data)
+    unit = data["loss_own"].attrs["units"]
+    axes.set(xscale="log", xlabel="loss" if unit == "1" else f"loss ({unit})")
+    axes.set_yticklabels([str(name) for name in data["preset"].values])
+    axes.hlines(place, data["loss_own"], data["loss_altered"], color=style.PALE, linewidth=1.0)
+    for name, (label, colour, marker) in _AGAINST.items():
+        axes.plot(data[name], place, marker, color=colour, label=label, markersize=4.0)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=0.8)
+
+
+def _changes(axes: Axes, data: xr.Dataset) -> None:
+    """Tells how much less loss the preset's design has, and how much more it pays for that."""
+    place = _rows(axes, data)
+    axes.set_yticklabels([])
+    axes.axvline(0.0, color=style.GREY, linewidth=0.6)
+    for values, colour, marker, label in (
+        (data["loss_own"] / data["loss_plain"], style.CLOAKED, "o", "under the preset's loads"),
+        (data["price"] / data["loss_drive"], style.GREY, "s", "under the study's drive"),
+    ):
+        change = 100 * (values.values - 1)
+        axes.plot(change, place, marker, color=colour, label=label, markersize=4.0)
+    axes.set(xlabel="change of the loss (%)")
+    axes.xaxis.set_major_locator(MaxNLocator(6))
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.04, 1.0), ncols=2, columnspacing=0.8)

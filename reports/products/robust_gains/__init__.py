@@ -1,1 +1,0 @@
-"""Shows what robust designs gain over the study's own."""

@@ -1,0 +1,164 @@
+"""Draws a spectrum: lowest modes, transmission of the drive, bands of the unit cell."""
+
+from __future__ import annotations
+
+import argparse
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from pipeline import datasets, problem
+from pipeline.problem import Problem
+from reports.base import Table, style
+from reports.page import FigureText, figure_page, publish, titled
+from reports.panels import draw
+from reports.study import from_dataset, study_results
+
+_LEAD = (
+    "Small vibrations of the structures about their equilibria, and waves in the unit cell of the"
+    " lattice."
+)
+_CAPTION = (
+    "(a) Lowest modes, exaggerated and coloured by their motion; frequencies without damping."
+    " (b) Steady motion under a small harmonic motion of the driven units, with damping; the mean"
+    " over the load cases where there are several. (c) Waves round the triangle of the Brillouin"
+    " zone, without damping, about the lattice at rest and compressed along x with the stress"
+    " across relieved."
+)
+_TABLES = {
+    "transmission": "Motion of the region of interest per motion of the drive (rms)",
+    "frequency": "Eigenfrequencies (Hz), undamped",
+    "band_frequency": "Frequencies of waves in the unit cell (Hz)",
+}
+_FILES = ("transmission.csv", "modes.csv", "bands.csv")
+MODES = 4
+"""Modes of each structure that are drawn, the lowest ones."""
+SHOWN = 0.45
+"""Largest motion of a drawn mode, in spacings."""
+_DECADES = 10.0
+"""Spread of the transmission from which on its axis is logarithmic."""
+_BANDS = (style.INTACT, style.METHOD_COLOURS["mma"], style.ALTERED, style.CLOAKED)
+_SIDE, _PITCH, _LEFT, _TOP = 36.0, 41.5, 10.0, 9.0
+_ROW = _SIDE + 4.5
+
+
+def report(args: argparse.Namespace) -> None:
+    """Makes the report that a command line asks for."""
+    asked = problem.load(args.problem, args.preset)
+    data = datasets.read(args.spectrum, "spectrum")
+    study_results.check_problem(asked, "spectrum", data, args.spectrum)
+    text = FigureText(titled(asked, args.problem), "small vibrations", _LEAD, _CAPTION)
+    tables = [
+        Table(file, words, _columns(data[name]))
+        for file, (name, words) in zip(_FILES, _TABLES.items(), strict=True)
+    ]
+    made = figure_page("spectrum", text, lambda: draw_spectrum(data, asked), tables, data)
+    publish(made, args.out_dir)
+
+
+def _columns(values: xr.DataArray) -> dict[str, list[object]]:
+    frame = values.rename("value").to_dataframe().reset_index()
+    return {str(column): frame[column].tolist() for column in (*values.dims, "value")}
+
+
+def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
+    """Draws the figure at two-column width.
+
+    Args:
+        data: the spectrum.
+        asked: its problem.
+    """
+    names = list(data["structure"].values)
+    below = _TOP + len(names) * _ROW + 3.0
+    figure = style.page(below + 66.0)
+    state = data["state"].values[-1]
+    style.letter(figure, 1.0, 1.0, "a", f"Lowest modes {state}")
+    for row, name in enumerate(names):
+        top = _TOP + row * _ROW
+        style.write(
+            figure, 2.0, top + _SIDE / 2, name.capitalize(), rotation=90.0, va="center",
+            color=style.STRUCTURE_COLOURS[name],
+        )  # fmt: skip
+        for mode in range(min(MODES, data.sizes["mode"])):
+            axes = style.place(figure, _LEFT + mode * _PITCH, top, _SIDE, _SIDE)
+            _mode(axes, data.sel(structure=name, state=state), mode, asked.lattice.spacing)
+    style.letter(
+        figure, 1.0, below, "b", "Motion of the region of interest per motion of the drive"
+    )
+    _transmission(style.place(figure, 13.0, below + 14.0, 70.0, 42.0), data, asked)
+    style.letter(figure, 95.0, below, "c", "Waves in the intact lattice")
+    _bands(style.place(figure, 108.0, below + 14.0, 64.0, 42.0), data)
+    return figure
+
+
+def _mode(axes: Axes, data: xr.Dataset, mode: int, spacing: float) -> None:
+    structure = from_dataset(data, spacing)
+    motion = data["mode_shape"].isel(mode=mode).transpose("unit", "dof").values
+    size = np.linalg.norm(motion[:, :2], axis=1)
+    base = np.nan_to_num(data["equilibrium"].transpose("unit", "dof").values)
+    draw(
+        axes,
+        structure,
+        base + SHOWN * spacing * np.nan_to_num(motion),
+        values=size,
+        colour_map=style.MAGNITUDE,
+        norm=None,
+        margin=SHOWN * spacing,
+    )
+    axes.set_title(f"{data['frequency'].values[mode]:.1f} Hz", pad=1.5, fontsize=style.SMALL)
+
+
+def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
+    excited = data["excitation"].values
+    for name in data["structure"].values:
+        curves = data["transmission"].sel(structure=name)
+        for state, dashes in zip(data["state"].values, ("-", (0, (3.0, 1.5))), strict=False):
+            mean = np.sqrt((curves.sel(state=state) ** 2).mean("case"))
+            axes.plot(
+                excited, mean, color=style.STRUCTURE_COLOURS[name], linestyle=dashes,
+                label=name if len(data["state"]) == 1 else f"{name}, {state}", linewidth=0.8,
+            )  # fmt: skip
+    if asked.frequency is not None and excited[0] <= asked.frequency <= excited[-1]:
+        axes.axvline(asked.frequency, color=style.GREY, linewidth=0.6, linestyle=":")
+        axes.annotate(
+            "drive", (asked.frequency, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -7),
+            textcoords="offset points", color=style.GREY, fontsize=style.SMALL,
+        )  # fmt: skip
+    axes.set(
+        xlabel="frequency (Hz)",
+        ylabel="rms |u| / amplitude of the drive",
+        xlim=(excited[0], excited[-1]),
+    )
+    low, high = axes.get_ylim()
+    if low <= 0 or high / low > _DECADES:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, columnspacing=1.0)
+
+
+def _bands(axes: Axes, data: xr.Dataset) -> None:
+    place = data["wave"].values
+    handles = []
+    for share, lateral, colour in zip(
+        data["compression"].values, data["lateral_strain"].values, _BANDS, strict=False
+    ):
+        found = data["band_frequency"].sel(compression=share).transpose("wave", "band").values
+        axes.plot(place, found / 1000, color=colour, linewidth=0.7)
+        words = (
+            "at rest"
+            if share == 0
+            else f"{100 * share:.3g} % shorter, {-100 * lateral:.2g} % narrower"
+        )
+        handles.append(Line2D([], [], color=colour, label=words))
+    axes.set_xticks(range(4), ["Γ", "X", "M", "Γ"])
+    axes.grid(axis="x", color=style.PALE, linewidth=0.5)
+    axes.set(ylabel="frequency (kHz)", xlim=(0, 3), ylim=(min(0.0, axes.get_ylim()[0]), None))
+    axes.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(-0.12, 1.0), ncols=2, columnspacing=1.0
+    )

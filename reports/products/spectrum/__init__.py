@@ -1,1 +1,0 @@
-"""Shows small vibrations: modes, transmission, waves in the unit cell."""

@@ -1,1 +1,0 @@
-"""Shows the counts of the stress suite."""

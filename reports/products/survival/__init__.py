@@ -1,1 +1,0 @@
-"""Shows what survived damage, kills and full disks."""
