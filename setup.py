@@ -55,4 +55,9 @@ class BuildRooms(build_py):
             shutil.copy(path, copy)
 
 
-setup(cmdclass={"build_py": BuildRooms})
+MADE = ROOT / ".cache/package"
+MADE.mkdir(parents=True, exist_ok=True)
+setup(
+    cmdclass={"build_py": BuildRooms},
+    options={"build": {"build_base": str(MADE)}, "egg_info": {"egg_base": str(MADE)}},
+)

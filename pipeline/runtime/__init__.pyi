@@ -2,8 +2,9 @@ from . import case_log as case_log
 from . import cli as cli
 from . import streams as streams
 from .atomic_write import write_atomically as write_atomically
+from .atomic_write import write_folder_atomically as write_folder_atomically
 from .bounded_read import read_bounded as read_bounded
-from .case_log import Casebook as Casebook
+from .case_log import CaseLog as CaseLog
 from .case_log import SweepResult as SweepResult
 from .environment import RUN_MARK as RUN_MARK
 from .environment import pin as pin

@@ -1,8 +1,9 @@
-"""Files that appear whole or not at all."""
+"""Writes files and folders that appear complete or not at all."""
 
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +15,7 @@ from pipeline.runtime.errors import refusal
 
 @contextmanager
 def write_atomically(path: Path) -> Iterator[Path]:
-    """A path beside ``path`` to write to: it takes its place at the end, or vanishes on an error.
+    """Yields a path beside ``path`` to write to, which takes its place at the end, or vanishes.
 
     It is this process's own, so that two that write the same file do not meet half of each other's.
 
@@ -35,8 +36,32 @@ def write_atomically(path: Path) -> Iterator[Path]:
         _discard(aside)
 
 
+@contextmanager
+def write_folder_atomically(folder: Path) -> Iterator[Path]:
+    """Yields a new folder that takes the place of ``folder`` at the end, or vanishes on an error.
+
+    Raises:
+        UserError: the disk is full, read-only or not ours.
+    """
+    aside = folder.with_name(f".{folder.name}.part")
+    former = folder.with_name(f".{folder.name}.former")
+    try:
+        for old in (aside, former):
+            shutil.rmtree(old, ignore_errors=True)
+        aside.mkdir(parents=True)
+        yield aside
+        if folder.exists():
+            folder.rename(former)
+        aside.rename(folder)
+    except OSError as error:
+        raise refusal(error.filename or folder, error) from error
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+        shutil.rmtree(former, ignore_errors=True)
+
+
 def sync(path: Path) -> None:
-    """Returns when the content of a file, or the names in a folder, are safe on the disk."""
+    """Waits until the content of a file, or the names in a folder, are safe on the disk."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -53,7 +78,7 @@ def _clear(path: Path) -> None:
 
 
 def _literal(name: str) -> str:
-    """A pattern that matches the name alone."""
+    """Makes a pattern that matches the name alone."""
     return name.replace("[", "[[]")
 
 

@@ -1,4 +1,4 @@
-"""Cases with their results as they come: a CSV that is read while it grows, and resumed from.
+"""Logs cases with their results as they come: a CSV that is read while it grows, and resumed.
 
 Every part of a sweep appends to a file of its own. A line counts if it is whole and its check, a
 CRC-32 of what is before it, holds: whatever ends a process, at most the cases under way are lost.
@@ -18,7 +18,7 @@ COLUMNS = ("loss", "loss_altered", "min_void_angle", "status")
 
 
 class SweepResult(NamedTuple):
-    """What came of a case; NaN where nothing did, and why."""
+    """Holds the result of a case; NaN where there is none, and why."""
 
     loss: float
     loss_altered: float
@@ -27,17 +27,17 @@ class SweepResult(NamedTuple):
 
     @classmethod
     def failed(cls, why: str) -> SweepResult:
-        """A case without a result."""
+        """Makes that of a case without a result."""
         return cls(float("nan"), float("nan"), float("nan"), why)
 
 
 def header(keys: Sequence[str]) -> list[str]:
-    """The names of the columns: the case's number, what it sets, what came of it, a check."""
+    """Names the columns: the case's number, its settings, its results, a check."""
     return ["case", *keys, *COLUMNS, "check"]
 
 
 def known(folder: Path) -> dict[int, SweepResult]:
-    """The results in all files of a folder, by number of the case; damaged lines tell nothing."""
+    """Reads the results in all files of a folder, by number of the case, without damaged lines."""
     found = {}
     for path in sorted(folder.glob("*.csv")):
         for number, *_, loss, altered, void, status in csv.reader(_whole_lines(path)):
@@ -46,7 +46,7 @@ def known(folder: Path) -> dict[int, SweepResult]:
 
 
 def _whole_lines(path: Path) -> Iterator[str]:
-    """The lines of a file whose checks hold, without them; the heading is none."""
+    """Yields the lines of a file whose checks hold, without these; the heading is none."""
     with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
         for line in file:
             told, _, check = line.rpartition(",")
@@ -58,7 +58,7 @@ def _check(told: str) -> str:
     return f"{zlib.crc32(told.encode()):08x}"
 
 
-class Casebook:
+class CaseLog:
     """Appends results to a file, which is begun where there is none; a context manager."""
 
     def __init__(self, path: Path, keys: Sequence[str]) -> None:
@@ -69,7 +69,7 @@ class Casebook:
             self._file.write(f"{_row(header(keys))}\n")
 
     def add(self, rows: Iterable[tuple[int, Sequence[object], SweepResult]]) -> None:
-        """Numbers, settings and results of some cases, on the disk when this returns."""
+        """Adds numbers, settings and results of some cases, on the disk when this returns."""
         for number, setting, found in rows:
             status = " ".join(found.status.split())
             told = _row([number, *setting, *map(repr, found[:-1]), status])
@@ -77,7 +77,7 @@ class Casebook:
         self._file.flush()
         os.fsync(self._file.fileno())
 
-    def __enter__(self) -> Casebook:
+    def __enter__(self) -> CaseLog:
         return self
 
     def __exit__(self, *_: object) -> None:

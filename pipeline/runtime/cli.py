@@ -1,4 +1,4 @@
-"""The frame of every command line: options, logs, and errors that people can read."""
+"""Frames every command line: options, logs, and errors that people can read."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def _told(error: Exception, log: Path | None) -> int:
 
 @contextmanager
 def _logging(log: Path | None, *, quiet: bool) -> Iterator[None]:
-    """Messages of the project to stderr, and all that there is to the log."""
+    """Sends messages of the project to stderr, and all that there is to the log."""
     console = logging.StreamHandler()
     console.setLevel(logging.ERROR if quiet else logging.INFO)
     console.addFilter(lambda record: not getattr(record, "drawn", False))
@@ -164,7 +164,7 @@ def _log_file(log: Path) -> logging.Handler:
 
 @contextmanager
 def _terminable() -> Iterator[None]:
-    """SIGTERM unwinds the stack, so that what is half done is put away."""
+    """Lets SIGTERM unwind the stack, so that what is half done is put away."""
 
     def leave(number: int, frame: FrameType | None) -> None:
         del frame

@@ -1,4 +1,4 @@
-"""The one place that says how a process of this project runs: one thread, fixed seeds, own caches.
+"""Sets how a process of this project runs: one thread, fixed seeds, own caches.
 
 Small systems lose up to thirty times their speed to threads of BLAS and XLA, and results are only
 byte-reproducible without them; work is spread over cores as processes instead. The libraries read

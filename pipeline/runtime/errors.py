@@ -1,4 +1,4 @@
-"""The one error that people are meant to read: what is wrong, where, and what to do about it."""
+"""Defines the error that people read: what is wrong, where, and what to do about it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _REFUSALS = {
 
 
 class UserError(Exception):
-    """A mistake in the input or a refusal by the machine, told on one screen without a traceback.
+    """Reports a mistake in the input or a refusal by the machine, without a traceback.
 
     Args:
         what: the fault in one sentence.
@@ -68,7 +68,7 @@ def _shortened(text: str) -> str:
 
 
 def refusal(path: str | PathLike[str], error: OSError) -> UserError:
-    """What it means to the user that the machine refused to use the file or folder `path`."""
+    """Tells the user what it means that the machine refused the file or folder `path`."""
     otherwise = (error.strerror or str(error), "check the path, then run the same command again")
     what, remedy = _REFUSALS.get(error.errno or 0, otherwise)
     return UserError(what, file=path, remedy=remedy)

@@ -1,4 +1,4 @@
-"""How far a long job is: a bar on a terminal, sparse plain lines in a log or a pipe."""
+"""Shows how far a long job is: a bar on a terminal, sparse plain lines in a log or a pipe."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Standard streams for a process that was started without some of them."""
+"""Completes the standard streams of a process that was started without some of them."""
 
 from __future__ import annotations
 

@@ -41,7 +41,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-
     asked = load_section(path, Calibration)
     fit = fit_calibration(asked, path)
     try:
@@ -64,7 +63,6 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
 
 
 def _synthesise(path: Path, args: argparse.Namespace) -> None:
-
     asked = load_section(path, Calibration)
     if asked.virtual is None:
         remedy = "its data are measured: run python -m pipeline calibrate FILE --out NC"

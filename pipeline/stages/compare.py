@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import logging
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.comparison import (
@@ -24,17 +24,12 @@ from pipeline.comparison import (
 )
 from pipeline.datasets import provenance
 from pipeline.posing import read_design, scene_of, structures_of
+from pipeline.problem import Problem
 from pipeline.runtime import UserError
+from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built
 from pipeline.virtual_lab import select_structure
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.comparison import Compared
-    from pipeline.problem import Problem
-    from pipeline.tracking.frames import Recording
 
 LOG = logging.getLogger(__name__)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
@@ -21,26 +23,21 @@ from pipeline.posing import (
     start_vector,
     unit_coordinates,
 )
+from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
 from sim.constraints import KIND_NAMES, ConstraintVector, margins
-from sim.core import SimulationError
+from sim.core import Floats, SimulationError
 from sim.optimise import (
+    Evaluation,
     InfeasibleStartError,
     Journal,
     JournalInUseError,
     MmaOptions,
+    Result,
     SqpOptions,
 )
-from sim.scene import Paths, make_plan, minimise
+from sim.scene import Paths, Plan, Scene, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from sim.core import Floats
-    from sim.optimise import Evaluation, MmaOptions, Result, SqpOptions
-    from sim.scene import Plan, Scene
 
 LOG = logging.getLogger(__name__)
 
@@ -142,7 +139,6 @@ def optimise(
 
 
 def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
-
     wanted = asked.optimiser
     evaluations = wanted.methods.chosen[method].evaluations
     if method == "mma":
@@ -158,9 +154,6 @@ def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
 
 def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     """The dataset ``design_method`` of an optimisation."""
-    import numpy as np
-    import xarray as xr
-
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))

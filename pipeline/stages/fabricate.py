@@ -16,7 +16,7 @@ from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_
 from pipeline.fabrication.parts import THIN_WALL, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
-from pipeline.runtime import cli, refusal
+from pipeline.runtime import cli, write_folder_atomically
 
 LOG = logging.getLogger(__name__)
 
@@ -33,7 +33,10 @@ def work(args: argparse.Namespace) -> None:
     pictures = args.out_dir.with_name(f"{args.out_dir.name}_faults")
     shutil.rmtree(pictures, ignore_errors=True)
     total = 2 * len(net.numbers) + 2 + STEPS
-    with cli.progress(total, f"fabrication, {args.structure}") as bar, _aside(args.out_dir) as room:
+    with (
+        cli.progress(total, f"fabrication, {args.structure}") as bar,
+        write_folder_atomically(args.out_dir) as room,
+    ):
         names = (study, args.structure)
         with _picture_of_fault(pictures):
             specimen = build_specimen(net, settings, names, args.design, bar.update)
@@ -60,23 +63,3 @@ def _picture_of_fault(pictures: Path) -> Iterator[None]:
         path = draw(error.what, error.around, error.spot, pictures / "fault_1.png")
         error.remedy = f"{error.remedy}; see {path}"
         raise
-
-
-@contextmanager
-def _aside(folder: Path) -> Iterator[Path]:
-    """Opens a new folder that takes the place of ``folder`` once complete, and vanishes if not."""
-    room = folder.with_name(f".{folder.name}.part")
-    former = folder.with_name(f".{folder.name}.former")
-    try:
-        for old in (room, former):
-            shutil.rmtree(old, ignore_errors=True)
-        room.mkdir(parents=True)
-        yield room
-        if folder.exists():
-            folder.rename(former)
-        room.rename(folder)
-    except OSError as error:
-        raise refusal(error.filename or folder, error) from error
-    finally:
-        shutil.rmtree(room, ignore_errors=True)
-        shutil.rmtree(former, ignore_errors=True)

@@ -6,13 +6,14 @@ import argparse
 import logging
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
 from pipeline.runtime import UserError, cli, found_in, write_atomically
-from pipeline.tracking.frames import SYNTHETIC_LABEL
+from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.virtual_lab import (
@@ -24,12 +25,6 @@ from pipeline.virtual_lab import (
     select_case,
     select_structure,
 )
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem.sections import VirtualRecording
-    from pipeline.tracking.frames import Recording
 
 LOG = logging.getLogger(__name__)
 
@@ -84,7 +79,6 @@ def _plan(args: argparse.Namespace) -> None:
 
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
-
     asked, virtual = _virtual(path)
     if out.suffix not in virtual.codec.suffixes:
         raise UserError(

@@ -21,7 +21,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
-
     asked = problem.load(args.problem, args.preset)
     if asked.robustness is None:
         raise UserError(

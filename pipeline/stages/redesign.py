@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import argparse
 import logging
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import design_scene, law_comparison, read_design, shipped_vector
+from pipeline.problem import Problem
 from pipeline.problem.sections import Method, Methods
 from pipeline.stages.design import design_dataset, optimise
 from pipeline.stages.select import join
 from sim.scene import make_plan
-
-if TYPE_CHECKING:
-    from pipeline.problem import Problem
 
 LOG = logging.getLogger(__name__)
 

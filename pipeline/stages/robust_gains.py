@@ -5,21 +5,18 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
+from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from sim.scene import Scene
+from sim.scene import Scene
 
 PLAIN = "plain"
 HELD_OUT = 16
@@ -67,8 +64,6 @@ def gains(path: Path, designs: Mapping[str, Path]) -> xr.Dataset:
     Raises:
         UserError: a preset asks for nothing but the study's own drive.
     """
-    import xarray as xr
-
     own = problem.load(path)
     presets = [name for name in designs if name != PLAIN]
     with cli.progress(len(presets) + 1, "losses") as bar:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import argparse
 import logging
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.runtime import UserError
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 LOG = logging.getLogger(__name__)
 
@@ -55,8 +53,6 @@ def _merit(design: xr.Dataset) -> tuple[int, float]:
 
 def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:
     """Histories of all methods side by side, everything else of the best."""
-    import xarray as xr
-
     history = [
         name
         for name, variable in designs[best].data_vars.items()

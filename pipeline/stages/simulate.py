@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
@@ -22,17 +23,11 @@ from pipeline.posing import (
     structures_of,
     times_of,
 )
+from pipeline.problem import Problem
 from pipeline.runtime import cli
-from sim.core import Floats
-from sim.scene import cases_of, make_plan
+from sim.core import Floats, SimulationError
+from sim.scene import Scene, cases_of, make_plan
 from sim.solvers import run_batch
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from sim.core import SimulationError
-    from sim.scene import Scene
 
 LOG = logging.getLogger(__name__)
 

@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import (
+    PosedStructure,
+    Variables,
     case_directions,
     compute_bands,
     lattice_of,
@@ -22,19 +25,12 @@ from pipeline.posing import (
     structures_of,
     unit_coordinates,
 )
+from pipeline.problem import Problem
+from pipeline.problem.sections import Spectrum
 from pipeline.runtime import UserError, cli
 from sim.core import Floats
 from sim.scene import concrete_parameters, simulate
-from sim.vibration import linearised, modes
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.posing import PosedStructure, Variables
-    from pipeline.problem import Problem
-    from pipeline.problem.sections import Spectrum
-    from sim.vibration import Linear
-
+from sim.vibration import Linear, linearised, modes
 
 STATES = ("at rest", "loaded")
 _MODE = ("structure", "state", "mode")
@@ -78,8 +74,6 @@ def spectrum(asked: Problem, wanted: Spectrum, folder: Path, design: Path) -> xr
     Raises:
         UserError: the lattice has fewer modes, or no unit cell, or it does not hold the strain.
     """
-    import xarray as xr
-
     scene = scene_of(asked, folder)
     structures = structures_of(scene, read_design(asked, design))
     intact = lattice_of(asked)
@@ -133,7 +127,6 @@ def _vibrations(
 
 
 def _equilibria(structure: PosedStructure) -> list[Floats]:
-
     scene = structure.scene
     found = [np.zeros((scene.lattice.n_units, 3))]
     if scene.loads.static:
@@ -144,7 +137,6 @@ def _equilibria(structure: PosedStructure) -> list[Floats]:
 
 
 def _modes(made: Linear, count: int) -> tuple[Floats, Floats]:
-
     try:
         found = modes(made, count)
     except ValueError as error:

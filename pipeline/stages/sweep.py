@@ -6,23 +6,17 @@ import argparse
 import hashlib
 import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
 from pipeline.posing import loss_units, read_design, setting_losses
-from pipeline.problem.sections import split_value, sweep_cases
-from pipeline.runtime import SweepResult, UserError, case_log, cli, source_hash
+from pipeline.problem import Problem
+from pipeline.problem.sections import DirectionGroup, SettingValue, split_value, sweep_cases
+from pipeline.runtime import CaseLog, SweepResult, UserError, case_log, cli, source_hash
 from sim.core import SimulationError
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
-    from pipeline.problem.sections import DirectionGroup, SettingValue
-    from pipeline.runtime import Casebook, SweepResult
 
 LOG = logging.getLogger(__name__)
 
@@ -33,7 +27,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _run(args: argparse.Namespace) -> None:
-
     asked = problem.load(args.problem, args.preset)
     if asked.sweep is None:
         raise UserError(
@@ -50,7 +43,7 @@ def _run(args: argparse.Namespace) -> None:
     here = sweep_cases.select_groups(asked.sweep, args.chunk, args.chunks)
     found = case_log.known(folder)
     path = folder / f"part_{args.chunk}.csv"
-    with case_log.Casebook(path, asked.sweep.keys) as book:
+    with case_log.CaseLog(path, asked.sweep.keys) as book:
         LOG.info("results as they come: %s", path)
         _simulate(args, asked, design["vertices"], here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
@@ -65,7 +58,7 @@ def _simulate(
     vertices: xr.DataArray,
     groups: Sequence[DirectionGroup],
     found: dict[int, SweepResult],
-    book: Casebook,
+    book: CaseLog,
 ) -> None:
     """Adds what is missing to ``found`` and to the casebook."""
     failed = 0
@@ -84,7 +77,6 @@ def _simulate(
 def _results(
     args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: DirectionGroup
 ) -> list[SweepResult]:
-
     setting = group.together
     try:
         found = setting_losses.results(asked, setting, args.problem.parent, vertices, args.threads)
@@ -101,8 +93,6 @@ def dataset(
     found: dict[int, SweepResult],
 ) -> xr.Dataset:
     """The dataset ``sweep`` of some cases."""
-    import xarray as xr
-
     assert asked.sweep is not None
     keys = asked.sweep.keys
     numbers = [number for number, _ in cases]

@@ -8,15 +8,16 @@ import logging
 import os
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.runtime import PREFIX, UserError, cli, found_in, write_atomically
 from pipeline.tracking.frames import (
     SYNTHETIC_LABEL,
+    Recording,
     frame_count,
     has_uneven_intervals,
     import_video,
@@ -27,15 +28,9 @@ from pipeline.tracking.frames import (
 )
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import as_built, outlines_of_design
-from pipeline.tracking.motion import track_video
+from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.tracking.frames import Recording
-    from pipeline.tracking.motion import Track
 
 LOG = logging.getLogger(__name__)
 
@@ -60,7 +55,6 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _points(path: Path, args: argparse.Namespace) -> None:
-
     asked = dic_points.load(path)
     source = _design(asked.design, path, args.design)
     design = as_built(datasets.read(source, "design"), asked.structure)
@@ -109,7 +103,6 @@ def _init(video: Path, args: argparse.Namespace) -> None:
 
 
 def _import(path: Path, args: argparse.Namespace) -> None:
-
     described = import_video.description(path)
     shown = import_video.video_of(path) if args.video is None else args.video
     name, folder = shown.stem, args.out_dir
@@ -125,7 +118,6 @@ def _import(path: Path, args: argparse.Namespace) -> None:
 
 
 def _track(path: Path, args: argparse.Namespace) -> None:
-
     if path.is_dir() or path.suffix.lower() in import_video.VIDEOS:
         remedy = f"python -m pipeline track init {path} --design NC proposes a recording of it"
         raise UserError("a video, where a recording is wanted", file=path, remedy=remedy)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
@@ -24,13 +24,9 @@ from pipeline.posing import (
     time_refinement,
     times_of,
 )
+from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from pipeline.stages.simulate import measured_cases
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.problem import Problem
 
 LOG = logging.getLogger(__name__)
 

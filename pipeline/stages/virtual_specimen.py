@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.posing import (
+    PosedStructure,
     case_directions,
     lattice_of,
     network_variables,
@@ -20,20 +21,13 @@ from pipeline.posing import (
     times_of,
     unit_coordinates,
 )
+from pipeline.problem import Problem
 from pipeline.runtime import UserError, found_in
+from pipeline.tracking.frames import Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.virtual_lab import make_specimen
-from sim.core import SimulationError
-from sim.scene import simulate
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from pipeline.posing import PosedStructure
-    from pipeline.problem import Problem
-    from pipeline.tracking.frames import Recording
-    from sim.core import Floats
-    from sim.scene import Scene
+from sim.core import Floats, SimulationError
+from sim.scene import Scene, simulate
 
 
 def work(args: argparse.Namespace) -> None:
@@ -104,8 +98,6 @@ def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
 def _described(
     asked: Problem, altered: Scene, made: PosedStructure, case: int, times: Floats
 ) -> xr.Dataset:
-    import xarray as xr
-
     scene, vertices = made
     intact, lattice = lattice_of(asked), scene.lattice
     motion, force = _simulated(made, times)

@@ -1,4 +1,4 @@
-"""The calibrations, as the workflow sees them: what each depends on.
+"""Lists the calibrations and the files that each depends on.
 
 A calibration is a file experiments/calibration/NAME.yaml. It names measured files beside it, or
 tells how they are computed.
@@ -18,12 +18,12 @@ _FOLDER = "experiments/calibration"
 
 
 def calibrations(root: Path = WORK) -> list[str]:
-    """The names of all calibrations."""
+    """Lists the names of all calibrations."""
     return sorted(path.stem for path in (root / _FOLDER).glob("*.yaml"))
 
 
 def measurements(wildcards: Wildcards) -> dict[str, str]:
-    """The files that a fit depends on: its YAML, measured files and problems; or computed ones."""
+    """Lists the files that a fit depends on: YAML, measured files, problems, or computed ones."""
     source = f"{_FOLDER}/{wildcards.calibration}.yaml"
     asked = _described(source)
     if asked is not None and asked.virtual is not None:
@@ -35,7 +35,7 @@ def measurements(wildcards: Wildcards) -> dict[str, str]:
 
 
 def problems_of(wildcards: Wildcards) -> dict[str, str]:
-    """The problems of the studies that tracks are of, each by the name of its set."""
+    """Lists the problems of the studies that tracks are of, each by the name of its set."""
     asked = _described(f"{_FOLDER}/{wildcards.calibration}.yaml")
     sets = asked.data if asked is not None else ()
     tracks = [each for each in sets if isinstance(each, TrackedMotion)]
@@ -43,13 +43,13 @@ def problems_of(wildcards: Wildcards) -> dict[str, str]:
 
 
 def description(wildcards: Wildcards) -> str:
-    """The YAML that a fit takes."""
+    """Names the YAML that a fit takes."""
     found = measurements(wildcards)
     return found.get("description") or f"{found['folder']}/calibration.yaml"
 
 
 def _described(source: str) -> Calibration | None:
-    """The calibration; None for one that cannot be read, of which the stage will tell why."""
+    """Reads the calibration; None where it cannot be read, of which the stage will tell why."""
     try:
         return load_section(WORK / source, Calibration)
     except UserError:

@@ -12,7 +12,7 @@ from textwrap import indent
 
 from pipeline import problem
 from pipeline.problem.outlines import read_outlines
-from pipeline.runtime import BUILD, UserError, found_in
+from pipeline.runtime import BUILD, UserError, found_in, write_folder_atomically
 
 LOG = logging.getLogger(__name__)
 
@@ -31,31 +31,25 @@ _SMALL_IMAGE = "image:\n  width: 45 mm"
 
 
 def work(args: argparse.Namespace) -> None:
-    """Writes the study's folder, whole or not at all.
+    """Writes the study's folder, complete or not at all.
 
     Raises:
         UserError: a bad name, a study of that name, or an image that shows no shape.
     """
     folder = args.folder / args.name
     _check(args, folder)
-    aside = args.folder / f".{args.name}.part"
-    shutil.rmtree(aside, ignore_errors=True)
-    try:
-        aside.mkdir(parents=True)
+    with write_folder_atomically(folder) as aside:
         if args.image is not None:
             shutil.copyfile(args.image, aside / args.image.name)
         made = aside / "problem.yaml"
         made.write_text(text(args.name, args.kind, args.image), encoding="utf-8")
         for preset in (None, "quick"):
             problem.load(made, preset)
-        aside.rename(folder)
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
     LOG.info("made %s; a draft: %s %s@quick", folder / "problem.yaml", BUILD, args.name)
 
 
 def text(name: str, kind: str, image: Path | None) -> str:
-    """The problem file of a new study."""
+    """Fills in the problem file of a new study."""
     if image is None:
         void, small = _DISC, _SMALL_DISC
     else:

@@ -1,4 +1,4 @@
-"""The JSON schema of problem files, for editors that complete and check while one types."""
+"""Writes the JSON schema of problem files, for editors that complete and check."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _OVERLAY = "Overlay"
 
 
 def schema() -> dict[str, Any]:
-    """The schema of a problem file, presets included."""
+    """Builds the schema of a problem file, presets included."""
     whole = _without_working_units(Problem.model_json_schema(mode="validation"))
     sections = whole.pop("$defs")
     overlay = _overlaid({key: value for key, value in whole.items() if key != "title"})
@@ -32,12 +32,12 @@ def schema() -> dict[str, Any]:
 
 
 def text() -> str:
-    """The schema as it is committed."""
+    """Formats the schema as it is committed."""
     return json.dumps(schema(), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
 
 
 def _without_working_units(node: Any) -> Any:  # noqa: ANN401  (any JSON)
-    """Defaults of quantities are floats in working units, which a file may not hold: leave them."""
+    """Drops defaults of quantities: floats in working units, which a file may not hold."""
     if isinstance(node, list):
         return [_without_working_units(item) for item in node]
     if not isinstance(node, dict):
@@ -47,7 +47,7 @@ def _without_working_units(node: Any) -> Any:  # noqa: ANN401  (any JSON)
 
 
 def _overlaid(node: Any) -> Any:  # noqa: ANN401  (any JSON)
-    """The schema of a part of what `node` describes: nothing is required, null removes a key."""
+    """Builds the schema of a part of `node`: nothing is required, null removes a key."""
     if isinstance(node, list):
         return [_overlaid(item) for item in node]
     if not isinstance(node, dict):

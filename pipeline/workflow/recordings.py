@@ -1,4 +1,4 @@
-"""The recordings of the studies, as the workflow sees them: what each depends on.
+"""Lists the recordings of the studies and the files that each depends on.
 
 A recording is a file experiments/STUDY/recordings/NAME.yaml. It names a video beside it, or tells
 how the virtual lab films the study's own response.
@@ -18,14 +18,14 @@ RECORDINGS = "_recordings"
 
 
 def recording_pages(study: str, root: Path = WORK) -> list[str]:
-    """The quality reports of all recordings of a study, such as fig2 or fig2@quick."""
+    """Lists the quality reports of all recordings of a study, such as fig2 or fig2@quick."""
     folder = root / "experiments" / study.partition("@")[0] / "recordings"
     names = sorted(path.stem for path in folder.glob("*.yaml"))
     return [f"results/{study}/recordings/{name}/index.html" for name in names]
 
 
 def shown_recordings(study: str, root: Path = WORK) -> list[str]:
-    """Names of the recordings that the report of a study, or of a preset of it, shows.
+    """Lists the recordings that the report of a study, or of a preset of it, shows.
 
     One that was filmed takes the place of those that are virtual and show the same structure under
     the same load case. One that cannot be read is shown too: its stage will tell why.
@@ -51,19 +51,19 @@ def _shows(asked: Recording) -> tuple[str, int]:
 
 
 def comparisons(wildcards: Wildcards) -> list[str]:
-    """The datasets of the recordings that the report of a study shows."""
+    """Lists the datasets of the recordings that the report of a study shows."""
     study = f"{wildcards.name}{wildcards.preset}"
     names = shown_recordings(study)
     return [f"results/{study}/recordings/{name}/comparison.nc" for name in names]
 
 
 def compared(wildcards: Wildcards) -> dict[str, str]:
-    """The recording's YAML that a comparison depends on, as it is tracked."""
+    """Names the recording's YAML that a comparison depends on, as it is tracked."""
     return {"recording": tracked(wildcards)["recording"]}
 
 
 def tracked(wildcards: Wildcards) -> dict[str, str]:
-    """The files that tracking a recording depends on: its YAML, video, design, load cell."""
+    """Lists the files that tracking depends on: YAML, video, design, load cell."""
     asked = described(wildcards)
     study = f"results/{wildcards.name}{wildcards.preset}"
     if asked is None or asked.virtual is not None:
@@ -84,7 +84,7 @@ def tracked(wildcards: Wildcards) -> dict[str, str]:
 
 
 def filmed(wildcards: Wildcards) -> str:
-    """What a virtual recording shows: its specimen, or the study's own response."""
+    """Names what a virtual recording shows: its specimen, or the study's own response."""
     asked = described(wildcards)
     study = f"results/{wildcards.name}{wildcards.preset}"
     if asked is None or asked.virtual is None or asked.virtual.specimen is None:
@@ -93,7 +93,7 @@ def filmed(wildcards: Wildcards) -> str:
 
 
 def described(wildcards: Wildcards) -> Recording | None:
-    """The recording; None for one that cannot be read, of which the stage will tell why."""
+    """Reads the recording; None where it cannot be read, of which the stage will tell why."""
     return _read(WORK / _source(wildcards))
 
 

@@ -23,14 +23,14 @@ PASSING = {"logs", ".journal"}
 
 
 def differences(first: Path, second: Path) -> tuple[int, list[str]]:
-    """How many files two folders hold, and the names of those that only one has or that differ."""
+    """Counts the files of two folders, and names those that only one has or that differ."""
     ours, others = _files(first), _files(second)
     names = sorted(ours.keys() | others.keys())
     return len(names), [name for name in names if ours.get(name) != others.get(name)]
 
 
 def _files(folder: Path) -> dict[str, str]:
-    """Hash of every result below a folder, by name."""
+    """Hashes every result below a folder, by name."""
     names = (path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
     return {
         name.as_posix(): file_hash(folder / name)
@@ -40,7 +40,7 @@ def _files(folder: Path) -> dict[str, str]:
 
 
 def _built(target: str, folder: Path) -> Path:
-    """The results of a target that was built from nothing in `folder`."""
+    """Builds a target from nothing in `folder`, and returns its results."""
     folder.mkdir()
     for name in SOURCES:
         (folder / name).symlink_to(ROOT / name)

@@ -1,9 +1,8 @@
-"""What the rules ask before anything runs: what a stage needs of a study.
+"""Answers the rules before anything runs: what a stage needs of a study.
 
 A stage depends on sections of its problem file and on source (pipeline/runtime/source_closure.py).
-Both enter the
-rules as hashes: a rerun follows from what a file says, never from its date. Nothing heavy is
-imported here: this is the time one waits for "nothing to be done".
+Both enter the rules as hashes: a rerun follows from what a file says, never from its date. Nothing
+heavy is imported here: this is the time one waits for "nothing to be done".
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
 
 def datasets_of(shown: Sequence[Study]) -> list[str]:
-    """The datasets that are shown of some studies."""
+    """Lists the datasets that are shown of some studies."""
     return [f"results/{study}/{name}.nc" for study in shown for name in outputs(problem_of(study))]
 
 
 def comparisons_of(shown: Sequence[Study]) -> list[str]:
-    """Their recordings beside their simulation."""
+    """Lists their recordings beside their simulation."""
     return [
         f"results/{study}/recordings/{name}/comparison.nc"
         for study in shown
@@ -40,28 +39,28 @@ def comparisons_of(shown: Sequence[Study]) -> list[str]:
 
 
 def hashes_of(shown: Sequence[Study]) -> str:
-    """Hash of what pictures of them depend on in their problem files."""
+    """Hashes what pictures of them depend on in their problem files."""
     return " ".join(section_hash(problem_of(study), "report") for study in shown)
 
 
 def any_of(names: Iterable[str]) -> str:
-    """A pattern that these names match, and nothing else does."""
+    """Makes a pattern that these names match, and nothing else does."""
     return "|".join(sorted(set(names))) or "(?!)"
 
 
 def members(wildcards: Wildcards) -> list[str]:
-    """The datasets that a figure of several studies shows."""
+    """Lists the datasets that a figure of several studies shows."""
     return datasets_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
 def product_pages(built: str, product: str) -> list[str]:
-    """The pages of a product (`fabrication`, say) of a study, or of all studies of a figure."""
+    """Lists the pages of a product (`fabrication`, say) of a study, or of all of a figure."""
     names = together().get(built) or [Study.parse(built)]
     return [f"results/{study}/{product}/index.html" for study in names]
 
 
 def packages(wildcards: Wildcards) -> list[str]:
-    """The packages of a study, one for each structure."""
+    """Lists the packages of a study, one for each structure."""
     study = study_of(wildcards)
     return [
         f"results/{study}/fabrication/{structure}/manifest.json"
@@ -70,13 +69,13 @@ def packages(wildcards: Wildcards) -> list[str]:
 
 
 def structures_built(problem: Problem) -> tuple[str, ...]:
-    """The structures that a lab would build: the intact one only where a void makes it differ."""
+    """Lists the structures that a lab would build: the intact one where a void makes it differ."""
     both = ("altered", "cloaked")
     return both if problem.void is None else ("intact", *both)
 
 
 def member_hashes(wildcards: Wildcards) -> str:
-    """Hash of what the figure depends on in the problem files of its studies."""
+    """Hashes what the figure depends on in the problem files of its studies."""
     return hashes_of(together()[f"{wildcards.name}{wildcards.preset}"])
 
 
@@ -101,7 +100,8 @@ def check_room(folder: str) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
         with NamedTemporaryFile(dir=path) as probe:
-            os.posix_fallocate(probe.fileno(), 0, ROOM)
+            if sys.platform != "darwin":  # macOS has no such call
+                os.posix_fallocate(probe.fileno(), 0, ROOM)
     except OSError as error:
         told = UserError(
             f"results cannot be written: {error.strerror}",
@@ -112,17 +112,17 @@ def check_room(folder: str) -> None:
 
 
 def study_of(wildcards: Wildcards) -> Study:
-    """The study that a job works on, from its wildcards `name` and `preset`."""
+    """Names the study that a job works on, from its wildcards `name` and `preset`."""
     return Study.parse(f"{wildcards.name}{wildcards.preset}")
 
 
 def options(wildcards: Wildcards) -> str:
-    """Command-line options by which a stage finds its problem."""
+    """Gives the options by which a stage finds its problem."""
     return study_of(wildcards).options
 
 
 def designs(wildcards: Wildcards) -> list[str]:
-    """The designs to choose from, one for each method that the problem names."""
+    """Lists the designs to choose from, one for each method that the problem names."""
     study = study_of(wildcards)
     return [
         f"results/{study}/design_{method}.nc"
@@ -131,13 +131,13 @@ def designs(wildcards: Wildcards) -> list[str]:
 
 
 def start_design(wildcards: Wildcards) -> list[str]:
-    """The design that an optimisation starts from, where it is not the initial lattice."""
+    """Names the design that an optimisation starts from, where that is not the initial lattice."""
     wanted = problem_of(study_of(wildcards)).optimiser.start == "study"
     return [f"results/{wildcards.name}/design.nc"] if wanted else []
 
 
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
-    """The study's own design ("plain") and those of its presets that ask for more."""
+    """Lists the study's own design ("plain") and those of its presets that ask for more."""
     own = problem_of(Study(wildcards.name))
     mine = [study for study in studies() if study.name == wildcards.name and study.preset]
     held = [study for study in mine if problem_of(study).asks_more_than(own)]
@@ -146,13 +146,13 @@ def robust_designs(wildcards: Wildcards) -> dict[str, str]:
 
 
 def chunks(wildcards: Wildcards, most: int) -> list[str]:
-    """The parts of the sweep, at most so many and none without a case of its own."""
+    """Lists the parts of the sweep, at most so many and none without a case of its own."""
     sweep = problem_of(study_of(wildcards)).sweep
     return _parts(wildcards, "sweep", min(most, group_count(sweep) if sweep else 1))
 
 
 def copies(wildcards: Wildcards, most: int) -> list[str]:
-    """The parts of the imperfect copies, at most so many and none without a copy of its own."""
+    """Lists the parts of the imperfect copies, at most so many and none without a copy."""
     robustness = problem_of(study_of(wildcards)).robustness
     return _parts(wildcards, "scatter", min(most, robustness.samples if robustness else 1))
 
@@ -163,20 +163,20 @@ def _parts(wildcards: Wildcards, kind: str, count: int) -> list[str]:
 
 
 def shown(wildcards: Wildcards) -> list[str]:
-    """The datasets that the report of a study shows."""
+    """Lists the datasets that the report of a study shows."""
     study = study_of(wildcards)
     return [f"results/{study}/{name}.nc" for name in outputs(problem_of(study))]
 
 
 def shown_options(wildcards: Wildcards) -> str:
-    """Command-line options that name these datasets."""
+    """Gives the options that name these datasets."""
     names = outputs(problem_of(study_of(wildcards)))
     files = zip(names, shown(wildcards), strict=True)
     return " ".join(f"--{name.replace('_', '-')} {file}" for name, file in files)
 
 
 def section(stage: str) -> Callable[[Wildcards], str]:
-    """A function from wildcards to the hash of what `stage` depends on in the problem file.
+    """Makes a function from wildcards to the hash of what `stage` needs of the problem file.
 
     A job with a wildcard `method` depends on that method's settings and not on the others'.
     """

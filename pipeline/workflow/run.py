@@ -72,14 +72,14 @@ def _clear_the_ground() -> None:
 
 
 def _others() -> list[psutil.Process]:
-    """All processes but this one and those that started it."""
+    """Lists all processes but this one and those that started it."""
     this = psutil.Process()
     own = {this, *this.parents()}
     return [process for process in psutil.process_iter() if process not in own]
 
 
 def _is_snakemake(process: psutil.Process) -> bool:
-    """Whether the process is a snakemake in this folder."""
+    """Tells whether the process is a snakemake in this folder."""
     try:
         names = {Path(word).name for word in process.cmdline()[:2]}
         return "snakemake" in names and Path(process.cwd()) == WORK
@@ -88,7 +88,7 @@ def _is_snakemake(process: psutil.Process) -> bool:
 
 
 def _mark(process: psutil.Process) -> str | None:
-    """The repository for which a job runs; None if the process is no job or is not ours."""
+    """Reads for which folder a job runs; None if the process is no job or is not ours."""
     try:
         return process.environ().get(RUN_MARK)
     except psutil.Error:

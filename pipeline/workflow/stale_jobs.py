@@ -1,4 +1,4 @@
-"""Jobs that a killed run left on a SLURM cluster: they would write what its successor writes."""
+"""Cancels jobs that a killed run left on a SLURM cluster: they would write into the next one."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cancel(folder: Path) -> list[str]:
 
 
 def jobs(folder: Path) -> list[str]:
-    """Numbers of our jobs for a folder, waiting or running."""
+    """Lists the numbers of our jobs for a folder, waiting or running."""
     rows = [line.split("|") for line in _ask("squeue", "--me", "--noheader", f"--format={_FORMAT}")]
     return [
         number for number, name, place in rows if name.startswith(PREFIX) and place == str(folder)

@@ -1,4 +1,4 @@
-"""Which studies and figures there are below experiments/, and what builds them.
+"""Lists the studies and figures below experiments/, and what builds them.
 
 Nothing heavy is imported here: this is the time one waits for "nothing to be done".
 """
@@ -24,7 +24,7 @@ ALL = "all"  # the target that builds every figure of the paper
 
 @dataclass(frozen=True, order=True)
 class Study:
-    """One study, with one preset of its problem file or with none ("")."""
+    """Names one study, with one preset of its problem file or with none ("")."""
 
     name: str
     preset: str = ""
@@ -40,23 +40,23 @@ class Study:
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Names under which a command line may ask for the study."""
+        """Lists the names under which a command line may ask for the study."""
         return (str(self), f"{self.name}_{self.preset}") if self.preset else (self.name,)
 
     @property
     def problem(self) -> str:
-        """Path of the problem file, from the root of the repository."""
+        """Gives the path of the problem file, from the folder of the work."""
         return f"experiments/{self.name}/problem.yaml"
 
     @property
     def options(self) -> str:
-        """Options by which a stage finds the problem."""
+        """Gives the options by which a stage finds the problem."""
         return f"--problem {self.problem}" + (f" --preset {self.preset}" if self.preset else "")
 
 
 @cache
 def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
-    """Every study below experiments/, each followed by its presets, with their several designs.
+    """Lists every study, each followed by its presets, with their several designs.
 
     A file that is no YAML counts as a study without presets: the stage that reads it tells why.
     """
@@ -73,13 +73,13 @@ def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
 
 
 def studies(root: Path = WORK) -> list[Study]:
-    """Every study with its presets and designs."""
+    """Lists every study with its presets and designs."""
     return [each for study, designs in families(root).items() for each in (study, *designs)]
 
 
 @cache
 def joints(root: Path = WORK) -> Mapping[str, list[Study]]:
-    """The studies of every figure of several, by target; with each preset that all of them have.
+    """Lists the studies of every figure of several, with each preset that all of them have.
 
     A file that cannot be read counts as a figure of no studies: the stage that reads it tells why.
     """
@@ -98,19 +98,19 @@ def joints(root: Path = WORK) -> Mapping[str, list[Study]]:
 
 @cache
 def together() -> Mapping[str, list[Study]]:
-    """The studies of every page of several, by target."""
+    """Lists the studies of every page of several, by target."""
     several = {str(study): designs for study, designs in families().items() if designs}
     return {**joints(), **several}
 
 
 def targets() -> dict[str, str]:
-    """What every target builds: the folder of a study or of a figure of several."""
+    """Maps every target to what it builds: the folder of a study or of a figure of several."""
     single = {target: str(study) for study in studies() for target in study.targets}
     return single | {figure: figure for figure in together()}
 
 
 def figures() -> list[str]:
-    """The studies that are figures of the paper, by their names."""
+    """Lists the studies that are figures of the paper, by their names."""
     return sorted(name for name in targets() if re.fullmatch(r"fig\d+", name))
 
 
@@ -125,7 +125,7 @@ def present(named: Mapping[str, Collection[str]]) -> dict[str, list[Study]]:
 
 
 def asked_for(words: Collection[str]) -> list[Study]:
-    """The studies that the words of a command line name, by target or by a file of theirs.
+    """Finds the studies that a command line names, by target or by a file of theirs.
 
     A preset counts even if its problem file has none of that name: reading the problem tells so.
     """
@@ -172,7 +172,7 @@ def check_names(study: Study, root: Path = WORK) -> None:
 
 @cache
 def problem_of(study: Study) -> Problem:
-    """The problem of a study.
+    """Reads the problem of a study.
 
     Raises:
         UserError: the problem file is wrong; tells where and what to do.

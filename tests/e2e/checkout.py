@@ -32,7 +32,14 @@ SMALLER = {
     "presets": {},
 }
 ROOMS = ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim")
-FILES = ("Snakefile", "Makefile", "CITATION.cff", "requirements.lock", ".gitignore")
+FILES = (
+    "Snakefile",
+    "Makefile",
+    "CITATION.cff",
+    "requirements.lock",
+    "requirements-dev.lock",
+    ".gitignore",
+)
 _CACHES = ("NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
 _NOBODYS = {"GIT_CONFIG_GLOBAL": os.devnull, "GIT_CONFIG_SYSTEM": os.devnull}
 _DATED = {"GIT_AUTHOR_DATE": "2025-01-01T00:00:00Z", "GIT_COMMITTER_DATE": "2025-01-01T00:00:00Z"}
@@ -177,7 +184,10 @@ class Checkout:
         return kept | own if self.own_caches else kept
 
 
-_NO_SETUP = ("--old-file=.venv/requirements.lock", "--old-file=setup")
+_NO_SETUP = tuple(
+    f"--old-file={name}"
+    for name in (".venv/requirements.lock", ".venv/requirements-dev.lock", "setup", "dev")
+)
 
 
 def _words(process: psutil.Process) -> list[str]:

@@ -23,7 +23,7 @@ from pipeline.problem import canonical_json
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.reading import joint_figure, load, load_section
 from pipeline.problem.sections import Codec
-from pipeline.runtime import ROOT, Casebook, SweepResult, case_log
+from pipeline.runtime import ROOT, CaseLog, SweepResult, case_log
 from pipeline.tracking.frames import import_video, load_cell, recording, video
 from pipeline.tracking.output import dic_points
 from pipeline.virtual_lab import encode_video
@@ -189,7 +189,7 @@ def _read_dataset(kind: Kind, path: Path) -> Told:
 
 def _cases(folder: Path) -> Path:
     path = folder / "part_0.csv"
-    with Casebook(path, ["drive.frequency"]) as book:
+    with CaseLog(path, ["drive.frequency"]) as book:
         for number in range(40):
             book.add([(number, [f"{number} Hz"], SweepResult(number / 7, 1.0, -number / 9))])
     return path

@@ -12,13 +12,13 @@ from pipeline.runtime import ROOT
 
 
 def test_an_installation_without_a_network(tmp_path: Path) -> None:
-    for name in ("Makefile", "requirements.lock"):
+    for name in ("Makefile", "requirements.lock", "requirements-dev.lock"):
         shutil.copy(ROOT / name, tmp_path)
     unwanted = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
     environment = {name: value for name, value in os.environ.items() if name not in unwanted}
     nowhere = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
     python = f"PYTHON={sys.executable}"
-    for command, more in (("wheels", {}), ("setup", nowhere)):
+    for command, more in (("wheels", {}), ("dev", nowhere)):
         subprocess.run(
             ["make", command, "WHEELS=packages", python],
             cwd=tmp_path,

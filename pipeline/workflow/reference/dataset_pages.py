@@ -1,4 +1,4 @@
-"""The page on the datasets: every variable with its dimensions, its unit and its meaning."""
+"""Writes the page on the datasets: every variable with its dimensions, its unit and its meaning."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Names in *italics* are coordinates.
 
 
 def page() -> str:
-    """The page, in Markdown."""
+    """Writes the page, in Markdown."""
     return HEAD + "".join(_kind(kind) for kind in SCHEMAS)
 
 

@@ -1,4 +1,4 @@
-"""The pages on the YAML files: every key with its type, its default and its meaning."""
+"""Writes the pages on the YAML files: every key with its type, its default and its meaning."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _PLAIN = {
 
 
 class File(NamedTuple):
-    """A YAML file: its name, the model that checks it, where it is, and more about it."""
+    """Describes a YAML file: its name, the model that checks it, where it is, and more about it."""
 
     name: str
     model: type[Section]
@@ -54,7 +54,7 @@ class File(NamedTuple):
 
 
 def pages() -> dict[str, str]:
-    """The pages, in Markdown, by the names of their files."""
+    """Writes the pages, in Markdown, by the names of their files."""
     studies = (
         File("problem.yaml", Problem, "`experiments/STUDY/problem.yaml`", PRESETS),
         File("figure.yaml", JointFigure, "`experiments/FIGURE/figure.yaml`"),
@@ -83,7 +83,7 @@ def _page(title: str, files: tuple[File, ...]) -> str:
 
 
 def _sections(schema: Node, told: set[str]) -> Iterator[str]:
-    """The sections that a file may have, in the order in which the keys name them."""
+    """Walks over the sections that a file may have, in the order in which the keys name them."""
     sections: dict[str, Node] = schema.get("$defs", {})
     waiting = _named(schema["properties"])
     while waiting:
@@ -96,7 +96,7 @@ def _sections(schema: Node, told: set[str]) -> Iterator[str]:
 
 
 def _named(node: object) -> list[str]:
-    """The sections that a schema refers to, in order."""
+    """Lists the sections that a schema refers to, in order."""
     return re.findall(r'"#/\$defs/(\w+)"', json.dumps(node))
 
 
@@ -119,7 +119,7 @@ def _keys(section: Node) -> str:
 
 
 def kind(node: Node) -> str:
-    """What may be given, in words."""
+    """Tells in words what may be given."""
     if "$ref" in node:
         return _link(_heading(node["$ref"].rpartition("/")[2]))
     if forms := node.get("anyOf") or node.get("oneOf"):
@@ -158,7 +158,7 @@ def _dimension(node: Node) -> units.Dimension | None:
 
 
 def _default(value: object, node: Node) -> str:
-    """The default as it would be written in the file."""
+    """Formats the default as it would be written in the file."""
     if value is None or value in ("", {}, []):
         return "none"
     if isinstance(value, dict):

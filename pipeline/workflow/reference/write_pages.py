@@ -6,7 +6,7 @@ import argparse
 
 
 def pages() -> dict[str, str]:
-    """The pages, by the names of their files."""
+    """Makes the pages, by the names of their files."""
     from pipeline.workflow.reference import api_page, dataset_pages, key_pages
 
     return {**key_pages.pages(), "datasets.md": dataset_pages.page(), "api.md": api_page.page()}

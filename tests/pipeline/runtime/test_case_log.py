@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.runtime import Casebook, SweepResult, case_log
+from pipeline.runtime import CaseLog, SweepResult, case_log
 
 FOUND = {
     number: SweepResult(number / 7, 1.0, -number / 9, "ok, more or less") for number in range(5)
@@ -11,7 +11,7 @@ FOUND = {
 
 def test_a_damaged_line_is_computed_again_and_no_other(tmp_path: Path) -> None:
     path = tmp_path / "part_0.csv"
-    with Casebook(path, ["drive.frequency", "lattice, in words"]) as book:
+    with CaseLog(path, ["drive.frequency", "lattice, in words"]) as book:
         book.add((number, [f"{number} Hz", "a, b"], found) for number, found in FOUND.items())
     assert case_log.known(tmp_path) == FOUND
     text = path.read_text(encoding="utf-8")

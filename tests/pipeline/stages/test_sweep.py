@@ -10,7 +10,7 @@ from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of, setting_losses
 from pipeline.problem.sections import Sweep, sweep_cases
-from pipeline.runtime import Casebook, SweepResult, UserError, case_log
+from pipeline.runtime import CaseLog, SweepResult, UserError, case_log
 from sim.scene import Evaluator, make_plan
 from tests.pipeline import static, unchanged
 
@@ -113,7 +113,7 @@ def test_a_killed_sweep_goes_on(
 
 def test_results_are_read_while_they_come(tmp_path: Path) -> None:
     path = tmp_path / "part_0.csv"
-    with Casebook(path, ["drive.amplitude"]) as book:
+    with CaseLog(path, ["drive.amplitude"]) as book:
         book.add([(7, ["2 mm"], SweepResult(0.1, 1 / 3, -0.2))])
         book.add([(8, ["3 mm"], SweepResult.failed("no\nequilibrium"))])
         found = case_log.known(tmp_path)
