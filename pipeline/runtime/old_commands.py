@@ -28,9 +28,12 @@ class _OldCommands(MetaPathFinder, InspectLoader):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Names this loader for a module of the table."""
+        """Names this loader for a module of the table, or a package that held one."""
         del path, target
-        return ModuleSpec(fullname, self) if fullname in self._commands else None
+        held = any(old.startswith(f"{fullname}.") for old in self._commands)
+        if not held and fullname not in self._commands:
+            return None
+        return ModuleSpec(fullname, self, is_package=held)
 
     def get_code(self, fullname: str) -> CodeType:
         """Compiles what `python -m` runs."""
@@ -38,9 +41,9 @@ class _OldCommands(MetaPathFinder, InspectLoader):
         return self.source_to_code(source, f"<{fullname}>")
 
     def get_source(self, fullname: str) -> str:
-        """Writes a program that hands its words to the command of today."""
-        new = self._commands[fullname]
-        return _CODE.format(package=self._package, old=fullname, new=new)
+        """Writes a program that hands its words to the command of today; nothing for a package."""
+        new = self._commands.get(fullname)
+        return "" if new is None else _CODE.format(package=self._package, old=fullname, new=new)
 
 
 def keep_old_commands(package: str, commands: Mapping[str, str]) -> None:
