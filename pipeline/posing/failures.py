@@ -34,7 +34,7 @@ def infeasible_start(
 
 
 class SimulatedStructure(NamedTuple):
-    """What was to be simulated: a structure of a problem file at solver times (n_times,)."""
+    """Names what was to be simulated: a structure of a problem file at times (n_times,)."""
 
     source: Path
     scene: Scene

@@ -43,7 +43,7 @@ class Noise(NamedTuple):
 
 
 class PerturbedResponse(NamedTuple):
-    """What is kept of a copy under one load case: curves (n_times,) and numbers."""
+    """Keeps what a copy did under one load case: curves (n_times,) and numbers."""
 
     rotation: Floats
     departure: Floats
@@ -173,7 +173,7 @@ def _along(motion: MotionLaw) -> Floats:
 def _row(
     scene: Scene, copy: PerturbedStructure, outcomes: list[Outcome[PerturbedResponse]]
 ) -> xr.Dataset:
-    """What the dataset holds of one copy: the mean of its load cases, or why there is none."""
+    """Reduces one copy to the mean of its load cases, or to why there is none."""
     failure = next((outcome.failure for outcome in outcomes if outcome.failure is not None), None)
     if not copy.sound:
         failure = f"units still overlap at rest after {MOST_ROUNDS} draws"

@@ -27,7 +27,7 @@ from pipeline.problem.sections import (
     Lattice,
     LinearRampDrive,
     MaterialConstants,
-    Objective,
+    ObjectiveSection,
     Optimiser,
     Prediction,
     RampHarmonicDrive,
@@ -174,7 +174,7 @@ class Problem(Section):
     void: VoidRegion | None = None
     inclusion: Inclusion | None = None
     cloak: CloakRegion
-    objective: Objective
+    objective: ObjectiveSection
     constraints: ConstraintLimits = ConstraintLimits()
     optimiser: Optimiser
     solver: SolverOptions = SolverOptions()

@@ -1,4 +1,4 @@
-"""Which datasets the stages make of a problem, for the rules and the report alike."""
+"""Lists the datasets that stages make of a problem, for the rules and the report alike."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def chosen(response: xr.Dataset, recording: Recording) -> xr.Dataset:
 
 
 def _plan(made: Compared) -> dict[str, object]:
-    """What was decided, and what is missing."""
+    """Says what was decided, and what is missing."""
     return {
         "frames": len(made.measurement.frames),
         "units_by_use": np.bincount(made.measurement.use, minlength=5).tolist(),

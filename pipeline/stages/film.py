@@ -127,7 +127,7 @@ def _virtual(path: Path) -> tuple[Recording, VirtualRecording]:
 
 
 def _shown(asked: Recording, response: Path) -> xr.Dataset:
-    """What a recording shows: its specimen, or the study's own response at structure and case."""
+    """Loads what is filmed: a specimen, or the response at the structure and the case."""
     assert asked.virtual is not None
     if asked.virtual.specimen is not None:
         return datasets.read(response, "specimen")

@@ -16,7 +16,7 @@ from pipeline.datasets import provenance
 from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
-from sim.scene import Scene
+from sim.scene import Scene, make_plan, simulate
 
 PLAIN = "plain"
 HELD_OUT = 16
@@ -123,6 +123,4 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
 
 def _of(scene: Scene, vertices: NDArray[np.float64]) -> float:
     """The combined loss of one structure."""
-    from sim.scene import make_plan, simulate
-
     return float(simulate(scene, vertices=vertices, plan=make_plan(scene, vertices)).loss)

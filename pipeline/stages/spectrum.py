@@ -30,7 +30,7 @@ from pipeline.problem.sections import Spectrum
 from pipeline.runtime import UserError, cli
 from sim.core import Floats
 from sim.scene import concrete_parameters, simulate
-from sim.vibration import Linear, linearised, modes
+from sim.vibration import Linear, linearised, modes, transmission
 
 STATES = ("at rest", "loaded")
 _MODE = ("structure", "state", "mode")
@@ -150,8 +150,6 @@ def _transmission(
     made: Linear, structure: PosedStructure, wanted: Spectrum, directions: Sequence[float]
 ) -> Floats:
     """Root mean square motion (n_cases, n_frequencies) of the region under a unit drive."""
-    from sim.vibration import transmission
-
     scene = structure.scene
     unit, dof = np.divmod(made.held, 3)
     along = np.array([[np.cos(angle), np.sin(angle), 0.0] for angle in directions])

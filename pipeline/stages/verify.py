@@ -111,7 +111,7 @@ def _finer_loads(
 
 
 def _share(asked: Problem, variant: Problem) -> float:
-    """What makes the loss of a variant comparable: that of mimicking is a sum over the steps."""
+    """Scales the loss of a variant to be comparable: that of mimicking is a sum over the steps."""
     mimics = asked.objective.target == "intact" and asked.objective.kind == "displacement"
     assert asked.horizon.steps is not None
     assert variant.horizon.steps is not None

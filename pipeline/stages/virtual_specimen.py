@@ -84,7 +84,7 @@ def _asked_for(held: dict[str, PosedStructure], recording: Recording) -> PosedSt
 
 
 def _times(asked: Problem, scene: Scene, unload: bool) -> Floats:
-    """When the specimen is looked at: as the response, and as often again on the way back."""
+    """Lists the times of the response, and as many again on the way back."""
     wanted = times_of(asked, scene)
     times = wanted.asked[wanted.shown]
     if not unload:

@@ -23,7 +23,7 @@ from .lattices import Quads as Quads
 from .material import Contact as Contact
 from .material import MaterialConstants as MaterialConstants
 from .objective import Load as Load
-from .objective import Objective as Objective
+from .objective import ObjectiveSection as ObjectiveSection
 from .objective import Robust as Robust
 from .optimiser import Method as Method
 from .optimiser import Methods as Methods

@@ -137,7 +137,7 @@ class Print(Section):
 
 
 class Fixture(Section):
-    """What holds the specimen: pads on a breadboard, grips on bolts, jig.
+    """Holds of the specimen: pads on a breadboard, grips on bolts, jig.
 
     Attributes:
         clearance: between a unit and its pocket.
@@ -169,7 +169,7 @@ class Fixture(Section):
 
 
 class Fabrication(Section):
-    """What is made of a design.
+    """Settings of all that is made of a design.
 
     Attributes:
         material: of the units; its density gives the mass in the bill of materials.

@@ -44,7 +44,7 @@ class Robust(Section):
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
-class Objective(Section):
+class ObjectiveSection(Section):
     """Target of the surroundings or of a region.
 
     Attributes:

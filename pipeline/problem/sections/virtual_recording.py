@@ -57,7 +57,7 @@ class Speckle(Section):
 
 
 class UnitAppearance(Section):
-    """What the units look like.
+    """Looks of the units.
 
     Attributes:
         face: shade of their faces, from black to white.
@@ -113,7 +113,7 @@ class Sensor(Section):
 
 
 class Codec(Section):
-    """How the video is stored.
+    """Storage of the video.
 
     Attributes:
         name: ffv1 loses nothing.

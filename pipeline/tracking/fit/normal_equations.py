@@ -51,7 +51,7 @@ class TemplateArrays(NamedTuple):
     reach: float
 
 
-class Workspace(NamedTuple):
+class FitBuffers(NamedTuple):
     """Arrays that the sums are made in.
 
     Attributes:
@@ -77,9 +77,9 @@ class Workspace(NamedTuple):
     sums: Floats
 
 
-def workspace(blocks: int) -> Workspace:
+def workspace(blocks: int) -> FitBuffers:
     """Allocates room for units of at most so many blocks."""
-    return Workspace(
+    return FitBuffers(
         np.zeros((UNKNOWNS, _PIXELS), np.float32),
         np.zeros(_PIXELS, np.float32),
         np.zeros(_PIXELS, np.float32),
@@ -94,7 +94,7 @@ def workspace(blocks: int) -> Workspace:
 
 @inlined
 def _place(
-    scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: Workspace
+    scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: FitBuffers
 ) -> None:
     """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
     plane, x, y = scene.plane, room.x, room.y
@@ -111,7 +111,7 @@ def _place(
 
 
 @inlined
-def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room: Workspace) -> int:
+def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room: FitBuffers) -> int:
     """Reads the template where pixels are to be compared; returns their number.
 
     Fills weight, residual with the frame's brightness, and rows 0, 1, 3 with slopes and value of
@@ -157,7 +157,7 @@ def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room:
 
 
 @inlined
-def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Workspace) -> None:
+def _derive(look: TemplateArrays, state: Floats, pixels: int, room: FitBuffers) -> None:
     """Turns slopes and value of the template into derivatives and residual of the frame."""
     rows, residual = room.rows, room.residual
     cos, sin = np.float32(math.cos(state[2])), np.float32(math.sin(state[2]))
@@ -179,7 +179,7 @@ def _derive(look: TemplateArrays, state: Floats, pixels: int, room: Workspace) -
 
 
 @inlined
-def _weigh(room: Workspace, tight: float, pixels: int) -> None:
+def _weigh(room: FitBuffers, tight: float, pixels: int) -> None:
     """Applies robust weights of Geman and McClure, and adds to the sums."""
     rows, residual, weight = room.rows, room.residual, room.weight
     full = left = curved = total = squares = np.float32(0)
@@ -204,7 +204,7 @@ def _weigh(room: Workspace, tight: float, pixels: int) -> None:
 
 
 @inlined
-def _add(room: Workspace, scores: Floats, pixels: int) -> None:
+def _add(room: FitBuffers, scores: Floats, pixels: int) -> None:
     """Adds a block to the matrix and fills its scores."""
     rows, residual, weight, matrix = room.rows, room.residual, room.weight, room.matrix
     scaled = room.weighted
@@ -235,7 +235,7 @@ def gather_equations(
     box: Floats,
     every: int,
     tight: float,
-    room: Workspace,
+    room: FitBuffers,
 ) -> int:
     """Fills matrix, scores and sums; returns the number of blocks.
 

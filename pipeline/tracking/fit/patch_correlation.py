@@ -17,9 +17,9 @@ from pipeline.runtime import compiled, inlined
 from pipeline.tracking.fit.normal_equations import (
     SIZE,
     UNKNOWNS,
+    FitBuffers,
     FramePixels,
     TemplateArrays,
-    Workspace,
     gather_equations,
     invert,
 )
@@ -163,7 +163,7 @@ def _hold_pose(matrix: Floats) -> None:
 
 
 @inlined
-def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: Workspace) -> float:
+def _next_scale(scale: float, moved: float, gain: float, aim: FitTarget, room: FitBuffers) -> float:
     """Returns the scale of the robust weights: wide until the unit has found its place."""
     if aim.tight > 0.0:
         return max(0.5 * scale, aim.tight)
@@ -187,7 +187,7 @@ def _descend(
     box: Floats,
     state: Floats,
     inverse: Floats,
-    room: Workspace,
+    room: FitBuffers,
 ) -> tuple[float, int]:
     """Improves the state of one unit.
 
@@ -220,7 +220,7 @@ def _descend(
 def _summarise(
     state: Floats,
     inverse: Floats,
-    room: Workspace,
+    room: FitBuffers,
     count: int,
     full: float,
     moved: float,
@@ -256,7 +256,7 @@ def fit_patches(
     start: FitStart,
     chosen: Mask,
     most: int,
-    room: Workspace,
+    room: FitBuffers,
     out: Floats,
 ) -> None:
     """Fits all chosen units; fills out (units, 30) in the order of `unpack`.

@@ -5,7 +5,7 @@ Where the template is flat, a pixel tells of the brightness alone: one of four i
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
 _STEEP = 0.04
 """Change from node to node in a cell that tells of the place, in contrasts of the unit."""
 
-NodeSpans = NDArray[np.int32]
+NodeSpans: TypeAlias = NDArray[np.int32]
 
 
 class TemplateCells(NamedTuple):

@@ -59,7 +59,7 @@ class LoadCellLog(Section):
 
 
 class Recording(Section):
-    """What was filmed.
+    """Subject of the video.
 
     Attributes:
         title: one line about it.

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 
+from pipeline.workflow.reference import api_page, dataset_pages, key_pages
+
 
 def pages() -> dict[str, str]:
     """Makes the pages, by the names of their files."""
-    from pipeline.workflow.reference import api_page, dataset_pages, key_pages
-
     return {**key_pages.pages(), "datasets.md": dataset_pages.page(), "api.md": api_page.page()}
 
 

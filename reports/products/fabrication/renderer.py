@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from sim.core import Image
 
-Floats = NDArray[np.floating]
-Integers = NDArray[np.integer]
+AnyFloats: TypeAlias = NDArray[np.floating]
+Integers: TypeAlias = NDArray[np.integer]
 
 AZIMUTH, ELEVATION = -76.0, 50.0
 """Direction of view in degrees: from the front, somewhat from the right, and from above."""
@@ -30,7 +31,7 @@ _RIM = 12  # pixels around the picture
 class Body:
     """Describes triangles (m, 3) of vertices (n, 3) in mm, in one colour."""
 
-    vertices: Floats
+    vertices: AnyFloats
     triangles: Integers
     colour: str
 
@@ -39,9 +40,9 @@ class Body:
 class View:
     """Holds right, up and towards the eye, as rows of a rotation; pixels per mm; the origin."""
 
-    axes: Floats
+    axes: AnyFloats
     scale: float
-    shift: Floats
+    shift: AnyFloats
 
 
 def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Image:
@@ -56,8 +57,8 @@ def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Ima
     view, shape = _fitted(bodies, _axes(azimuth, elevation), width * _SAMPLES)
     depth = np.full(shape, -np.inf, dtype=np.float32)
     face = np.full(shape, -1, dtype=np.int32)
-    normals: list[Floats] = []
-    colours: list[Floats] = []
+    normals: list[AnyFloats] = []
+    colours: list[AnyFloats] = []
     for body in bodies:
         drawn = sum(map(len, normals))
         normals.append(_draw(body, view, depth, face, drawn))
@@ -65,7 +66,7 @@ def picture(bodies: list[Body], width: int, elevation: float = ELEVATION) -> Ima
     return _reduced(_shaded(depth, face, np.concatenate(normals), np.concatenate(colours)))
 
 
-def _axes(azimuth: float, elevation: float) -> Floats:
+def _axes(azimuth: float, elevation: float) -> AnyFloats:
     """Returns unit vectors to the right, upwards and to the eye."""
     a, e = np.radians([azimuth, elevation])
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -73,7 +74,7 @@ def _axes(azimuth: float, elevation: float) -> Floats:
     return np.stack([right, np.cross(eye, right), eye])
 
 
-def _fitted(bodies: list[Body], axes: Floats, width: int) -> tuple[View, tuple[int, int]]:
+def _fitted(bodies: list[Body], axes: AnyFloats, width: int) -> tuple[View, tuple[int, int]]:
     """Returns the view that fills an image of this width, and the image's rows and columns."""
     seen = np.concatenate([body.vertices for body in bodies]) @ axes[:2].T
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -84,7 +85,7 @@ def _fitted(bodies: list[Body], axes: Floats, width: int) -> tuple[View, tuple[i
     return View(axes, scale, rim - low * scale), (height, width)
 
 
-def _draw(body: Body, view: View, depth: Floats, face: Integers, drawn: int) -> Floats:
+def _draw(body: Body, view: View, depth: AnyFloats, face: Integers, drawn: int) -> AnyFloats:
     """Puts a body's visible triangles into the buffers, counted from `drawn`; their normals."""
     corners = body.vertices[body.triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -100,13 +101,13 @@ def _draw(body: Body, view: View, depth: Floats, face: Integers, drawn: int) -> 
         place = (row[order], column[order])
         depth[place] = height[order]
         face[place] = which[order] + drawn
-    normals: Floats = across[facing] / length[facing, None]
+    normals: AnyFloats = across[facing] / length[facing, None]
     return normals
 
 
 def _covered(
-    at: Floats, away: Floats, shape: tuple[int, ...]
-) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
+    at: AnyFloats, away: AnyFloats, shape: tuple[int, ...]
+) -> Iterator[tuple[Integers, Integers, Integers, AnyFloats]]:
     """Yields triangle, row, column and depth of every pixel inside of a triangle, in chunks."""
     low = np.floor(at.min(axis=1)).astype(np.int64)
     size = np.ceil(at.max(axis=1)).astype(np.int64) - low + 1
@@ -127,13 +128,13 @@ def _covered(
 
 
 def _inside(
-    at: Floats,
-    away: Floats,
+    at: AnyFloats,
+    away: AnyFloats,
     which: Integers,
     row: Integers,
     column: Integers,
     shape: tuple[int, ...],
-) -> Iterator[tuple[Integers, Integers, Integers, Floats]]:
+) -> Iterator[tuple[Integers, Integers, Integers, AnyFloats]]:
     """Yields those pixels whose middle lies in their triangle, with y turned down."""
     a, b, c = (at[which, k] for k in range(3))
     point = np.stack([column, row], axis=1) + 0.5
@@ -149,12 +150,12 @@ def _inside(
     yield which[inside], shape[0] - 1 - row[inside], column[inside], height
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
-    found: Floats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+def _cross(a: AnyFloats, b: AnyFloats) -> AnyFloats:
+    found: AnyFloats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return found
 
 
-def _shaded(depth: Floats, face: Integers, normals: Floats, colours: Floats) -> Floats:
+def _shaded(depth: AnyFloats, face: Integers, normals: AnyFloats, colours: AnyFloats) -> AnyFloats:
     """Returns colours in the light, darker at edges."""
     light = _LIGHT / np.linalg.norm(_LIGHT)
     bright = _AMBIENT + (1.0 - _AMBIENT) * np.clip(normals @ light, 0.0, 1.0)
@@ -164,7 +165,7 @@ def _shaded(depth: Floats, face: Integers, normals: Floats, colours: Floats) -> 
     return shaded
 
 
-def _edges(depth: Floats, face: Integers, normals: Floats) -> NDArray[np.bool_]:
+def _edges(depth: AnyFloats, face: Integers, normals: AnyFloats) -> NDArray[np.bool_]:
     """Returns pixels of a body next to a jump in depth or a bend of the surface."""
     facing = np.vstack([normals, np.zeros((1, 3))]).astype(np.float32)[face]
     flat = np.where(face >= 0, depth, np.float32(-1e3))
@@ -175,7 +176,7 @@ def _edges(depth: Floats, face: Integers, normals: Floats) -> NDArray[np.bool_]:
     return edge & (face >= 0)
 
 
-def _reduced(fine: Floats) -> Image:
+def _reduced(fine: AnyFloats) -> Image:
     """Returns the mean of the samples of each pixel, as bytes."""
     rows, columns = fine.shape[0] // _SAMPLES, fine.shape[1] // _SAMPLES
     blocks = fine.reshape(rows, _SAMPLES, columns, _SAMPLES, 3)

@@ -14,7 +14,7 @@ from reports.base import Table
 from reports.figures.shielding.sweep_map import frequency_map
 from reports.figures.study_report import study_report
 from reports.page import rendered
-from reports.page.study_page import LARGEST_PAGE
+from reports.page.study_pages import LARGEST_PAGE
 from reports.study import StudyResults
 
 

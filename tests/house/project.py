@@ -1,0 +1,91 @@
+"""Reads the project's own source: its modules, what they import, and what they define."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from pipeline.runtime import ROOT
+
+PACKAGES = ("sim", "pipeline", "reports", "benchmarks")
+
+
+@dataclass(frozen=True)
+class Module:
+    """One file of the project."""
+
+    path: Path
+
+    @property
+    def name(self) -> str:
+        parts = self.path.relative_to(ROOT).with_suffix("").parts
+        return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+    @property
+    def folder(self) -> str:
+        return ".".join(self.path.parent.relative_to(ROOT).parts)
+
+    @property
+    def is_face(self) -> bool:
+        return self.path.name == "__init__.py"
+
+    @property
+    def lines(self) -> int:
+        return len(self.path.read_text().splitlines())
+
+    @property
+    def tree(self) -> ast.Module:
+        return _parsed(self.path)
+
+    def imports(self) -> Iterator[tuple[ast.ImportFrom | ast.Import, str]]:
+        """Every import of the project: the statement, and each module or face it names."""
+        for node in ast.walk(self.tree):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            else:
+                continue
+            yield from ((node, name) for name in names if name.split(".")[0] in PACKAGES)
+
+    def imported_modules(self) -> set[str]:
+        """The modules of the project that are imported, through faces to where a name is from."""
+        found = set()
+        for node, base in self.imports():
+            names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
+            found |= {base} | {source for name in names for source in resolved(base, name)}
+        return found & module_names()
+
+
+@cache
+def _parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_bytes())
+
+
+@cache
+def modules(*packages: str) -> tuple[Module, ...]:
+    """The modules of some packages, or of all, in the order of their paths."""
+    return tuple(
+        Module(path)
+        for package in packages or PACKAGES
+        for path in sorted((ROOT / package).rglob("*.py"))
+    )
+
+
+@cache
+def module_names() -> frozenset[str]:
+    return frozenset(module.name for module in modules() if not module.is_face)
+
+
+def resolved(base: str, name: str) -> list[str]:
+    """The modules that `from base import name` may lead to."""
+    stub = ROOT.joinpath(*base.split("."), "__init__.pyi")
+    sources = [f"{base}.{name}"]
+    if stub.is_file():
+        for node in _parsed(stub).body:
+            if isinstance(node, ast.ImportFrom) and any(a.name == name for a in node.names):
+                sources += [f"{base}.{node.module}"] if node.module else []
+    return sources
