@@ -1,3 +1,9 @@
+from . import constraints as constraints
+from . import optimise as optimise
+from . import scene as scene
+from . import solvers as solvers
+from . import structure as structure
+from . import vibration as vibration
 from .constraints import Limits as Limits
 from .core import SimulationError as SimulationError
 from .energy import Observables as Observables

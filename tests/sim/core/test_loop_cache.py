@@ -26,7 +26,8 @@ RUN = "from sim.loops import outer as f; f(3); print(f(3), sum(f.stats.cache_mis
 
 def checkout(root: Path) -> Path:
     shutil.copytree(ROOT / "sim/core", root / "sim/core")
-    shutil.copy(ROOT / "sim/__init__.py", root / "sim/__init__.py")
+    for face in ("__init__.py", "__init__.pyi"):
+        shutil.copy(ROOT / "sim" / face, root / "sim" / face)
     for name, text in LOOPS.items():
         (root / name).write_text(text)
     return root

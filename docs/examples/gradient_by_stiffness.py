@@ -1,0 +1,35 @@
+"""A gradient by stiffness: how the force of a press depends on the constants of the ligaments."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from specimen import PLA, panels, pressed, squares
+
+import sim
+
+lattice = squares(6, 6)
+scene = pressed(lattice, shortening=6.0)
+# Derivatives are kept for the ligaments of units that may change: all of them here.
+scene = scene.updated(cloak=np.arange(lattice.n_units), frozen=np.array([], dtype=int))
+plan = sim.make_plan(scene, lattice.vertices, np.array([1.0]))
+inner = jnp.asarray(np.setdiff1d(np.arange(lattice.n_units), scene.loads.driven))
+
+
+def lateral_bulge(constants):
+    """Mean square of the sideways motion (mm^2) for (axial, shear, bending) stiffness."""
+    axial, shear, bending = constants
+    material = PLA._replace(axial=axial, shear=shear, bending=bending)
+    shape = sim.structure.shape(lattice, lattice.vertices)
+    values = sim.structure.parameters(lattice, shape, material)
+    motion = sim.solvers.differentiable_motion(plan.solver, values, scene.loads.cases)
+    return jnp.mean(motion.displacement[0, -1, inner, 0] ** 2)
+
+
+constants = jnp.array([PLA.axial, PLA.shear, PLA.bending])
+bulge, slope = jax.value_and_grad(lateral_bulge)(constants)
+elasticity = np.asarray(slope * constants / bulge)  # change in % for 1 % of each constant
+axial, shear, bending = elasticity
+
+figure, axes = panels(1)
+axes.bar(["axial", "shear", "bending"], elasticity, color="black")
+axes.set_ylabel("change of the bulge (% per %)")
