@@ -2,7 +2,6 @@ from . import comparison as comparison
 from . import storage as storage
 from . import text_table as text_table
 from .measuring import in_turn as in_turn
-from .measuring import measure_in_turn as measure_in_turn
 from .measuring import measure_settings as measure_settings
 from .measuring import result_of as result_of
 from .records import Measured as Measured

@@ -20,8 +20,6 @@ from pipeline.runtime import cli, write_folder_atomically
 
 LOG = logging.getLogger(__name__)
 
-STRUCTURES = ("intact", "altered", "cloaked")
-
 
 def work(args: argparse.Namespace) -> None:
     """Makes the parts, writes the package aside, checks it, and puts it in its place."""

@@ -24,7 +24,6 @@ TWO_COLUMNS = 178.0
 """Width of a journal's two columns, mm."""
 
 MM_PER_INCH = 25.4
-POINTS_PER_MM = 72.0 / MM_PER_INCH
 
 INTACT, ALTERED, CLOAKED = "#1a1a1a", "#e07b00", "#6f3fa0"
 STRUCTURE_COLOURS = {"intact": INTACT, "reference": INTACT, "altered": ALTERED, "cloaked": CLOAKED}

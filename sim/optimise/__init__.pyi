@@ -1,6 +1,5 @@
 from .journal import Journal as Journal
 from .journal import JournalInUseError as JournalInUseError
-from .kkt import Stationarity as Stationarity
 from .kkt import stationarity as stationarity
 from .minimisation import minimise as minimise
 from .mma import MmaOptions as MmaOptions

@@ -1,6 +1,5 @@
 from . import base as base
 from . import loads as loads
-from .base import CaseMotions as CaseMotions
 from .base import PrescribedMotion as PrescribedMotion
 from .base import Solver as Solver
 from .base import adjoint_cases as adjoint_cases

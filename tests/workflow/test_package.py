@@ -44,7 +44,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def ran(code: Path, folder: Path, *words: str) -> str:
-    """What a command of the package prints, of which neither checkout nor caches are known."""
+    """Runs a command of the package, without checkout or caches; returns what it prints."""
     hidden = ("PYTHONPATH", "NUMBA_CACHE_DIR", "JAX_COMPILATION_CACHE_DIR", "MPLCONFIGDIR")
     environment = {name: value for name, value in os.environ.items() if name not in hidden}
     environment |= {"PYTHONPATH": str(code), "XDG_CACHE_HOME": str(folder / "caches")}

@@ -8,21 +8,23 @@ import pytest
 from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, SimulationError
 from sim.energy import gradient, hessian_product, system_of, workspace
-from sim.solvers import Harmonic, PrescribedMotion, TimeSeries, solve_case
+from sim.solvers import Harmonic, TimeSeries, solve_case
 from sim.time_integration import BLANES_MOAN, LEAPFROG, ExplicitSolver, ImplicitSolver, Splitting
 from sim.vibration import highest_frequency, lowest_frequency
 from tests.sim.structures import Rig, mixed_polygons, rotating_squares
-from tests.sim.time_integration.pulse import DURATION, exact_end, order, pulsed
+from tests.sim.time_integration.pulse import (
+    CORNERS,
+    DURATION,
+    MIDDLE,
+    exact_end,
+    order,
+    pulsed,
+    shaken,
+)
 
-CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
 SPLITTINGS = pytest.mark.parametrize(
     "splitting", [LEAPFROG, BLANES_MOAN], ids=["leapfrog", "Blanes-Moan"]
 )
-
-
-def shaken(amplitude: float, bias_deg: float = 20.0) -> Rig:
-    motion = Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
-    return Rig(rotating_squares(5, bias_deg), CORNERS, MIDDLE, motion)
 
 
 def solver_for(rig: Rig, n_steps: int, splitting: Splitting = BLANES_MOAN) -> ExplicitSolver:
@@ -136,23 +138,6 @@ def test_a_run_that_would_fill_the_memory_is_refused_before_it_begins() -> None:
     stiff = rig.values._replace(law=rig.values.law * 1e14)
     with pytest.raises(SimulationError, match=r"explicit run needs \d+ steps .* try softer"):
         solver_for(rig, 200).forward(stiff, rig.drive)
-
-
-@pytest.mark.parametrize("broken", ["drive", "law", "void", "mass", "damping"])
-def test_nan_never_leaves(broken: str) -> None:
-    rig = shaken(1.0)
-    values, drive = rig.values, rig.drive
-    if broken == "drive":
-        knots = np.array([0.0, 0.006, 0.012])
-        drive = PrescribedMotion(
-            rig.driven, TimeSeries(knots, np.array([[0.0] * 3, [np.nan] * 3, [0.0] * 3]))
-        )
-    else:
-        bad = np.array(getattr(values, broken))
-        bad.flat[20] = np.nan
-        values = values._replace(**{broken: bad})
-    with pytest.raises(SimulationError):
-        solve_case(solver_for(rig, 200), values, drive)
 
 
 def test_polygons_of_any_kind() -> None:

@@ -8,13 +8,19 @@ import pytest
 from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, SimulationError
 from sim.quasistatics import StaticSolver
-from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, TimeSeries, solve_case
+from sim.solvers import Harmonic, LinearRamp, TimeSeries, solve_case
 from sim.time_integration import ImplicitSolver
 from sim.time_integration.coefficients import ESDIRK3
 from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
-from tests.sim.time_integration.pulse import DURATION, exact_end, order, pulsed
-
-CORNERS, MIDDLE = np.array([0, 4, 20, 24]), np.array([12])
+from tests.sim.time_integration.pulse import (
+    CORNERS,
+    DURATION,
+    MIDDLE,
+    exact_end,
+    order,
+    pulsed,
+    shaken,
+)
 
 
 def test_order_conditions_of_the_method() -> None:
@@ -46,11 +52,6 @@ def test_order_of_convergence() -> None:
         return u[-1]
 
     assert order(end, (160, 320), exact_end(rig)) == pytest.approx(3.0, abs=0.1)
-
-
-def shaken(amplitude: float, bias_deg: float = 20.0) -> Rig:
-    motion = Harmonic(amplitude, 150.0, 0.6, rise=0.0015, delay=0.003)
-    return Rig(rotating_squares(5, bias_deg), CORNERS, MIDDLE, motion)
 
 
 def solver_for(rig: Rig, n_steps: int = 60) -> ImplicitSolver:
@@ -134,23 +135,6 @@ def test_what_cannot_be_integrated_is_an_error_with_its_step_and_a_remedy() -> N
         ImplicitSolver(rig.topology, times, times).forward(rig.values, rig.drive)
     assert failure.value.step is not None
     assert failure.value.unit is not None
-
-
-@pytest.mark.parametrize("broken", ["drive", "law", "void", "mass", "damping"])
-def test_nan_never_leaves(broken: str) -> None:
-    rig = shaken(1.0)
-    values, drive = rig.values, rig.drive
-    if broken == "drive":
-        knots = np.array([0.0, 0.006, 0.012])
-        drive = PrescribedMotion(
-            rig.driven, TimeSeries(knots, np.array([[0.0] * 3, [np.nan] * 3, [0.0] * 3]))
-        )
-    else:
-        bad = np.array(getattr(values, broken))
-        bad.flat[20] = np.nan
-        values = values._replace(**{broken: bad})
-    with pytest.raises(SimulationError):
-        solve_case(solver_for(rig), values, drive)
 
 
 def test_asked_times_do_not_change_the_steps() -> None:
