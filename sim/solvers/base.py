@@ -234,6 +234,9 @@ def differentiable_motion(
     ``jax.vmap`` (and so ``jax.jacrev``) it cannot run: the solvers loop over concrete arrays. There
     are no forward or second derivatives.
 
+    Derivatives by ligaments that are not ``designed`` in the solver's topology are skipped and read
+    zero: for a gradient by stiffness, make the plan of a scene in which every unit may change.
+
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
         TypeError: a transform that is not supported.
