@@ -23,7 +23,12 @@ highest = float(rest.max())
 gap = float(np.max(rest[:, 1:].min(axis=0) - rest[:, :-1].max(axis=0)))  # widest, Hz
 
 figure, axes = panels(1)
-axes.plot(rest, color=INTACT, lw=0.8)
-axes.plot(pressed, color=CLOAKED, lw=0.8, ls="--")
+for values, colour, style, name in (
+    (rest, INTACT, "-", "at rest"),
+    (pressed, CLOAKED, "--", "compressed by 5 %"),
+):
+    lines = axes.plot(values, color=colour, lw=0.8, ls=style)
+    lines[0].set_label(name)
 axes.set_xticks(marks, ["Γ", "X", "M", "Γ"])
-axes.set(ylabel="frequency (Hz)", ylim=(0, 1300), title="at rest; compressed by 5 % (dashed)")
+axes.set(ylabel="frequency (Hz)", ylim=(0, 1300))
+axes.legend(fontsize="small")

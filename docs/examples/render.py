@@ -1,4 +1,4 @@
-"""Renders the pictures of all examples and the page that shows them."""
+"""Runs examples and saves their pictures: all, with the page that shows them, or those named."""
 
 import ast
 import runpy
@@ -6,13 +6,16 @@ import sys
 from pathlib import Path
 
 import matplotlib
+from matplotlib import pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 SHARED = ("render", "specimen")
 HEAD = """# Examples
 
-One capability a script, at most 60 lines; `python docs/examples/NAME.py` runs one. All are run as
-tests, with pinned numbers. Pictures and this page are made by `python docs/examples/render.py`.
+One capability a script, at most 60 lines, run as tests with pinned numbers. From the folder of the
+repository, `.venv/bin/python docs/examples/render.py modes` runs the one of that name and draws its
+picture; without a name it draws all, and writes this page. Where `metacloak` is installed as a
+package, `from metacloak import sim` takes the place of `import sim`.
 """
 
 
@@ -33,13 +36,16 @@ def section(name: str) -> str:
 
 
 def main() -> None:
-    """Runs every example, saves its figure, and writes the page."""
+    """Runs examples, saves their figures, and writes the page if none was named."""
     matplotlib.use("agg")
     sys.path[:0] = [str(HERE), str(HERE.parents[1])]
-    for name in names():
+    for name in sys.argv[1:] or names():
         figure = runpy.run_path(str(HERE / f"{name}.py"))["figure"]
         figure.savefig(HERE / f"{name}.png", dpi=90, metadata={"Software": None})
+        plt.close(figure)
         print(name)
+    if sys.argv[1:]:
+        return
     page = HEAD + "".join(section(name) for name in names())
     (HERE.parent / "examples.md").write_text(page, encoding="utf-8")
 
