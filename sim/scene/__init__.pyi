@@ -5,10 +5,9 @@ from .evaluation import minimise as minimise
 from .objectives import DisplacementMimicking as DisplacementMimicking
 from .objectives import StrainEnergyMimicking as StrainEnergyMimicking
 from .objectives import combined as combined
+from .objectives import estimated_errors as estimated_errors
 from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
-from .plan import STIFFENING as STIFFENING
-from .plan import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .plan import Plan as Plan
 from .plan import concrete_parameters as concrete_parameters
 from .plan import make_plan as make_plan
@@ -29,4 +28,7 @@ from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
+from .time_solver import NEWTON as NEWTON
+from .time_solver import STIFFENING as STIFFENING
+from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .warm_starts import Paths as Paths
