@@ -76,7 +76,7 @@ class StepRule:
 
 RULES: dict[Accuracy, StepRule] = {
     "draft": StepRule(1e-3, 1.3, 16, 1e-2, 1e-2, 5e-2),
-    "default": StepRule(5e-4, 1.2, 20, 3e-3, 1e-3, 1e-2),
+    "default": StepRule(7e-4, 1.3, 20, 3e-3, 1e-3, 1e-2),
     "tight": StepRule(1e-4, 1.05, 80, 3e-4, 1e-6, 1e-4),
 }
 
@@ -240,6 +240,13 @@ def _parts(solver: ImplicitSolver, left: float) -> tuple[ImplicitSolver, int]:
 def _doubled(solver: ExplicitSolver, left: float) -> tuple[ExplicitSolver, int]:
     del left
     return replace(solver, n_steps=2 * solver.n_steps), 2
+
+
+def twice_as_fine(solver: TimeSolver) -> TimeSolver:
+    """Cuts every step in two."""
+    if isinstance(solver, ImplicitSolver):
+        return _parts(solver, 1.0)[0]
+    return _doubled(solver, 1.0)[0]
 
 
 def _n_steps(solver: TimeSolver) -> int:
