@@ -31,12 +31,12 @@ from sim.structure import quads
 from sim.time_integration import ExplicitSolver
 from sim.vibration import lowest_frequency
 
-REFERENCE = "our explicit method of order 4 at steps of 2 microseconds or less"
+REFERENCE = "our explicit method of order 4 with 40 000 steps, of 8 microseconds or less"
 SETTINGS = tuple(product(("auto", "implicit", "explicit"), ("draft", "default", "tight")))
-AMPLITUDE, ANGLE = 3.0, np.pi / 4
-"""mm, rad; of the small lattice's drives."""
+AMPLITUDE, ANGLE = 2.0, np.pi / 4
+"""mm, rad; of the small lattice's drives: at 3 mm the lightly damped one is chaotic near f1."""
 PERIODS, SEED, N_PULSES = 6, 1, 6
-FINE = 2e-6
+FINE, MANY = 8e-6, 40_000
 
 
 def drives() -> Iterator[tuple[str, Scene]]:
@@ -61,7 +61,7 @@ def drives() -> Iterator[tuple[str, Scene]]:
         motion = Pulse(AMPLITUDE, float(width), ANGLE, float(delay))
         yield f"pulse of {1e3 * width:.3g} ms at {delay:.3g} s", small(motion, 1.0)
     spike = np.zeros((1001, 3))
-    spike[401, 0] = AMPLITUDE
+    spike[401, 0] = AMPLITUDE / 4
     yield "series with a spike of 2 ms", small(TimeSeries(np.linspace(0.0, 1.0, 1001), spike), 1.0)
 
 
@@ -100,7 +100,7 @@ def measure(limits: MeasuringLimits, tell: Tell) -> list[Measurement]:
 def truth(scene: Scene) -> Floats:
     """Solves for the motion (1, n_times, n_units, 3) with far finer steps."""
     values, times = concrete_parameters(scene, scene.lattice.vertices), sample_times(scene)
-    n_steps = int(np.ceil(times[-1] / FINE))
+    n_steps = max(MANY, int(np.ceil(times[-1] / FINE)))
     solver = ExplicitSolver(scene.topology, float(times[-1]), n_steps, times)
     return solve_case(solver, values, scene.loads.cases[0])[0].reshape(1, len(times), -1, 3)
 

@@ -27,7 +27,6 @@ from sim.scene.time_solver import RULES, twice_as_fine
 from sim.scene.warm_starts import Paths
 from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, solve_cases
 from sim.structure import Parameters
-from sim.time_integration import ExplicitSolver, ImplicitSolver
 
 LOG = logging.getLogger(__name__)
 
@@ -240,9 +239,10 @@ def _check_steps(evaluate: Evaluator, result: Result) -> None:
     The steps were chosen for the initial structure and kept. What is allowed is that share of the
     loss at the start.
     """
-    solver, first = evaluate.plan.solver, result.evaluations[0]
-    if not isinstance(solver, ImplicitSolver | ExplicitSolver):
+    solver: Any = evaluate.plan.solver
+    if isinstance(solver, StaticSolver):
         return
+    first = result.evaluations[0]
     finer = copy(evaluate)
     finer.plan = replace(evaluate.plan, solver=twice_as_fine(solver))
     allowed = RULES[evaluate.scene.numerics.accuracy].loss

@@ -1,8 +1,9 @@
 """Chooses integrator and steps of a motion in time, by estimates of the error that they make.
 
-A first grid is solved beside one of about twice its steps. The difference over ``ratio^order - 1``
-estimates the error of the finer one, and steps are cut until that is what the accuracy allows. The
+A first grid is solved beside one of half its steps. The difference over ``ratio^order - 1``
+estimates the error of the finer one, and steps are cut until it is what the accuracy allows. The
 order is that of motions which start with a jump of the velocity, well below that of the method.
+Explicit steps, which cannot be longer than stable ones, are compared with the leapfrog's first.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ STIFFENING = 1.7
 
 NEWTON = 1e-6
 """Tolerance of the stage velocities, mm/s: losses are smooth to 1e-13, gradients exact to 1e-6."""
-IMPLICIT_ORDER, EXPLICIT_ORDER = 0.75, 3.0
+IMPLICIT_ORDER, EXPLICIT_ORDER = 0.6, 3.0
 MOST_PARTS = 8
 EXPLICIT_STEPS = 6
 """Explicit steps that take the time of one implicit step, the adjoint of either counted in."""
@@ -103,8 +104,9 @@ def time_solver(
         stored = 3 * 4 * scene.topology.n_dofs * np.dtype(float).itemsize
         most = explicit.n_steps // EXPLICIT_STEPS if auto else MOST_MEMORY // stored
         try:
-            start, implicit = _first_grids(scene, values, times, threads, most)
-            solver, left = _shortened(start, implicit, _parts, IMPLICIT_ORDER, error, most)
+            first = _first_grid(scene, values, times, threads, most)
+            halves = twice_as_fine(first)
+            solver, left = _shortened(first, first, halves, _parts, IMPLICIT_ORDER, error, most)
         except SimulationError:
             if not auto:
                 raise
@@ -117,7 +119,7 @@ def time_solver(
         decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
     rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
     most = 2**MOST_DOUBLINGS * explicit.n_steps
-    chosen, left = _shortened(rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
+    chosen, left = _shortened(None, rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
     told = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
     decisions.extend([told, error.told(left)])
     return chosen
@@ -198,8 +200,9 @@ def different_drives(scene: Scene) -> list[PrescribedMotion]:
 
 
 def _shortened(
+    kept: S | None,
     rough: S,
-    start: S,
+    finer: S,
     cut: Callable[[S, float], tuple[S, int]],
     order: float,
     error: _Error,
@@ -208,16 +211,16 @@ def _shortened(
     """Cuts steps until the error is allowed; also returns the estimate, over the allowed one.
 
     Args:
-        rough: half as accurate as the start, or less; it is not returned.
-        start: the coarsest that may do.
+        kept: the rough one if it may do, too.
+        rough: about half as accurate as the finer one.
+        finer: it may do.
         cut: makes a solver with shorter steps that reduces an error (over the allowed one) to 1 if
             it can, and says into how many parts they were cut.
         order: of convergence, cautiously.
         error: to compare solutions.
         most: number of steps.
     """
-    kept, finer, parts = None, start, 2
-    seen, motions = error.motions(rough), error.motions(start)
+    parts, seen, motions = 2, error.motions(rough), error.motions(finer)
     while motions is not None:
         left = error.between(seen, motions) / (parts**order - 1.0)
         if kept is not None and left * parts**order <= 1.0:
@@ -239,28 +242,29 @@ def _parts(solver: ImplicitSolver, left: float) -> tuple[ImplicitSolver, int]:
 
 def _doubled(solver: ExplicitSolver, left: float) -> tuple[ExplicitSolver, int]:
     del left
-    return replace(solver, n_steps=2 * solver.n_steps), 2
+    return twice_as_fine(solver), 2
 
 
-def twice_as_fine(solver: TimeSolver) -> TimeSolver:
+def twice_as_fine(solver: S) -> S:
     """Cuts every step in two."""
     if isinstance(solver, ImplicitSolver):
-        return _parts(solver, 1.0)[0]
-    return _doubled(solver, 1.0)[0]
+        return replace(solver, times=time_grid.halved(solver.times))
+    return replace(solver, n_steps=2 * solver.n_steps)
 
 
 def _n_steps(solver: TimeSolver) -> int:
     return solver.n_steps if isinstance(solver, ExplicitSolver) else len(solver.times) - 1
 
 
-def _first_grids(
+def _first_grid(
     scene: Scene, values: ConcreteParameters, times: Floats, threads: int, most: int
-) -> tuple[ImplicitSolver, ImplicitSolver]:
-    """Solvers on a first grid and on one of half its steps, the rough one first.
-
-    It is graded by the drive's frequency, or adapted to each of the drives that have none.
-    """
-    rule, end, frequency = _rule(scene), float(times[-1]), scene.loads.drive_frequency
+) -> ImplicitSolver:
+    """Grades a grid by the drive's frequency, or adapts one to each of the drives without."""
+    rule, end, frequency = (
+        RULES[scene.numerics.accuracy],
+        float(times[-1]),
+        scene.loads.drive_frequency,
+    )
     largest = (end if frequency is None else 1 / frequency) / rule.per_period
     steps = time_grid.graded(end, min(rule.first, largest), rule.growth, largest)
     drives = different_drives(scene)
@@ -269,19 +273,13 @@ def _first_grids(
         scene.topology, steps, times, NEWTON, threads, turn_allowance=TURN_ALLOWANCE
     )
     if frequency is not None:
-        fine = time_grid.through(steps, stops)
-        return replace(solver, times=np.append(fine[:-1:2], end)), replace(solver, times=fine)
+        return replace(solver, times=time_grid.through(steps, stops))
     grids = [
         adapted(solver, values, drive, rule.per_step * _size(solver, drive, stops), rule.first,
                 largest, stops, most).times
         for drive in drives
     ]  # fmt: skip
-    rough = time_grid.through(grids[0], np.concatenate(grids))
-    return replace(solver, times=rough), replace(solver, times=time_grid.halved(rough))
-
-
-def _rule(scene: Scene) -> StepRule:
-    return RULES[scene.numerics.accuracy]
+    return replace(solver, times=time_grid.through(grids[0], np.concatenate(grids)))
 
 
 def _size(solver: ImplicitSolver, drive: PrescribedMotion, stops: Floats) -> float:
