@@ -105,8 +105,7 @@ def time_solver(
         most = explicit.n_steps // EXPLICIT_STEPS if auto else MOST_MEMORY // stored
         try:
             first = _first_grid(scene, values, times, threads, most)
-            halves = twice_as_fine(first)
-            solver, left = _shortened(first, first, halves, _parts, IMPLICIT_ORDER, error, most)
+            solver, left = _shortened(first, None, _parts, IMPLICIT_ORDER, error, most)
         except SimulationError:
             if not auto:
                 raise
@@ -119,7 +118,7 @@ def time_solver(
         decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
     rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
     most = 2**MOST_DOUBLINGS * explicit.n_steps
-    chosen, left = _shortened(None, rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
+    chosen, left = _shortened(rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
     told = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
     decisions.extend([told, error.told(left)])
     return chosen
@@ -158,13 +157,20 @@ class _Error:
         self._units = region if len(region) else np.setdiff1d(every, scene.loads.driven)
         self._scales = np.array([scene.lattice.spacing, scene.lattice.spacing, 1.0])
 
-    def motions(self, solver: TimeSolver) -> list[Floats] | None:
-        """Solves for the region's motions (n_times, n_region, 3); None if that fails."""
+    def motions(self, solver: S) -> tuple[list[Floats] | None, S]:
+        """Solves for the region's motions (n_times, n_region, 3); None if that fails.
+
+        Also returns the solver with the steps that had to be cut on the way.
+        """
         try:
-            solved = (solve_case(solver, self._values, drive)[0] for drive in self._drives)
-            return [u.reshape(len(u), -1, 3)[:, self._units] / self._scales for u in solved]
+            solved = [solve_case(solver, self._values, drive) for drive in self._drives]
         except SimulationError:
-            return None
+            return None, solver
+        moved = [u.reshape(len(u), -1, 3)[:, self._units] / self._scales for u, _, _ in solved]
+        if isinstance(solver, ImplicitSolver):
+            longest = max((record.times for _, _, record in solved), key=len)
+            return moved, replace(solver, times=longest)
+        return moved, solver
 
     def between(self, one: list[Floats] | None, other: list[Floats] | None) -> float:
         """Returns the greatest difference of two solutions, over what is allowed."""
@@ -200,9 +206,8 @@ def different_drives(scene: Scene) -> list[PrescribedMotion]:
 
 
 def _shortened(
-    kept: S | None,
     rough: S,
-    finer: S,
+    finer: S | None,
     cut: Callable[[S, float], tuple[S, int]],
     order: float,
     error: _Error,
@@ -211,16 +216,17 @@ def _shortened(
     """Cuts steps until the error is allowed; also returns the estimate, over the allowed one.
 
     Args:
-        kept: the rough one if it may do, too.
         rough: about half as accurate as the finer one.
-        finer: it may do.
+        finer: the first that may do; None for the rough one and that with half its steps.
         cut: makes a solver with shorter steps that reduces an error (over the allowed one) to 1 if
             it can, and says into how many parts they were cut.
         order: of convergence, cautiously.
         error: to compare solutions.
         most: number of steps.
     """
-    parts, seen, motions = 2, error.motions(rough), error.motions(finer)
+    seen, rough = error.motions(rough)
+    kept, finer = (rough, twice_as_fine(rough)) if finer is None else (None, finer)
+    parts, (motions, finer) = 2, error.motions(finer)
     while motions is not None:
         left = error.between(seen, motions) / (parts**order - 1.0)
         if kept is not None and left * parts**order <= 1.0:
@@ -230,8 +236,8 @@ def _shortened(
         following, parts = cut(finer, left)
         if _n_steps(following) > most:
             return finer, left
-        kept, finer, seen = finer, following, motions
-        motions = error.motions(finer)
+        kept, seen = finer, motions
+        motions, finer = error.motions(following)
     return finer, np.inf
 
 
