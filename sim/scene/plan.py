@@ -9,17 +9,10 @@ import numpy as np
 
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
+from sim.scene.equal_cases import equal_cases
 from sim.scene.scene import Accuracy, Scene
-from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, check_free_dofs, concrete
-from sim.structure import (
-    QUARTER_TURN,
-    ConcreteParameters,
-    equal_directions,
-    is_invariant,
-    parameters,
-    shape,
-    unit_image,
-)
+from sim.solvers import Solver, check_free_dofs, concrete
+from sim.structure import ConcreteParameters, parameters, shape
 from sim.time_integration import BLANES_MOAN, ExplicitSolver, ImplicitSolver, adapted, time_grid
 from sim.vibration import highest_frequency, lowest_frequency
 
@@ -32,8 +25,6 @@ SLOW = 0.75
 STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
 STIFFENING = 1.7
 """Highest eigenfrequency in motion over that at rest (4.6 -> 7 kHz for the paper's lattices)."""
-
-_DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
 
 
 @dataclass(frozen=True)
@@ -127,12 +118,10 @@ def make_plan(
 
     symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
     may_repeat = not every_case and (vertices is not None or symmetric)
-    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.loads.motions))
-    if len(np.unique(case_of)) < len(case_of):
-        skipped.append(
-            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
-            " by 90 deg"
-        )
+    every = np.arange(len(scene.loads.cases))
+    case_of = equal_cases(scene, structure, values) if may_repeat else every
+    if copies := int((case_of != every).sum()):
+        skipped.append(f"{copies} of {len(every)} load cases: copies turned by 90 deg")
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
     if vertices is not None:
         skipped.append("parameter derivatives: none are asked for")
@@ -187,23 +176,6 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     """Computes the parameters of a structure as NumPy arrays."""
     made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
     return concrete(made)
-
-
-def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
-    every = np.arange(len(scene.loads.motions))
-    directed = [m for m in scene.loads.motions if isinstance(m, _DIRECTED)]
-    if len(directed) < len(scene.loads.motions) or scene.objective.reference is not None:
-        return every
-    image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
-    clamped_units = np.unique(scene.loads.clamped // 3)
-    whole_units = len(clamped_units) * 3 == len(scene.loads.clamped)
-    if image is None or not whole_units:
-        return every
-    if not is_invariant(image, clamped_units, scene.loads.driven, scene.objective.region):
-        return every
-    besides = [motion._replace(direction=0.0) for motion in directed]
-    kind = np.array([besides.index(other) for other in besides])
-    return equal_directions(np.array([motion.direction for motion in directed], dtype=float), kind)
 
 
 def _choose(

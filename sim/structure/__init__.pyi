@@ -28,7 +28,3 @@ from .perturbation import MOST_ROUNDS as MOST_ROUNDS
 from .perturbation import Perturbation as Perturbation
 from .perturbation import PerturbedStructure as PerturbedStructure
 from .perturbation import perturbed as perturbed
-from .symmetry import QUARTER_TURN as QUARTER_TURN
-from .symmetry import equal_directions as equal_directions
-from .symmetry import is_invariant as is_invariant
-from .symmetry import unit_image as unit_image
