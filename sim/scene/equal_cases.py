@@ -114,9 +114,9 @@ def _keeps_constants(image: NetworkImage, values: ConcreteParameters) -> bool:
         (values.mass[image.unit], values.mass),
         (values.damping[image.unit], values.damping),
     )
-    return np.allclose(values.vector[image.ligament], turned, rtol=0, atol=VERTEX_TOLERANCE) and all(
-        np.allclose(one, other, rtol=SAME, atol=0) for one, other in pairs
-    )
+    return np.allclose(
+        values.vector[image.ligament], turned, rtol=0, atol=VERTEX_TOLERANCE
+    ) and all(np.allclose(one, other, rtol=SAME, atol=0) for one, other in pairs)
 
 
 def _is_kept(image: Ints, units: Ints) -> bool:

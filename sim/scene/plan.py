@@ -11,6 +11,7 @@ from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
 from sim.scene.scene import Accuracy, Scene
+from sim.scene.soundness import check_scene
 from sim.solvers import Solver, check_free_dofs, concrete
 from sim.structure import ConcreteParameters, parameters, shape
 from sim.time_integration import BLANES_MOAN, ExplicitSolver, ImplicitSolver, adapted, time_grid
@@ -53,7 +54,7 @@ GRIDS: dict[Accuracy, GridRule] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Holds the decisions for one scene.
 
@@ -63,6 +64,7 @@ class Plan:
         case_of: (n_cases,) the simulated case that each load case takes its loss from.
         decisions: one line for each thing decided.
         skipped: one line for each thing left out.
+        warnings: one line for each thing that may not be meant; logged when the plan is made.
     """
 
     integrator: Literal["static", "implicit", "explicit"]
@@ -70,6 +72,7 @@ class Plan:
     case_of: Ints
     decisions: tuple[str, ...]
     skipped: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def simulated(self) -> Ints:
@@ -86,6 +89,7 @@ class Plan:
             "integrator": self.integrator,
             "decisions": list(self.decisions),
             "skipped": list(self.skipped),
+            "warnings": list(self.warnings),
         }
 
 
@@ -108,11 +112,13 @@ def make_plan(
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
+        SceneError: the scene has no meaning.
     """
-    check_free_dofs(scene.topology)
     structure = scene.lattice.vertices if vertices is None else vertices
-    values = concrete_parameters(scene, structure)
     times = sample_times(scene) if times is None else times
+    warnings = check_scene(scene, structure, times)
+    check_free_dofs(scene.topology)
+    values = concrete_parameters(scene, structure)
     decisions: list[str] = []
     skipped = [_reference_line(scene)]
 
@@ -154,7 +160,7 @@ def make_plan(
                 decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
             solver = explicit
     decisions.insert(0, f"integrator: {integrator}")
-    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
+    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), warnings)
 
 
 def _reference_line(scene: Scene) -> str:

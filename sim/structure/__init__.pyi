@@ -8,6 +8,7 @@ from .gaps import clearance as clearance
 from .gaps import close_pairs as close_pairs
 from .gaps import displaced as displaced
 from .gaps import overlapping_pairs as overlapping_pairs
+from .gaps import polygons as polygons
 from .gaps import smallest_gap as smallest_gap
 from .geometry import VOID_BRANCH as VOID_BRANCH
 from .geometry import angle_between as angle_between
