@@ -64,6 +64,7 @@ def check_scene(
     """
     asked = np.array([0.0, scene.loads.duration]) if times is None else times
     check_units(scene.lattice, scene.lattice.vertices if vertices is None else vertices)
+    _check_ids(scene)
     found = [*_loose_units(scene), *_size(scene, len(asked))]
     for number, motion in enumerate(scene.loads.motions):
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(motion)):
@@ -103,6 +104,21 @@ def check_units(lattice: Lattice, vertices: Floats) -> None:
             f" ({lengths.min():.3g} mm); keep corners of neighbours apart",
             "lattice.ligament_length",
         )
+
+
+def _check_ids(scene: Scene) -> None:
+    """Refuses ids of units that there are not."""
+    loads, n = scene.loads, scene.lattice.n_units
+    named = {
+        "supports": [each.units for each in loads.supports],
+        "drive.units": [case.units for case in loads.cases],
+        "objective.region": [scene.objective.region],
+        "cloak": [scene.design.cloak],
+    }
+    for key, ids in named.items():
+        every = np.concatenate([np.zeros(0, dtype=np.int64), *ids])
+        if len(wrong := every[(every < 0) | (every >= n)]) > 0:
+            raise SceneError(f"there is no unit {wrong[0]}; the lattice has 0 to {n - 1}", key)
 
 
 def _loose_units(scene: Scene) -> Iterator[str]:
