@@ -163,7 +163,8 @@ def _drive(scene: Scene, motion: MotionLaw, case: str, end: float) -> Iterator[s
     if isinstance(motion, TimeSeries):
         _series(motion, case, end)
     instants = np.linspace(0.0, end, INSTANTS)
-    course = np.asarray(motion(instants)).reshape(INSTANTS, -1, 3)
+    with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
+        course = np.asarray(motion(instants)).reshape(INSTANTS, -1, 3)
     far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
     size = np.ptp(scene.lattice.vertices, axis=0)
     if not far <= size.max():

@@ -21,7 +21,12 @@ from jax.custom_derivatives import SymbolicZero
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology
 from sim.solvers.loads import MotionLaw, held_values
-from sim.solvers.validation import check_free_dofs, check_ligaments, check_parameters
+from sim.solvers.validation import (
+    check_free_dofs,
+    check_ligaments,
+    check_masses,
+    check_parameters,
+)
 from sim.structure import ConcreteParameters, Parameters
 
 T = TypeVar("T")
@@ -134,6 +139,7 @@ def solve_case(
     """
     check_free_dofs(solver.topology)
     check_parameters(values, drive.motion)
+    check_masses(values, at_rest=True)
     try:
         displacement, velocity, record = solver.forward(values, drive)
     except NewContactPairs as met:

@@ -22,7 +22,6 @@ NEVER_NEGATIVE = {
     "law": "stiffness of the ligaments",
     "contact": "stiffness of contact",
     "damping": "damping",
-    "mass": "mass or the moment of inertia of a unit (do its edges cross?)",
 }
 COLLAPSED = 1e-3
 """Length of a ligament in motion, over that at rest, below which it has none."""
@@ -70,10 +69,13 @@ def check_connected(topology: Topology) -> None:
         )
 
 
-def check_masses(values: ConcreteParameters) -> None:
-    """Raises an error that names a unit which nothing accelerates, or the wrong way round."""
+def check_masses(values: ConcreteParameters, *, at_rest: bool = False) -> None:
+    """Raises an error that names a unit which nothing accelerates, or the wrong way round.
+
+    Where inertia plays no part, ``at_rest``, a unit may be without mass, but not turned inside out.
+    """
     lightest = values.mass.min(axis=1)
-    if (lightest <= 0.0).any():
+    if (lightest < 0.0).any() or (not at_rest and (lightest == 0.0).any()):
         unit = int(lightest.argmin())
         raise SimulationError(
             f"unit {unit} has no mass, or less than none ({lightest[unit]:.3g}); try another design"

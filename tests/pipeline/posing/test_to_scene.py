@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.__main__ import run_stage
+from pipeline.posing import scene_of
+from pipeline.posing.to_scene import contact_laws
+from pipeline.problem.reading import load
+from sim.structure import VoidAngleContact
 from tests.pipeline.static import SHIELD, write
 
 SERIES = "drive: { kind: time_series, units: right, file: push.csv }\n"
@@ -16,6 +21,12 @@ WRONG = {
     "no supports": ("supports:\n  - units: left\n", "supports: []\n", "supports"),
     "no length": ("ligament_length: 2.25 mm", "ligament_length: 1e-9 mm", "lattice"),
 }
+
+
+def test_the_law_of_contact_is_that_of_the_problem(fig2: Path) -> None:
+    laws = contact_laws(load(fig2))
+    assert laws["angle"] == VoidAngleContact(np.deg2rad(-15.0), np.deg2rad(-10.0))
+    assert scene_of(load(fig2), fig2.parent).structure.contact == laws["angle"]
 
 
 def design(path: Path, out: Path, capfd: pytest.CaptureFixture[str]) -> str:

@@ -14,7 +14,7 @@ import pytest
 from pipeline.problem.fields import csv_columns
 from pipeline.problem.outlines import find_inside, images
 from pipeline.problem.reading import yaml_file
-from pipeline.runtime import UserError
+from pipeline.runtime import UserError, read_bounded
 from pipeline.tracking.frames import video
 
 UNSAFE = {
@@ -187,3 +187,15 @@ def test_outlines_of_many_edges_need_little_memory() -> None:
     finally:
         tracemalloc.stop()
     assert sum(inside) == 151
+
+
+def test_a_file_is_read_up_to_its_bound_and_no_further(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(bytes(1000))
+    assert read_bounded(path, 1000) == bytes(1000)
+    with pytest.raises(OSError, match="1000 bytes, which is more than 999"):
+        read_bounded(path, 999)
+    problem = tmp_path / "problem.yaml"
+    problem.write_text("# " + "a" * (256 << 10) + "\ntitle: a\n")
+    with pytest.raises(UserError, match="bytes, which is more than 262144"):
+        yaml_file.read_yaml(problem)
