@@ -123,12 +123,11 @@ class Tally:
     @property
     def worst(self) -> list[Check]:
         """Lists the check of each name that came closest to its limit in solved cases."""
+        solved = (outcome.checks for outcome in self.outcomes if outcome.verdict == "solved")
         found: dict[str, Check] = {}
-        for outcome in self.outcomes:
-            for check in outcome.checks if outcome.verdict == "solved" else ():
-                known = found.get(check.name)
-                if known is None or check.share > known.share:
-                    found[check.name] = check
+        for check in (check for checks in solved for check in checks):
+            known = found.setdefault(check.name, check)
+            found[check.name] = check if check.share > known.share else known
         return list(found.values())
 
 

@@ -12,7 +12,7 @@ from reports.base import style
 from reports.facts import measures
 from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
-from reports.panels import Panel, PanelFigure, measured_overlay
+from reports.panels import CLOAK_TINT, Panel, PanelFigure, measured_overlay
 from reports.study import CLOAK, RigidUnits, StudyResults, from_dataset, middle_of_top_edge
 
 HEIGHT = 158.0
@@ -86,7 +86,7 @@ def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
     _arrow(figure, (45.5, top + SIDE / 2), (58.5, top + SIDE / 2), kind="<|-|>")
     _say(figure, 52.0, top + SIDE / 2 - 2.0, "alike in the\nregion of\ninterest", va="bottom")
     for k, (tint, text) in enumerate(
-        ((domain_panels.INTEREST_TINT, "region of interest"), (domain_panels.CLOAK_TINT, "cloak"))
+        ((domain_panels.INTEREST_TINT, "region of interest"), (CLOAK_TINT, "cloak"))
     ):
         y = top + SIDE / 2 + 4.0 + 10.5 * k
         _box(figure, (49.5, y, 5.0, 2.6), tint)
