@@ -44,11 +44,7 @@ def suite() -> Suite:
         ),
         (
             Target("whole path", seconds_of(COLD), "s", at_most=0.15),
-            Target(
-                "time from the last design over time from rest",
-                time_ratio(WARM, COLD),
-                at_most=1.0,
-            ),
+            Target(f"time {WARM} over time {COLD}", time_ratio(WARM, COLD), at_most=1.0),
             Target("loss error", error_of(WARM, "loss"), at_most=1e-9),
             Target("gradient error", error_of(WARM, "gradient"), at_most=1e-7),
         ),

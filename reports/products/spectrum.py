@@ -85,17 +85,10 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
 def _mode(axes: Axes, data: xr.Dataset, mode: int, spacing: float) -> None:
     structure = from_dataset(data, spacing)
     motion = data["mode_shape"].isel(mode=mode).transpose("unit", "dof").values
-    size = np.linalg.norm(motion[:, :2], axis=1)
+    size, reach = np.linalg.norm(motion[:, :2], axis=1), SHOWN * spacing
     base = np.nan_to_num(data["equilibrium"].transpose("unit", "dof").values)
-    draw(
-        axes,
-        structure,
-        base + SHOWN * spacing * np.nan_to_num(motion),
-        values=size,
-        colour_map=style.MAGNITUDE,
-        norm=None,
-        margin=SHOWN * spacing,
-    )
+    moved = base + reach * np.nan_to_num(motion)
+    draw(axes, structure, moved, values=size, colour_map=style.MAGNITUDE, margin=reach)
     axes.set_title(f"{data['frequency'].values[mode]:.1f} Hz", pad=1.5, fontsize=style.SMALL)
 
 

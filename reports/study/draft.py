@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from pipeline.problem import Problem
@@ -40,16 +42,5 @@ def _sizes(problem: Problem) -> dict[str, float]:
 
 def mark(figure: Figure) -> None:
     """Says across the page that this is not the study itself."""
-    figure.text(
-        0.5,
-        0.5,
-        "DRAFT",
-        fontsize=110,
-        fontweight="bold",
-        color=ALTERED,
-        alpha=0.16,
-        rotation=45,
-        ha="center",
-        va="center",
-        zorder=100,
-    )
+    pale: dict[str, Any] = {"color": ALTERED, "alpha": 0.16, "fontsize": 110, "fontweight": "bold"}
+    figure.text(0.5, 0.5, "DRAFT", rotation=45, ha="center", va="center", zorder=100, **pale)
