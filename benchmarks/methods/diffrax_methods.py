@@ -1,7 +1,5 @@
 """Lists methods of diffrax: the law in JAX, with its adjoints; statics as slow dynamics."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache, partial

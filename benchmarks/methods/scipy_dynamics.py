@@ -3,8 +3,6 @@
 The right-hand side is the project's compiled force, called from Python at every stage.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Poses the paper's scenes at their initial designs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from functools import cache
 from typing import Any

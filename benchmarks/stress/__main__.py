@@ -4,8 +4,6 @@ Command line: ``python -m benchmarks.stress [family ...]``. The counts go to JSO
 shows.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

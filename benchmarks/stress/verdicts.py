@@ -4,8 +4,6 @@ A case is solved if everything that is checked of its answer keeps within its
 limit, refused if it ends in an error that says what to do, and wrong otherwise.
 """
 
-from __future__ import annotations
-
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence

@@ -1,7 +1,5 @@
 """Measures work against precision of our own integrators, on Figure 2's load case at 45 deg."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Measures the growth of an equilibrium with the lattice: squares compressed by a tenth at once."""
 
-from __future__ import annotations
-
 from functools import cache, partial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measures Figure 4's whole path, loss and gradient, along a walk of designs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace

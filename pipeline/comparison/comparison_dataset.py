@@ -1,7 +1,5 @@
 """Assembles a comparison: both sides at the frames, metrics, and their alignment."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

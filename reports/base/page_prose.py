@@ -1,7 +1,5 @@
 """Reads the prose of a page from the YAML beside the module that makes it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

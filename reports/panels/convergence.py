@@ -1,7 +1,5 @@
 """Draws the loss against the evaluation of the design, for every method, as a panel of a figure."""
 
-from __future__ import annotations
-
 import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr

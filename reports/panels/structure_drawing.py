@@ -1,7 +1,5 @@
 """Draws structures: units, clamps, outlines and arrows of the drive."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 

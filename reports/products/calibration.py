@@ -1,7 +1,5 @@
 """Draws a calibration: every set with its fit and residuals, then the constants."""
 
-from __future__ import annotations
-
 import argparse
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Draws what robust presets gain: losses of the altered structure and of both designs."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draws a spectrum: lowest modes, transmission of the drive, bands of the unit cell."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tells what was tried to lose or to spoil results: tables of tried and survived."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tells why a report shows a draft and not the study itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from matplotlib.figure import Figure

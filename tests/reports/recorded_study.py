@@ -1,7 +1,5 @@
 """Comparisons in closed form: what was measured is the simulation, a tenth more and with noise."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Compares answers with those of the same problem posed differently, and with those of SciPy."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Tries contact at its barrier and cutoff, and inputs of 32 bits, none, far too large."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Tries paths that end in a limit point or branch, and turns beyond 180 deg."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

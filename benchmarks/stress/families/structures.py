@@ -1,7 +1,5 @@
 """Tries lattices from 3 x 3 to 120 x 120 units, and structures in pieces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

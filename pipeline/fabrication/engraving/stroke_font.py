@@ -1,7 +1,5 @@
 """Draws ids in a font of single strokes, to be engraved or embossed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

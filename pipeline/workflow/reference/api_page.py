@@ -1,7 +1,5 @@
 """Writes the page on the public names of sim, from their signatures and docstrings."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Writes the page on the datasets: every variable with its dimensions, its unit and its meaning."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, Kind, Table, Variable

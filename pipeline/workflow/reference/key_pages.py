@@ -1,7 +1,5 @@
 """Writes the pages on the YAML files: every key with its type, its default and its meaning."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

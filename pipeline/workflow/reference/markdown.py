@@ -1,7 +1,5 @@
 """Formats tables of Markdown, and the text above them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Draws pictures of the framework: domains with their regions, what is cut, what a camera sees."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

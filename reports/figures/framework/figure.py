@@ -1,7 +1,5 @@
 """Composes Figure 1 at two-column width: problem, model, optimisation, making, comparing."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

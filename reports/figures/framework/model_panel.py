@@ -1,7 +1,5 @@
 """Describes the model of one ligament between two rigid units, from the geometry of a design."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import matplotlib.patheffects as effects

@@ -1,7 +1,5 @@
 """Describes structures along the path, true to scale, side by side and above one another."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -68,7 +66,7 @@ class SnapshotLayout:
     beside: bool
 
     @classmethod
-    def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> SnapshotLayout:
+    def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> "SnapshotLayout":
         """Returns the layout that shows them larger."""
         kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR

@@ -1,7 +1,5 @@
 """Describes panels that show structures: at rest with their regions, and along the path."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Composes the figure of several designs: how well each shields, and the designs."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize

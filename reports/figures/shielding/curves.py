@@ -1,7 +1,5 @@
 """Draws panels of Figure 2: loss (b), motion of one unit (d), robustness map (e)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Paper: Bordiga et al., "Nonlinear mechanical metamaterial cloaks", section "Shie
 excitations" and the caption of its Figure 2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

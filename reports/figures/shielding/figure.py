@@ -1,7 +1,5 @@
 """Composes Figure 2 of the paper: panels with their tables, text of the page, animation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Describes panels of Figure 2 that show structures: the problem (a) and the snapshots (c)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Makes the page on benchmarks: a section for each picture, with what lies behind it."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

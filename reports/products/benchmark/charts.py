@@ -1,7 +1,5 @@
 """Draws what skipping saves, how time and memory grow, and how well tracking does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 import xarray as xr

@@ -1,7 +1,5 @@
 """Describes points of a benchmark in rows: for the page and as CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

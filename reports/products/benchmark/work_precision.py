@@ -1,7 +1,5 @@
 """Draws time against error, one point a setting: of losses, and of gradients over losses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -3,8 +3,6 @@
 Points are drawn where the cases are not all combinations of two parameters, however many there are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Makes the report of a sweep over any parameters: figure, numbers, tables, one page."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

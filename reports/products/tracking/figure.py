@@ -1,7 +1,5 @@
 """Draws the figure of a quality report: residuals and uncertainty, in space and time."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
