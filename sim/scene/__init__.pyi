@@ -28,6 +28,8 @@ from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
+from .soundness import SceneError as SceneError
+from .soundness import check_scene as check_scene
 from .time_solver import NEWTON as NEWTON
 from .time_solver import STIFFENING as STIFFENING
 from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE

@@ -9,22 +9,16 @@ import numpy as np
 
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
-from sim.scene.scene import DIRECTED, Scene
+from sim.scene.equal_cases import equal_cases
+from sim.scene.scene import Scene
+from sim.scene.soundness import check_scene
 from sim.scene.time_solver import time_solver
 from sim.solvers import Solver, check_free_dofs, concrete
-from sim.structure import (
-    QUARTER_TURN,
-    ConcreteParameters,
-    equal_directions,
-    is_invariant,
-    parameters,
-    shape,
-    unit_image,
-)
+from sim.structure import ConcreteParameters, parameters, shape
 from sim.time_integration import ImplicitSolver
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Holds the decisions for one scene.
 
@@ -34,6 +28,7 @@ class Plan:
         case_of: (n_cases,) the simulated case that each load case takes its loss from.
         decisions: one line for each thing decided.
         skipped: one line for each thing left out.
+        warnings: one line for each thing that may not be meant; logged when the plan is made.
     """
 
     integrator: Literal["static", "implicit", "explicit"]
@@ -41,6 +36,7 @@ class Plan:
     case_of: Ints
     decisions: tuple[str, ...]
     skipped: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def simulated(self) -> Ints:
@@ -57,6 +53,7 @@ class Plan:
             "integrator": self.integrator,
             "decisions": list(self.decisions),
             "skipped": list(self.skipped),
+            "warnings": list(self.warnings),
         }
 
 
@@ -79,22 +76,22 @@ def make_plan(
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
+        SceneError: the scene has no meaning.
     """
-    check_free_dofs(scene.topology)
     structure = scene.lattice.vertices if vertices is None else vertices
-    values = concrete_parameters(scene, structure)
     times = sample_times(scene) if times is None else times
+    warnings = list(check_scene(scene, structure, times))
+    check_free_dofs(scene.topology)
+    values = concrete_parameters(scene, structure)
     decisions: list[str] = []
     skipped = [_reference_line(scene)]
 
     symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
     may_repeat = not every_case and (vertices is not None or symmetric)
-    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.loads.motions))
-    if len(np.unique(case_of)) < len(case_of):
-        skipped.append(
-            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
-            " by 90 deg"
-        )
+    every = np.arange(len(scene.loads.cases))
+    case_of = equal_cases(scene, structure, values) if may_repeat else every
+    if copies := int((case_of != every).sum()):
+        skipped.append(f"{copies} of {len(every)} load cases: copies turned by 90 deg")
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
     if vertices is not None:
         skipped.append("parameter derivatives: none are asked for")
@@ -110,7 +107,7 @@ def make_plan(
         decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:
-        solver = time_solver(scene, values, times, threads, decisions)
+        solver = time_solver(scene, values, times, threads, decisions, warnings)
         integrator = "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
         if isinstance(solver, ImplicitSolver):
             skipped.append(_contact_line(values, solver))
@@ -118,7 +115,7 @@ def make_plan(
             megabytes = solver.adjoint_memory() / 1e6
             decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
     decisions.insert(0, f"integrator: {integrator}")
-    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
+    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), tuple(warnings))
 
 
 def _reference_line(scene: Scene) -> str:
@@ -140,23 +137,6 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     """Computes the parameters of a structure as NumPy arrays."""
     made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
     return concrete(made)
-
-
-def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
-    every = np.arange(len(scene.loads.motions))
-    directed = [m for m in scene.loads.motions if isinstance(m, DIRECTED)]
-    if len(directed) < len(scene.loads.motions) or scene.objective.reference is not None:
-        return every
-    image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
-    clamped_units = np.unique(scene.loads.clamped // 3)
-    whole_units = len(clamped_units) * 3 == len(scene.loads.clamped)
-    if image is None or not whole_units:
-        return every
-    if not is_invariant(image, clamped_units, scene.loads.driven, scene.objective.region):
-        return every
-    besides = [motion._replace(direction=0.0) for motion in directed]
-    kind = np.array([besides.index(other) for other in besides])
-    return equal_directions(np.array([motion.direction for motion in directed], dtype=float), kind)
 
 
 def _contact_line(values: ConcreteParameters, solver: ImplicitSolver) -> str:

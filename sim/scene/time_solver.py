@@ -86,7 +86,12 @@ S = TypeVar("S", ImplicitSolver, ExplicitSolver)
 
 
 def time_solver(
-    scene: Scene, values: ConcreteParameters, times: Floats, threads: int, decisions: list[str]
+    scene: Scene,
+    values: ConcreteParameters,
+    times: Floats,
+    threads: int,
+    decisions: list[str],
+    warnings: list[str],
 ) -> TimeSolver:
     """Chooses the solver of a motion; adds what was decided, a line each.
 
@@ -96,6 +101,7 @@ def time_solver(
         times: (n_times,) of the output, s.
         threads: cases to solve side by side.
         decisions: appended to.
+        warnings: likewise, if the accuracy is not reached.
     """
     error = _Error(scene, values)
     explicit = _explicit(scene, values, times, threads)
@@ -113,14 +119,14 @@ def time_solver(
         if left <= 1.0 or not auto:
             kind = "adapted" if scene.loads.drive_frequency is None else "graded"
             told = f"grid: {len(solver.times) - 1} {kind} steps over {times[-1]:.6g} s, frozen"
-            decisions.extend([told, error.told(left)])
+            decisions.extend([told, error.told(left, warnings)])
             return solver
         decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
     rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
     most = 2**MOST_DOUBLINGS * explicit.n_steps
     chosen, left = _shortened(rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
     told = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
-    decisions.extend([told, error.told(left)])
+    decisions.extend([told, error.told(left, warnings)])
     return chosen
 
 
@@ -186,12 +192,13 @@ class _Error:
         motion = float(np.sqrt(np.sum((one - other) ** 2) / size))
         return max(loss / self._rule.loss, motion / self._rule.motion)
 
-    def told(self, left: float) -> str:
+    def told(self, left: float, warnings: list[str]) -> str:
         """Says how much of the allowed error is estimated to be there."""
         allowed = f"loss {self._rule.loss:g}, motion {self._rule.motion:g}"
         line = f"estimated error: {left:.2g} of what {self._accuracy} allows ({allowed})"
         if left > 1.0:
-            LOG.warning("%s, with the shortest steps that were tried", line)
+            warnings.append(f"{line}, with the shortest steps that were tried")
+            LOG.warning(warnings[-1])
         return line
 
 
