@@ -20,7 +20,7 @@ PINNED: dict[str, dict[str, float]] = {
     "custom_lattice": {"force": 14.6877, "n_units": 24.0, "n_ligaments": 37.0},
     "custom_loss": {"turn_deg": -15.6055, "steepest": 1.15457},
     "energy_balance": {},
-    "error_estimate": {"draft": 0.00208586, "default": 0.00185421},
+    "error_estimate": {"draft": 0.00209083, "default": 0.00149858},
     "gradient_by_stiffness": {"axial": 0.0200955, "shear": -0.0110401, "bending": -0.00905535},
     "harmonic_wave": {"arrived": 128.0},
     "hidden_void": {"before": 0.116888, "after": 0.0350505},
