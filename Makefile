@@ -17,7 +17,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup dev reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup dev reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -33,9 +33,11 @@ help:
 	@echo "make movies    the paper's movies: results/movies"
 	@echo "make reproduce build fig2@quick (or STUDY=...) twice from nothing, and compare all bytes"
 	@echo "make test      run the tests"
+	@echo "make nightly   run what takes longer: the four below, with a table of them (PARTS=clients: one)"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
-	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
+	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/nightly)"
 	@echo "make cluster   make this machine a SLURM of one node and run the tests on it"
+	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make benchmark run time against error of every solver, and more: results/benchmark (an hour)"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
@@ -46,7 +48,6 @@ help:
 	@echo "make dev       the same, with the tools of tests, linters and documentation"
 	@echo "make wheels WHEELS=folder   download what make setup needs into the folder"
 	@echo "make docs      the documentation as a site: results/docs/index.html"
-	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make lock      renew requirements.lock from pyproject.toml (with Python 3.11)"
 	@echo "make clean     remove results and caches (.venv stays)"
 
@@ -94,6 +95,9 @@ reproduce: setup
 test: dev
 	$(BIN)/python -m pytest $(PYTEST)
 
+nightly: dev
+	@.ci/nightly $(PARTS)
+
 pythons:
 	@.ci/pythons
 
@@ -107,7 +111,6 @@ clients: dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients
 
 cluster: dev
-	tests/cluster/start.sh
 	$(BIN)/python -m pytest tests/cluster
 
 lint: dev
