@@ -8,8 +8,7 @@ PAGES := all fig1 index movies calibrate benchmark
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
-INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE)
-OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
+INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
 PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
@@ -61,16 +60,16 @@ dev: .venv/requirements-dev.lock
 	    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	    echo "error: '$(PYTHON)' comes without venv or pip. On Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
+	@echo "Setting up .venv from requirements.lock (half a minute, once)" >&2
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
-	@$(INSTALL) -r requirements.lock
+	@$(INSTALL) requirements.lock
 	@cp requirements.lock $@
 
 .venv/requirements-dev.lock: requirements-dev.lock | setup
-	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (a minute, once)" >&2
+	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (once)" >&2
 	@rm -f $@
-	@$(INSTALL) -r requirements-dev.lock
+	@$(INSTALL) requirements-dev.lock
 	@cp requirements-dev.lock $@
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
@@ -146,7 +145,7 @@ LOCK = CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --
 ITSELF := '/^metacloak @/d; /^\# WARNING: pip install will/d; /^\# Consider using a hashable/d'
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }
-	$(LOCK) --extra all --output-file requirements.lock pyproject.toml
+	$(LOCK) --extra all --extra install --output-file requirements.lock pyproject.toml
 	sed -i $(ITSELF) requirements.lock
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i $(ITSELF) requirements-dev.lock
