@@ -1,7 +1,12 @@
 from __future__ import annotations
 
+import ctypes
+import gc
 import signal
+import sys
 
+import psutil
+import pytest
 from hypothesis import HealthCheck, settings
 
 from pipeline.runtime import pin
@@ -16,3 +21,20 @@ settings.register_profile(
     "suite", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("suite")
+
+GROWTH = 250 << 20
+"""Bytes by which a process may grow before it drops the functions that JAX has compiled."""
+_process, _kept = psutil.Process(), [0]
+
+
+def pytest_collection_finish() -> None:
+    _kept[0] = _process.memory_info().rss
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown() -> None:
+    if "jax" in sys.modules and _process.memory_info().rss > _kept[0] + GROWTH:
+        sys.modules["jax"].clear_caches()
+        gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)
+        _kept[0] = _process.memory_info().rss

@@ -40,6 +40,7 @@ FLOORS = {
 HEAVY = {
     "av",
     "cv2",
+    "diffrax",
     "ezdxf",
     "jax",
     "lxml",
