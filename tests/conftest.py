@@ -26,8 +26,12 @@ GROWTH = 250 << 20
 """Bytes by which a process may grow before it drops the functions that JAX has compiled."""
 _process, _kept = psutil.Process(), [0]
 
+gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
+
 
 def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
     _kept[0] = _process.memory_info().rss
 
 
