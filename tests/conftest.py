@@ -22,8 +22,8 @@ settings.register_profile(
 )
 settings.load_profile("suite")
 
-GROWTH = 250 << 20
-"""Bytes by which a process may grow before it drops the functions that JAX has compiled."""
+LARGE, GROWTH = 1000 << 20, 150 << 20
+"""Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
 _process, _kept = psutil.Process(), [0]
 
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
@@ -32,12 +32,11 @@ gc.disable()  # what is imported to collect tests stays: nothing to look through
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
-    _kept[0] = _process.memory_info().rss
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown() -> None:
-    if "jax" in sys.modules and _process.memory_info().rss > _kept[0] + GROWTH:
+    if "jax" in sys.modules and _process.memory_info().rss > max(LARGE, _kept[0] + GROWTH):
         sys.modules["jax"].clear_caches()
         gc.collect()
         ctypes.CDLL(None).malloc_trim(0)

@@ -49,7 +49,7 @@ def stages(out: Path) -> dict[str, list[str]]:
     return {
         "select": [*study, "--designs", f"{TARGET}/design_sqp.nc", "--out", f"{out}/design.nc"],
         "simulate": [*study, "--design", design, "--out", f"{out}/response.nc"],
-        "virtual_lab": [
+        "film": [
             *("render", f"experiments/{STUDY}/recordings/cloaked.yaml", *shown),
             *("--out", f"{out}/film.mp4"),
         ],
@@ -179,13 +179,8 @@ def no_fonts(checkout: Checkout) -> Iterator[Tried]:
     with tempfile.TemporaryDirectory() as folder:
         nowhere = {"HOME": "/nonexistent", "FONTCONFIG_FILE": "/nonexistent"}
         nowhere |= {"XDG_CACHE_HOME": f"{folder}/cache", "MPLCONFIGDIR": f"{folder}/matplotlib"}
-        command = [
-            ".venv/bin/python",
-            "-m",
-            "reports",
-            "study",
-            *stages(Path(folder))["report"],
-        ]
+        words = stages(Path(folder))["report"]
+        command = [".venv/bin/python", "-m", "reports", "study", *words]
         environment = {**os.environ, **nowhere}
         ended = subprocess.run(
             command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False

@@ -98,7 +98,7 @@ def built(built_once: Sandbox, tmp_path: Path) -> Sandbox:
 
 def _copied(root: Path) -> Sandbox:
     for folder in ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim"):
-        shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / folder, root / folder, ignore=shutil.ignore_patterns("*.pyc.*"))
     shutil.copy(ROOT / "Snakefile", root)
     for stage in STAGES:
         shutil.copy(Path(__file__).with_name("toy_stage.py"), root / f"{stage}.py")
