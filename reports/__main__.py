@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from pipeline.runtime import PREFIX, cli
+from pipeline.runtime import PREFIX, cli, delegate
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
@@ -35,4 +35,6 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    asked = REPORTS.get("".join(sys.argv[1:2]))
+    code = delegate(f"{PREFIX}reports", PREFIX + asked.module) if asked else None
+    sys.exit(main() if code is None else code)

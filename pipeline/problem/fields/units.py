@@ -105,6 +105,7 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     return value
 
 
+@lru_cache
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     """Converts one `unit` to working units of `dimension`."""
     from pint.errors import UndefinedUnitError
