@@ -40,6 +40,9 @@ class Tried:
     fault: str = ""
 
 
+Attempt = Callable[[Checkout], Iterator[Tried]]
+
+
 def stages(out: Path) -> dict[str, list[str]]:
     """Returns the command lines of the stages that write, from what is built to a folder."""
     study = ["--problem", f"experiments/{STUDY}/problem.yaml"]
@@ -207,7 +210,7 @@ def odd_paths(checkout: Checkout) -> Iterator[Tried]:
             yield Tried(f"path: {place}", "make", fault or ("a command was run" if pwned else ""))
 
 
-ALL: tuple[Callable[[Checkout], Iterator[Tried]], ...] = (
+ALL: tuple[Attempt, ...] = (
     *(small_files, full_disk, read_only, two_at_once, no_fonts, no_terminal, wrong_clock),
     odd_paths,
 )
