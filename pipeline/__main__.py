@@ -9,13 +9,18 @@ from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
 
-from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, delegate, version
+from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, delegate, streams, version
 
 _HELP = ("-h", "--help")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Looks up the stage that the first word names, and runs it with the others."""
+    with streams.unread():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     if not words or words[0] in _HELP:
         print(overview())  # noqa: T201
