@@ -29,6 +29,14 @@ _process, _kept = psutil.Process(), [0]
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
 
 
+LONG = ("e2e", "workflow", "docs", "solvers")
+"""Folders with files of a minute; begun first, they keep no worker at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.parent.name not in LONG)
+
+
 def pytest_collection_finish() -> None:
     gc.freeze()
     gc.enable()
