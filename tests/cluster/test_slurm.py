@@ -1,7 +1,5 @@
 """Figure 3 on a real SLURM of one node: a node lost, the submitter killed, the same bytes."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -5,8 +5,6 @@ commands run. Of every other page, targets are planned by make and by Snakemake,
 stages are read by their own parsers.
 """
 
-from __future__ import annotations
-
 import argparse
 import runpy
 import shutil

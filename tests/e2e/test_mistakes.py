@@ -1,7 +1,5 @@
 """Mistakes and refusals meet the real stages: one message, an exit code, and nothing lost."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

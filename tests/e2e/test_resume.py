@@ -1,7 +1,5 @@
 """Whatever ends `make`, the same command goes on, and ends with the same bytes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import struct

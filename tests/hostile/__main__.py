@@ -1,7 +1,5 @@
 """Tries to lose or to spoil something: ``python -m tests.hostile [inputs] [kills] [places]``."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

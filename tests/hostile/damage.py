@@ -1,7 +1,5 @@
 """Damages files: bits turn, ends are lost, people and other software edit them."""
 
-from __future__ import annotations
-
 import re
 import tempfile
 from collections.abc import Callable, Hashable, Sequence

@@ -3,8 +3,6 @@
 ``python -m tests.hostile.inputs SEED NUMBERS`` tries some: a line of JSON before and after each.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import math

@@ -1,7 +1,5 @@
 """Works where nobody should: full disks, odd paths, wrong clocks, no terminal, no fonts."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Lists the kinds of files that the project reads: one of each, and how the stages read it."""
 
-from __future__ import annotations
-
 import shutil
 import zlib
 from collections.abc import Callable

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 from tests.e2e.conftest import fresh, undisturbed
 
 __all__ = ["fresh", "undisturbed"]

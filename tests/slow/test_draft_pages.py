@@ -1,7 +1,5 @@
 """The tutorial and the pages after it do as they say, with a draft in the place of its study."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

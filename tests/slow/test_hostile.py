@@ -1,7 +1,5 @@
 """Killed runs and hostile places; `make survive` tries more kills, and makes a page of all."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

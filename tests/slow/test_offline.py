@@ -1,7 +1,5 @@
 """The whole installation from a folder of packages, as docs/install.md tells it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

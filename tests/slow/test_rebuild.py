@@ -1,7 +1,5 @@
 """Builds of `fig2@quick` that take minutes: from nothing in two folders."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Builds that are ended at every moment of their work, one after the other."""
 
-from __future__ import annotations
-
 from tests.e2e.checkout import Checkout
 from tests.e2e.test_resume import ENDS, check_ends
 

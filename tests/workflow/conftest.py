@@ -1,7 +1,5 @@
 """A copy of the repository whose stages only pretend: the workflow without the work."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Every module can be imported, on each Python."""
 
-from __future__ import annotations
-
 import importlib
 
 from pipeline.runtime import ROOT

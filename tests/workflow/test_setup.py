@@ -1,7 +1,5 @@
 """An environment from a folder of packages, without a network, by uv or by pip."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

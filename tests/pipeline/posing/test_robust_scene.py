@@ -1,7 +1,5 @@
 """Designs for more than one load, and for imperfect copies."""
 
-from __future__ import annotations
-
 import json
 from copy import deepcopy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Problems that can be read but have no meaning: one message, whatever stage meets them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

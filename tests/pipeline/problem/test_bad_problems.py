@@ -1,7 +1,5 @@
 """Every mistake in a problem file is told with its key, its value and a remedy."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

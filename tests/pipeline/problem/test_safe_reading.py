@@ -1,7 +1,5 @@
 """Files that were written to do harm, or that were never meant to be read here."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tracemalloc
