@@ -10,7 +10,7 @@ from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
 from sim.quasistatics.equilibrium_path import adjoint, follow
-from sim.solvers import PrescribedMotion, check_connected, check_start
+from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
@@ -111,6 +111,7 @@ class StaticSolver:
                 states=states[:reached][self.substeps - 1 :: self.substeps],
             )
         last = slice(self.substeps - 1, None, self.substeps)
+        check_ligaments(top, values, states[last])
         on_the_way = jumped.reshape(-1, self.substeps).max(axis=1)
         record = StaticRecord(
             states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts, top
