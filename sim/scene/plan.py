@@ -72,6 +72,8 @@ class Plan:
         case_of: (n_cases,) the simulated case that each load case takes its loss from.
         decisions: one line for each thing decided.
         skipped: one line for each thing left out.
+        passed: (n_loads,) load parameters, those of the loss among them, by which the paths of a
+            static scene are followed anew to confirm losses; None for four for each of these.
     """
 
     integrator: Literal["static", "implicit", "explicit"]
@@ -79,6 +81,7 @@ class Plan:
     case_of: Ints
     decisions: tuple[str, ...]
     skipped: tuple[str, ...]
+    passed: Floats | None = None
 
     @property
     def simulated(self) -> Ints:

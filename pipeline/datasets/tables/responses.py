@@ -68,11 +68,37 @@ RESPONSE: Table = (
             "1",
             "whether a state of equilibrium is a minimum of the energy",
             "int8",
-            flags={"not_asked": -1, "unstable": 0, "stable": 1, "stable_after_a_jump": 2},
+            flags={
+                "not_asked": -1,
+                "unstable": 0,
+                "stable": 1,
+                "stable_after_a_jump": 2,
+                "stable_after_a_branching": 3,
+            },
+        ),
+        "snap": Variable(
+            _STEP,
+            "s",
+            "load parameter at which the structure snapped on the way to a load: its path ended",
+            gaps=True,
+        ),
+        "eigenvalue": Variable(
+            _STEP,
+            "N/mm",
+            "smallest eigenvalue of the tangent at fixed supports and drives, rotations times half"
+            " a spacing; static studies",
+            gaps=True,
         ),
         "min_gap": Variable(_OFCASE, "mm", "smallest gap between units over the history"),
         "overlaps": Variable(_OFCASE, "1", "overlapping pairs of units over the history", "int64"),
         "loss": Variable(_OFCASE, "1", "loss: time integral, or over the load steps", also=ENERGY),
+        "loss_other_branch": Variable(
+            _OFCASE,
+            "1",
+            "loss on the other branch where the path of equilibria branches",
+            gaps=True,
+            also=ENERGY,
+        ),
         "loss_samples": Variable(
             _OFCASE, "1", "loss, mean of the samples as the authors plot it", also=ENERGY
         ),
@@ -95,6 +121,12 @@ RESPONSE: Table = (
         ),
         "gap_by_contact": Variable(
             _BY_LAW, "mm", "smallest gap over the load steps under either law of contact", gaps=True
+        ),
+        "snaps_by_contact": Variable(
+            _BY_LAW,
+            "1",
+            "ways between load steps on which the structure snaps under either law of contact",
+            gaps=True,
         ),
     }
 )

@@ -17,7 +17,7 @@ from pipeline.datasets.tables.tracks import RECORDED, SPECIMEN, TRACK, TRUTH
 from pipeline.datasets.tables.trials import SCATTER, VERIFICATION
 from pipeline.datasets.tables.variables import Table
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 Kind = Literal[
     "design",

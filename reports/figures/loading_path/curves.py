@@ -97,7 +97,7 @@ def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignRe
 
 def _jumps(axes: Axes, path: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
     """Draws crosses where a structure came to another branch of equilibria."""
-    jumped = (response["stability"] == JUMPED).any("case")
+    jumped = (response["stability"] >= JUMPED).any("case")
     for name in structures(response):
         at = jumped.sel(structure=name).values
         colour = style.STRUCTURE_COLOURS[name]
@@ -155,6 +155,11 @@ def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     measured.forces(axes, study)
     if study.problem.objective.target == "rest":  # or another panel has told it
         _sides(axes, study)
+
+
+def stability_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws the smallest eigenvalue of the tangent; the path ends where it vanishes."""
+    _plain_panel(axes, study.problem, path, study.response["eigenvalue"], "eigenvalue (N/mm)")
 
 
 def _sides(axes: Axes, study: StudyResults) -> None:
