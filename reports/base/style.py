@@ -169,6 +169,11 @@ def write(figure: Figure, left: float, top: float, text: str, **style: str | flo
     figure.text(x, y, text, **settings)
 
 
+def literal(text: str) -> str:
+    """Returns the words of a user as they stand: a dollar begins no formula."""
+    return text.replace("$", r"\$")
+
+
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:
     """Draws bold panel letter, and its title beside it."""
     write(figure, left, top, name, fontsize=PANEL, fontweight="bold")

@@ -68,7 +68,7 @@ def _band(
     yield Panel((next(letters), "", 0.0, top))
     draws = [*([None] * (len(band) - 1)), lambda figure: _structures(figure, columns, shade, *at)]
     for study, start, draw in zip(band, starts, draws, strict=True):
-        yield Panel((next(letters), heading(study), LEFT + start * side, top), draw)
+        yield Panel((next(letters), style.literal(heading(study)), LEFT + start * side, top), draw)
 
 
 def _structures(
@@ -115,4 +115,6 @@ def _curves(study: StudyResults, k: int, top: float, letters: Iterator[str]) -> 
             else:
                 curves.contraction_panel(axes, study, way)
 
-        yield Panel((next(letters), f"{heading(study)}, {title.lower()}", left, y), draw)
+        yield Panel(
+            (next(letters), f"{style.literal(heading(study))}, {title.lower()}", left, y), draw
+        )
