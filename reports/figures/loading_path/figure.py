@@ -41,8 +41,6 @@ from reports.study import StudyResults
 
 TALLEST_SNAPSHOTS = 116.0
 """Height that all snapshots may take, mm."""
-IN_A_ROW, ROW_HEIGHT = 4, 48.0
-"""Panels of curves side by side at most, and the height of a row, mm."""
 _SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
 _HISTORY = (
     "Loss against evaluation; rejected evaluations are dots, infeasible ones pale, the circle is "
@@ -68,7 +66,6 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
         + (", grey ones stiffened" if problem.inclusion is not None else "")
         + (", green ones of interest." if problem.objective.region != "surroundings" else ".")
     )
-    below, height = _in_rows(list(_curves(study, path)), low)
     panels = [
         *design_panels(study, symbol, clamped),
         Panel(
@@ -76,10 +73,10 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
             lambda figure: snapshots(figure, study, grid, top + head),
             f"Snapshots at true size, coloured by {colours}.",
         ),
-        *below,
+        *_side_by_side(list(_curves(study, path)), low),
     ]
     remark = measured_overlay.caption(study.recordings)
-    return PanelFigure(low + height, panels, study.draft, remark)
+    return PanelFigure(low + 48.0, panels, study.draft, remark)
 
 
 def design_panels(
@@ -133,15 +130,14 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
             words,
             (),
         )
-    words = "Force of the drive along its direction."
-    yield "Reaction", lambda axes: curves.reaction_panel(axes, study, path), words, ()
+    words = "Force of the drive along its direction"
     if path.static:
-        words = (
-            "Smallest eigenvalue of the tangent at fixed supports and drive: a path ends where it "
-            "vanishes, and the structure snaps."
+        words += (
+            "; dotted, smallest eigenvalue of the tangent at fixed supports and drive: where it "
+            "vanishes a path ends, and the structure snaps"
         )
-        draw = curves.stability_panel
-        yield "Distance from a snap", lambda axes: draw(axes, study, path), words, ()
+    words += "."
+    yield "Reaction", lambda axes: curves.reaction_panel(axes, study, path), words, ()
     if (copies := study.scatter) is not None:
         words = (
             "The measure of panel d at the end of the path over imperfect cloaks: median and 5 % "
@@ -155,20 +151,8 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
         yield title, lambda axes: panel(axes, study, measure, copies), words, [table]
 
 
-def _in_rows(shown: Sequence[Curve], top: float) -> tuple[list[Panel], float]:
-    """Lists the panels of curves, lettered from d, in rows of four at most; and their height."""
-    rows = [shown] if len(shown) <= IN_A_ROW else [shown[:3], shown[3:]]
-    letters = iter("defghi")
-    panels = [
-        panel
-        for k, row in enumerate(rows)
-        for panel in _side_by_side(row, letters, top + ROW_HEIGHT * k)
-    ]
-    return panels, ROW_HEIGHT * len(rows)
-
-
-def _side_by_side(shown: Sequence[Curve], letters: Iterator[str], top: float) -> Iterator[Panel]:
-    """Yields the panels of a row of curves."""
+def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
+    """Yields the panels of curves, lettered from d."""
     width = style.TWO_COLUMNS / len(shown)
     for k, (title, draw, words, data) in enumerate(shown):
         left = k * width
@@ -176,7 +160,7 @@ def _side_by_side(shown: Sequence[Curve], letters: Iterator[str], top: float) ->
         def placed(figure: Figure, left: float = left, draw: Callable[[Axes], None] = draw) -> None:
             draw(style.place(figure, left + 11.0, top + 11.5, width - 14.0, 27.0))
 
-        yield Panel((next(letters), title, left, top), placed, words, data)
+        yield Panel(("defg"[k], title, left, top), placed, words, data)
 
 
 def marks(studies: Sequence[StudyResults]) -> str:
