@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import scipy.sparse as sp
 
@@ -46,7 +47,7 @@ class SnapMargin:
         of_design = parameters_of_design(scene)
         self._parameters = of_design
         self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
-        initial = concrete(of_design(np.zeros(scene.space.n_variables)))
+        initial = concrete(of_design(jnp.zeros(scene.space.n_variables)))
         system = system_of(scene.topology, initial)
         rest, _ = lowest_eigenpair(system, np.zeros(scene.topology.n_dofs))
         self.bound = share * rest
@@ -74,7 +75,7 @@ class SnapMargin:
 
     def _margins(self, design: Floats) -> tuple[Floats, Floats]:
         """Margins (n,) of all loads in mm, and their derivatives (n, n_variables)."""
-        values = concrete(self._parameters(design))
+        values = concrete(self._parameters(jnp.asarray(design)))
         _, _, records = solve_cases(self._solver, values, self._cases)
         pull_back = partial(self._pull_back, design)
         found, rows = [], []

@@ -24,7 +24,7 @@ from sim.quasistatics import StaticRecord
 log = logging.getLogger(__name__)
 
 _KEPT = ("states", "tangents", "stable", "jumped", "snapped", "eigenvalue")
-"""Parts of a record, in its order."""
+"""Parts of a record that are stored."""
 
 
 class Paths:
@@ -62,7 +62,7 @@ class Paths:
         unfinished = self.folder / f"{name}.new"
         with unfinished.open("wb") as file:
             parts = {name: np.stack([getattr(one, name) for one in records]) for name in _KEPT}
-            np.savez(file, **parts)
+            np.savez(file, allow_pickle=False, **parts)
             file.flush()
             os.fsync(file.fileno())
         unfinished.rename(self.folder / name)
@@ -76,11 +76,14 @@ class Paths:
 def _records(path: Path) -> list[StaticRecord]:
     """Reads the records in a file, whose entries have checksums."""
     with np.load(path) as stored:
-        parts = (stored[name] for name in _KEPT)
-        return [
-            StaticRecord(*one, counts=np.zeros(4, dtype=np.int64))
-            for one in zip(*parts, strict=True)
-        ]
+        parts = {name: stored[name] for name in _KEPT}
+    return [
+        StaticRecord(
+            **{name: part[case] for name, part in parts.items()},
+            counts=np.zeros(4, dtype=np.int64),
+        )
+        for case in range(len(parts["states"]))
+    ]
 
 
 def _name(design: Floats) -> str:
