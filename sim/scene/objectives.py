@@ -109,7 +109,7 @@ def estimated_errors(
     """
     motion = CHANGE * _relative(np.linalg.norm(motions[0] - motions[1]), np.linalg.norm(motions[1]))
     loss = CHANGE * _relative(abs(losses[0] - losses[1]), size)
-    return motion, max(loss, (motion / CHANGE) ** 2 * _relative(abs(losses[1]), size))
+    return motion, max(loss, motion**2 * _relative(abs(losses[1]), size))
 
 
 def _relative(change: float | np.floating, size: float | np.floating) -> float:

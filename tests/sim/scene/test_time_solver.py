@@ -99,7 +99,7 @@ def test_drives_that_differ_by_direction_are_tried_once() -> None:
 def test_the_change_of_a_loss_may_vanish_but_not_its_stated_error() -> None:
     one, other = np.array([1.0, 0.1]), np.array([1.0, -0.1])
     motion, loss = estimated_errors((one, other), (2.0, 2.0), 2.0)
-    assert loss == pytest.approx(motion**2 / 4)
+    assert loss == pytest.approx(motion**2)
     assert motion > 0.2
     assert estimated_errors((0 * one, 0 * one), (0.0, 0.0), 0.0) == (0.0, 0.0)
     assert estimated_errors((one, 0 * one), (1.0, 0.0), 0.0) == (np.inf, np.inf)
