@@ -21,9 +21,8 @@ _EMERGING = 2.858
 """Singular value, over the median, of a shape that is told from white noise (Gavish and Donoho,
 IEEE Trans. Inf. Theory 60 (2014) 5040)."""
 _FILLINGS = 12
-_DIFFERENCES = tuple(
-    np.array(row, float) for row in ([1, -2, 1], [1, -4, 6, -4, 1], [1, -6, 15, -20, 15, -6, 1])
-)
+_REACHES = (1, 2, 3)
+"""Frames to either side of one whose place the polynomial through them tells."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0
 
@@ -100,13 +99,13 @@ def constant_share(amplitude: Floats) -> float:
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
-    """Measures amplitudes (frames, n) against polynomials through those beside, per frame.
+def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
+    """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
     The order is the lowest that leaves little more than the next ones: more is motion. A jolt is
     motion too, so values are held to a few times the usual; frames at the ends are as the next.
     """
-    found = [_differences(amplitude, steady, weights) for weights in _DIFFERENCES]
+    found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
     usual = np.array([np.nanmedian(np.abs(one), axis=0) / 0.6745 for one in found])
     usual = np.nan_to_num(usual)
     out = np.empty_like(amplitude)
@@ -120,10 +119,13 @@ def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
     return out
 
 
-def _differences(amplitude: Floats, steady: Mask, weights: Floats) -> Floats:
+def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> Floats:
+    """Returns divided differences (frames, n) over so many frames to either side, unit norm."""
     out = np.full_like(amplitude, np.nan)
-    reach = len(weights) // 2
     for frame in range(reach, len(amplitude) - reach):
+        window = slice(frame - reach, frame + reach + 1)
         if steady[frame - reach + 1 : frame + reach + 1].all():
-            out[frame] = weights @ amplitude[frame - reach : frame + reach + 1]
-    return out / np.linalg.norm(weights)
+            apart = time[window, None] - time[None, window] + np.eye(2 * reach + 1)
+            weights = 1 / np.prod(apart / np.abs(apart).max(), axis=1)
+            out[frame] = weights @ amplitude[window] / np.linalg.norm(weights)
+    return out
