@@ -66,7 +66,8 @@ TRACK: Table = UNIT | {
     "camera_radial": Variable(
         ("power",),
         "1",
-        "distortion at half the image's larger side: square and fourth power",
+        "distortion at half the image's larger side: square and fourth power; of a fisheye, of"
+        " the angle to its axis, and as a third half the larger side over the focal length",
         gaps=True,
     ),
     "camera_residual": Variable(
