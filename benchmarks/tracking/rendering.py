@@ -190,7 +190,7 @@ def write_video(
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=Fraction(30))
         stream.height, stream.width = images[0].shape[:2]
-        stream.pix_fmt, stream.time_base = pixels, step
+        stream.pix_fmt, stream.codec_context.time_base = pixels, step
         stream.options = {} if codec == "ffv1" else {"crf": str(crf), "x265-params": "log-level=none"}
         kind = "bgr24" if images[0].ndim == 3 else ("gray16le" if images[0].dtype == np.uint16 else "gray")
         for image, time in zip(images, times, strict=True):

@@ -78,7 +78,9 @@ def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
     own, seen = _motions(shown, script)
     view, middle = script.view, shown.centre.mean(axis=0)
     renderer = Renderer(shown, seen, view, script.cover)
-    images = [renderer.frame(time) for time in times]
+    images: list[Singles] = []
+    for before, time in zip(np.r_[-1.0, times], times, strict=False):
+        images.append(images[-1] if time == before else renderer.frame(time))
     stamps = times if script.stamps is None else script.stamps[: len(times)]
     place = view.project(shown.centre + seen(times)[..., :2] - middle)
     reach = shown.radius * view.scale
@@ -181,7 +183,7 @@ def _stick(time: Floats) -> Floats:
 
 
 def _gap(time: Floats, after: int, missing: int) -> Floats:
-    return np.asarray(time + missing / RATE * (np.arange(len(time)) >= after))
+    return np.asarray(np.round(RATE * time + missing * (np.arange(len(time)) >= after)) / RATE)
 
 
 _SMALL = np.arange(24) / RATE
@@ -212,11 +214,11 @@ SCRIPTS: dict[str, _Script] = {
     "motion_blur_untold": _Script(pace=_swing, view=_QUICK),
     "rolling_shutter": _Script(pace=_sway, view=View(readout=0.03), keys={"readout": 0.03}),
     "camera_drifts": _Script(
-        lambda t: np.stack([1.5 * t / 0.8, -0.4 * t], axis=-1), keys={"follow": True}, follows=True
+        lambda t: np.stack([1.5 * t / 0.8, -0.4 * t], axis=-1), keys={"follows_supports": True}, follows=True
     ),
     "tripod_knocked": _Script(
         lambda t: np.stack([6.0 * (t > 0.4), 3.0 * (t > 0.4)], axis=-1),
-        keys={"follow": True},
+        keys={"follows_supports": True},
         follows=True,
     ),
     "fisheye": _Script(view=View(fisheye=True, distance=75.0, scale=4.6, tilt=0.01)),

@@ -24,6 +24,8 @@ _DOT = 0.25
 """Width of a median that a mark on a face does not survive, pitches."""
 _OTHER = 0.35
 """Orientations that differ by so much are others, rad."""
+_SMALLEST = 0.25
+"""Least area of a patch, over that of a unit: at the rim of a wide picture they are small."""
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
@@ -168,7 +170,7 @@ def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> 
 
 
 def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
-    """Returns centroids (n, 2) in px of patches of a unit's size."""
+    """Returns centroids (n, 2) in px of patches of a unit's size that the rim does not cut."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
@@ -184,7 +186,10 @@ def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright:
     opened = cv2.morphologyEx(filled, cv2.MORPH_OPEN, kernel)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(opened, connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA] / scale**2
-    good = (areas > 0.4 * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
+    good = (areas > _SMALLEST * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
+    left, top, wide, high = stats[1:, :4].T
+    rows, columns = opened.shape
+    good &= (left > 0) & (top > 0) & (left + wide < columns) & (top + high < rows)
     return np.asarray(centroids[1:][good], np.float64)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from sim.core import Floats, Ints, Mask
 
@@ -36,6 +37,7 @@ _SURE = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
 _ROUNDS = 80
+_BESIDE = 1.25
 
 Inside = Callable[[Floats], Mask]
 
@@ -47,7 +49,8 @@ class Placement(NamedTuple):
         unit, patch: (matches,) pairs, one unit a patch.
         place: (units, 2) where all are, by the matches and what they say of the others.
         turn: of the lattice against its reference, rad.
-        missing: number of units without a patch that should be in view.
+        missing: number of units without a patch that should be in view, and of patches without a
+            unit that go on with the lattice.
     """
 
     unit: Ints
@@ -202,10 +205,17 @@ class _Growth:
         unit = np.flatnonzero(self._patch >= 0)
         if len(unit) < _LEAST:
             return None
-        missing = int((inside(place) & (self._patch < 0)).sum())
+        missing = int((inside(place) & (self._patch < 0)).sum()) + self._continuing()
         return Placement(
             unit, self._patch[unit], self._seen(place), float(np.angle(factor)), missing
         )
+
+    def _continuing(self) -> int:
+        """Counts patches without a unit about a pitch from two or more that have one."""
+        free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
+        taken = self._patches[self._patch[self._patch >= 0]]
+        near = cdist(self._patches[free], taken) < _BESIDE * self._pitch
+        return int((near.sum(axis=1) > 1).sum())
 
     def _seen(self, place: Floats) -> Floats:
         """Replaces expected places by those of the units' own patches."""

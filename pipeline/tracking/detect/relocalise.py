@@ -15,7 +15,7 @@ from sim.core import Floats, Mask
 _MOST_TURN = np.deg2rad(44.0)
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
-_CLEAR, _FEWEST = 0.08, 2
+_CLEAR, _FEWEST = 0.1, 3
 """A placement must be better than those at other places by this part of its matches."""
 _BETTER, _HALF_SEEN, _AGREEING = 1.2, 0.5, 0.2
 _ELSEWHERE = 0.5

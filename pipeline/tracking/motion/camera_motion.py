@@ -9,9 +9,8 @@ from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion, rotation_
 from pipeline.tracking.reference_frame import CameraCalibration, RecordingSetup
 from sim.core import Floats, Mask, Reals
 
-_LEAST = 2
-_SURE = 4.0
-"""Motion of the clamped units together, in its standard uncertainties, that is none of noise."""
+_LEAST, _FEWEST = 2, 4
+"""Clamped units that tell of the camera; frames that tell how a unit moves."""
 
 
 def camera_motion(
@@ -69,18 +68,22 @@ def row_times(
     return np.asarray(setup.readout * ((row + 0.5) / calibration.camera.size[1] - 0.5))
 
 
-def at_frame_times(motion: Reals, time: Floats, late: Floats) -> Reals:
-    """Interpolates poses (frames, units, 3) at frames' times (frames,), by cubic splines.
+def at_frame_times(motion: Reals, time: Floats, late: Floats, exposure: float) -> Reals:
+    """Computes poses (frames, units, 3) at frames' times (frames,), by cubic splines in time.
+
+    A picture shows the mean over its exposure: x + x'' exposure^2 / 24, to second order.
 
     Args:
         motion: as seen, NaN where missing.
-        time: of the frames, s.
+        time: of the frames, s; middle of the exposure of the middle row.
         late: (frames, units) by how much later each pose was seen, s.
+        exposure: of a row, s.
     """
     out = motion.copy()
     for unit in range(motion.shape[1]):
         known = np.isfinite(motion[:, unit, 0])
-        if known.sum() > 3:
+        if known.sum() > _FEWEST:
             spline = CubicSpline(time[known] + late[known, unit], motion[known, unit])
-            out[known, unit] = spline(time[known])
+            bent = spline(time[known], 2) * (exposure**2 / 24)
+            out[known, unit] = spline(time[known]) - bent
     return out

@@ -18,6 +18,8 @@ _WINDOW = 4
 _DEGREE = 4
 _GAPS = (0, 1, 2, 3, 4, 5, 6, 8, 10)
 """Numbers of frames that may be missing, none first."""
+_VISIBLE = 2.5
+"""Steps must be so many standard uncertainties long on either side of a gap."""
 _ROUGH = 3.0
 """What is left of smooth motion, over a standard uncertainty, where a gap may be the reason."""
 _SMOOTH = 20.0
@@ -25,6 +27,8 @@ _SMOOTH = 20.0
 _EVEN = 0.2
 """Least part of the steps after a gap that those before have, and the reverse: none where motion
 sets in, ends or jumps."""
+_JOLTING = 0.25
+"""Squared residuals on either side of a gap, over those across it; motion is rough where more."""
 _BETTER = 0.2
 """A gap must make the squared residuals of smooth motion so much smaller."""
 
@@ -82,22 +86,23 @@ def _late(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         rough = (
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
         )
-        if rough and _goes_on(near) and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
+        if rough and _goes_on(near, noise[shown[middle]]) and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
             most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
-            out[shown[middle]] = min(rough[1:]) < most
+            sides = [_roughness(clock[window[part]], near[part], 2) for part in (~after, after)]
+            out[shown[middle]] = min(rough[1:]) < most and max(sides) < _JOLTING * rough[0]
     return out
 
 
-def _goes_on(motion: Floats) -> bool:
-    """Checks that motions (frames, n) are about as quick in the second half as in the first."""
+def _goes_on(motion: Floats, noise: float) -> bool:
+    """Checks that motions (frames, n) are seen, and about as quick in both halves."""
     steps = np.sqrt(np.mean(np.diff(motion, axis=0) ** 2, axis=1))
     half = len(motion) // 2
     before, after = np.median(steps[: half - 1]), np.median(steps[half:])
-    return bool(min(before, after) > _EVEN * max(before, after))
+    return bool(min(before, after) > max(_EVEN * max(before, after), _VISIBLE * noise))
 
 
-def _roughness(clock: Floats, motion: Floats) -> float:
+def _roughness(clock: Floats, motion: Floats, degree: int = _DEGREE) -> float:
     """Returns the mean square of what motions (frames, n) are off polynomials in time."""
-    basis = np.linalg.qr(np.vander((clock - clock.mean()) / np.ptp(clock), _DEGREE + 1))[0]
+    basis = np.linalg.qr(np.vander((clock - clock.mean()) / np.ptp(clock), degree + 1))[0]
     rest = motion - basis @ (basis.T @ motion)
     return float(np.mean(rest**2))

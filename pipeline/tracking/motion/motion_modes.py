@@ -20,7 +20,9 @@ _ABOVE = 3.0
 _EMERGING = 2.858
 """Singular value, over the median, of a shape that is told from white noise (Gavish and Donoho,
 IEEE Trans. Inf. Theory 60 (2014) 5040)."""
-_FILLINGS = 12
+_COMMON = 8
+_FILLINGS, _FILLED = 80, 0.1
+"""Rounds in which missing motions are filled, at most; a change in one, over the noise, of no use."""
 _REACHES = (1, 2, 3)
 """Frames to either side of one whose place the polynomial through them tells."""
 _LITTLE_MORE = 1.3
@@ -53,13 +55,16 @@ def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """
     known = np.isfinite(motion)
     full = _filled(motion)
-    for _ in range(1 if known.all() else _FILLINGS):
+    for _ in range(_FILLINGS):
         left, values, right = np.linalg.svd(full, full_matrices=False)
         floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
         count = _leading(values / floor, right[: min(_MOST, len(values) // 2)], near)
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
+        change = np.sqrt(np.mean((full - low)[~known] ** 2)) if count and not known.all() else 0.0
         full = np.where(known, motion, low)
+        if change < _FILLED * noise:
+            break
     return MotionModes(amplitude, shape, full - low)
 
 
@@ -72,13 +77,25 @@ def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
 
 
 def _filled(motion: Floats) -> Floats:
-    """Fills missing values by those before and after, in time."""
-    out = motion.copy()
-    frames = np.arange(len(motion))
-    for unit in np.nonzero(~np.isfinite(motion).all(axis=0))[0]:
-        known = np.isfinite(motion[:, unit])
-        out[:, unit] = np.interp(frames, frames[known], motion[known, unit]) if known.any() else 0.0
-    return out
+    """Fills missing values by those before and after, in time, about what all units do together."""
+    known = np.isfinite(motion)
+    if known.all():
+        return motion.copy()
+    frames, seen = np.arange(len(motion)), known.any(axis=1)
+    common = np.zeros(len(motion))
+    apart = motion
+    for _ in range(_COMMON):  # units that are seen now and then are no reason for a common step
+        more = np.nansum(apart, axis=1)[seen] / known.sum(axis=1)[seen]
+        common += np.interp(frames, frames[seen], more) if seen.any() else 0.0
+        apart = motion - common[:, None]
+        usual = np.nansum(apart, axis=0) / np.maximum(known.sum(axis=0), 1)
+        apart = apart - usual
+    apart = motion - common[:, None]
+    for unit in np.nonzero(~known.all(axis=0))[0]:
+        here = known[:, unit]
+        rest = np.interp(frames, frames[here], apart[here, unit]) if here.any() else 0.0
+        apart[:, unit] = np.where(here, apart[:, unit], rest)
+    return apart + common[:, None]
 
 
 def _likeness(shape: Floats, near: Ints) -> float:
@@ -124,7 +141,7 @@ def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> F
     out = np.full_like(amplitude, np.nan)
     for frame in range(reach, len(amplitude) - reach):
         window = slice(frame - reach, frame + reach + 1)
-        if steady[frame - reach + 1 : frame + reach + 1].all():
+        if steady[frame - reach + 1 : frame + reach + 1].all() and (np.diff(time[window]) > 0).all():
             apart = time[window, None] - time[None, window] + np.eye(2 * reach + 1)
             weights = 1 / np.prod(apart / np.abs(apart).max(), axis=1)
             out[frame] = weights @ amplitude[window] / np.linalg.norm(weights)

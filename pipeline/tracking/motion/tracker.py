@@ -39,7 +39,8 @@ in another place, it has."""
 _WHOLE = 0.8
 """Part of the units that must be found for their poses to be those looked for after a loss."""
 _OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])
-"""Tried of every unit, beside the turn of a lattice that is found again; the first that fits."""
+"""Tried of every unit, beside the turn of a lattice that is found again; the first that fits. None
+but the first unless nearly all are in view, since a lattice turned so may lie a unit aside."""
 _CLOSE = 0.5
 """Two units nearer to each other than this part of their least distance at rest are one."""
 _ROUNDS = 40
@@ -179,12 +180,15 @@ class Tracker:
         self._fitter.full = np.nan_to_num(fits.information)
 
     def _accepted(self, fits: PoseFits, share: float) -> Mask:
+        """Judges fits; one of a unit that is seen in part has to be the better."""
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
+        seen = np.minimum(fits.share, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            fitting = fits.noise / np.abs(gain) < self._limit
-        seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
-        return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
+            fitting = fits.noise / np.abs(gain) < self._limit * 0.5 * (1 + seen)
+        settled = fits.last < _SETTLED * seen**2
+        lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
+        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit
 
     def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
@@ -200,7 +204,8 @@ class Tracker:
             return fits, good
         again, new = fits.copy(), np.zeros_like(good)
         self._pose = placed
-        for own in _OWN_TURNS:
+        most = self._relocaliser.in_view(placed).mean() > _WHOLE
+        for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
             guess = placed + [0.0, 0.0, own]
             new = self._try(image, again, new, (guess, self._photometry, None, _SHARE))
             if new.sum() > _HALF * len(new):

@@ -47,8 +47,11 @@ LOG = logging.getLogger(__name__)
 
 _USUAL = RecordingSetup()
 _End = BrokenOffError | KeyboardInterrupt
-_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool]
-"""Time, number, poses, sigma, quality, whether it is the one before: what is kept of a frame."""
+_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float]
+"""Time, number, poses, sigma, quality, whether it is the one before, likeness of its residuals within
+blocks: what is kept of a frame."""
+_CODED = 1.8
+"""Likeness from which on a codec is at work."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 _MOVED = 0.2
@@ -113,27 +116,38 @@ def track_video(
     offset = _centre_offset(shown.image, specimen, ways[0], calibration, setup.kind)
     tracker = _tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
-    times, numbers, motion, sigmas, qualities, same = (
+    times, numbers, motion, sigmas, qualities, same, likeness = (
         np.array(values) for values in zip(*rows, strict=True)
     )
     del rows, tracker
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
-        rest = np.nanmean(motion[: shown.count], axis=0)
-    motion -= np.nan_to_num(rest)
-    motion[..., :2] += arm_swing(motion[..., 2], offset)
     time = times - times[0]
-    if setup.readout:
-        motion = at_frame_times(motion, time, row_times(motion, specimen, calibration, setup))
+    if setup.readout or setup.exposure:
+        late = row_times(motion, specimen, calibration, setup)
+        motion = at_frame_times(motion, time, late, setup.exposure)
+    motion = _since_rest(motion, shown.count, offset)
     _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion, sigmas, same)
     steady = faults != DUPLICATE
+    later = likeness[1:][np.isfinite(likeness[1:])]
+    coded = not len(later) or float(np.median(later)) > _CODED
     sigma = uncertainty.calibrate_sigma(
-        motion, sigmas, specimen.centre, steady, time, shown.count
+        motion, sigmas, specimen.centre, steady, time, shown.count, coded
     )
     sigma[~np.isfinite(motion)] = np.nan
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+def _since_rest(motion: Reals, count: int, offset: Singles) -> Reals:
+    """Returns motions (frames, units, 3) from the mean of the first frames on.
+
+    What the middles swing about the design's places, offset (units, 2), is added.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
+        motion = motion - np.nan_to_num(np.nanmean(motion[:count], axis=0))
+    motion[..., :2] += arm_swing(motion[..., 2], offset)
+    return motion
 
 
 def _remove_camera_motion(
@@ -202,8 +216,8 @@ def _track_frames(
             sigma = uncertainty.standard_errors(fits.scatter, fits.blocks).astype(np.float32)
             pose = fits.pose.astype(np.float32)
             same = before is not None and _same(before, frame.image)
-            before = frame.image
-            rows.append((frame.time, frame.index, pose, sigma, quality.astype(np.int8), same))
+            before, like = frame.image, uncertainty.residual_likeness(fits)
+            rows.append((frame.time, frame.index, pose, sigma, quality.astype(np.int8), same, like))
             if tell is not None:
                 tell()
     except (BrokenOffError, KeyboardInterrupt) as error:

@@ -151,15 +151,17 @@ def best_orientations(
     pixel = _pixel(specimen, detections[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
     templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
-    wrong = [_unlikeness(image, templates, one) for one in detections]
+    wrong = [_unlikeness(image, specimen, templates, one) for one in detections]
     return [
         one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
     ]
 
 
-def _unlikeness(image: Picture, templates: Templates, detection: LatticeDetection) -> float:
+def _unlikeness(
+    image: Picture, specimen: SpecimenOutlines, templates: Templates, detection: LatticeDetection
+) -> float:
     """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
-    fitter = PoseFitter(detection.camera, templates)
+    fitter = PoseFitter(with_distortion(specimen, detection).camera, templates)
     fits = fitter.fit(image, *fitter.start(_gain(image, detection)))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:
