@@ -93,7 +93,9 @@ class Renderer:
         self._centre = specimen.centre
         parts = np.arange(_PARTS) / _PARTS
         self._outline = [
-            np.concatenate([a + parts[:, None] * (b - a) for a, b in zip(p, np.roll(p, -1, 0), strict=True)])
+            np.concatenate(
+                [a + parts[:, None] * (b - a) for a, b in zip(p, np.roll(p, -1, 0), strict=True)]
+            )
             for p in map(specimen.polygon, range(specimen.count))
         ]
 
@@ -115,9 +117,10 @@ class Renderer:
 
     def _instant(self, time: float) -> Singles:
         view, (columns, rows) = self._view, self._view.size
-        share = covered((rows * _FINE, columns * _FINE), [
-            (polygon + 0.5) * _FINE for polygon in self._outlines(time)
-        ])
+        share = covered(
+            (rows * _FINE, columns * _FINE),
+            [(polygon + 0.5) * _FINE for polygon in self._outlines(time)],
+        )
         fine = np.asarray(view.light + (view.dark - view.light) * share, np.float32)
         blurred = cv2.GaussianBlur(fine, (0, 0), _FINE * view.blur)
         image = np.asarray(cv2.resize(blurred, (columns, rows), interpolation=cv2.INTER_AREA))
@@ -191,8 +194,14 @@ def write_video(
         stream = container.add_stream(codec, rate=Fraction(30))
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt, stream.codec_context.time_base = pixels, step
-        stream.options = {} if codec == "ffv1" else {"crf": str(crf), "x265-params": "log-level=none"}
-        kind = "bgr24" if images[0].ndim == 3 else ("gray16le" if images[0].dtype == np.uint16 else "gray")
+        stream.options = (
+            {} if codec == "ffv1" else {"crf": str(crf), "x265-params": "log-level=none"}
+        )
+        kind = (
+            "bgr24"
+            if images[0].ndim == 3
+            else ("gray16le" if images[0].dtype == np.uint16 else "gray")
+        )
         for image, time in zip(images, times, strict=True):
             frame = av.VideoFrame.from_ndarray(image, format=kind)
             frame.pts, frame.time_base = round(time / step), step

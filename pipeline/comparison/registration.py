@@ -93,6 +93,5 @@ def pixel_size(track: xr.Dataset, middle: Floats) -> float:
     return float(1 / np.sqrt(abs(np.linalg.det(camera.jacobian(middle)))))
 
 
-
 def _complex(points: Floats) -> np.ndarray:
     return np.asarray(points[:, 0] + 1j * points[:, 1])

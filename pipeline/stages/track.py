@@ -196,9 +196,8 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
         clamped_units(design),
         asked.camera == "follows supports",
     )
-    with found_in(source):
-        with cli.progress(frame_count(video), "tracking") as bar:
-            track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
+    with found_in(source), cli.progress(frame_count(video), "tracking") as bar:
+        track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
     if has_uneven_intervals(track.time):
         LOG.warning("warning: the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))

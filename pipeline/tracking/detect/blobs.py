@@ -152,13 +152,19 @@ def _detections(
             seen = replace(camera, homography=matrix)
             areas = np.abs(np.linalg.det(seen.jacobian(specimen.centre[one.unit]))) / scale**2
             if areas.min() > 1 / _AREA and areas.max() < _AREA:
-                found.append((side < 0, abs(one.turn), replace(
-                    nothing,
-                    camera=seen,
-                    unit=one.unit,
-                    blob=patches[one.patch],
-                    missing=one.missing,
-                )))
+                found.append(
+                    (
+                        side < 0,
+                        abs(one.turn),
+                        replace(
+                            nothing,
+                            camera=seen,
+                            unit=one.unit,
+                            blob=patches[one.patch],
+                            missing=one.missing,
+                        ),
+                    )
+                )
     return [one for *_, one in sorted(found, key=lambda way: way[:2])] or [nothing]
 
 

@@ -2,9 +2,9 @@
 
 Two neighbouring patches and two joined units vote for a turn, every patch and every unit for a
 shift (a generalised Hough transform: Ballard, Pattern Recognition 13 (1981) 111). Patches that are
-no units, and units without a patch, take votes from no one. From the place with most votes the
-match grows over the joints, where the affine map of the nearest matches says: lenses bend a lattice,
-and loads deform it.
+no units, and units without a patch, win votes for nothing. From the place with most votes the match
+grows over the joints, where the affine map of the nearest matches says: lenses bend lattices, and
+loads deform them.
 """
 
 from __future__ import annotations

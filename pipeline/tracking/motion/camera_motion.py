@@ -1,4 +1,4 @@
-"""Takes out of the motions what camera and shutter add: drifts, knocks, rows that are read later."""
+"""Takes out of motions what camera and shutter add: drifts, knocks, rows that are read later."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ _LEAST, _FEWEST = 2, 4
 """Clamped units that tell of the camera; frames that tell how a unit moves."""
 
 
-def camera_motion(
-    motion: Reals, sigma: Reals, centre: Floats, held: Mask
-) -> Floats | None:
+def camera_motion(motion: Reals, sigma: Reals, centre: Floats, held: Mask) -> Floats | None:
     """Fits the rigid motion (frames, 3) of the clamped units, about the origin, mm and rad.
 
     Frames that show none of them have that of the frame before; nothing is returned if there are

@@ -86,7 +86,11 @@ def _late(clock: Floats, place: Floats, noise: Floats, repeated: Mask) -> Mask:
         rough = (
             [_roughness(clock[window] + gap * after, near) for gap in _GAPS] if near.size else []
         )
-        if rough and _goes_on(near, noise[shown[middle]]) and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]:
+        if (
+            rough
+            and _goes_on(near, noise[shown[middle]])
+            and np.sqrt(rough[0]) > _ROUGH * noise[shown[middle]]
+        ):
             most = min(_BETTER * rough[0], (_SMOOTH * noise[shown[middle]]) ** 2)
             sides = [_roughness(clock[window[part]], near[part], 2) for part in (~after, after)]
             out[shown[middle]] = min(rough[1:]) < most and max(sides) < _JOLTING * rough[0]

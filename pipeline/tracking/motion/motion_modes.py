@@ -22,7 +22,7 @@ _EMERGING = 2.858
 IEEE Trans. Inf. Theory 60 (2014) 5040)."""
 _COMMON = 8
 _FILLINGS, _FILLED = 80, 0.1
-"""Rounds in which missing motions are filled, at most; a change in one, over the noise, of no use."""
+"""Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
 _REACHES = (1, 2, 3)
 """Frames to either side of one whose place the polynomial through them tells."""
 _LITTLE_MORE = 1.3
@@ -141,7 +141,10 @@ def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> F
     out = np.full_like(amplitude, np.nan)
     for frame in range(reach, len(amplitude) - reach):
         window = slice(frame - reach, frame + reach + 1)
-        if steady[frame - reach + 1 : frame + reach + 1].all() and (np.diff(time[window]) > 0).all():
+        if (
+            steady[frame - reach + 1 : frame + reach + 1].all()
+            and (np.diff(time[window]) > 0).all()
+        ):
             apart = time[window, None] - time[None, window] + np.eye(2 * reach + 1)
             weights = 1 / np.prod(apart / np.abs(apart).max(), axis=1)
             out[frame] = weights @ amplitude[window] / np.linalg.norm(weights)

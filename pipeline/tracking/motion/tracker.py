@@ -24,6 +24,13 @@ _SHARE = 0.35
 _SHARE_KNOWN = 0.18
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""
+_QUICK, _SHARP = 2.0, 0.7
+"""A unit that moves by so many px from frame to frame, and of which less than this part is seen,
+may be blurred by its motion where the exposure is not known."""
+_PARTS = np.linspace(0.0, 1.0, 9)
+"""Exposures that are tried where none is told, over the interval of frames."""
+_TELLING, _FEW_QUICK = 5.0, 3
+"""Motion from frame to frame that tells of the exposure, px; number of units that must make it."""
 _GLARE = 0.4
 _MISFIT = 0.15
 """Residuals of a good fit, in contrasts of the unit; or so many times the reference frame's: """
@@ -51,12 +58,12 @@ class Shutter(NamedTuple):
     """Holds the shutter of a camera.
 
     Attributes:
-        exposure: of a row, s.
+        exposure: of a row, s; without it, the first quick motion tells.
         readout: from the first row to the last, s.
         noise: residuals to expect of the sensor's noise, levels.
     """
 
-    exposure: float = 0.0
+    exposure: float | None = None
     readout: float = 0.0
     noise: float = 0.0
 
@@ -85,7 +92,10 @@ class Tracker:
         relocaliser: finds the lattice where prediction fails.
         walls: of thick units.
         shutter: of the camera.
-        blur: by the exposure, if it is known.
+        blur: by the exposure; without it, none is allowed for.
+
+    Attributes:
+        exposure: of a row, s; zero as long as it is not known.
     """
 
     def __init__(
@@ -99,10 +109,14 @@ class Tracker:
     ) -> None:
         self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
         self._shutter, self._blur = shutter, blur
+        self.exposure = shutter.exposure or 0.0
+        self._open = shutter.exposure is None and blur is not None
         self._time, self._interval = 0.0, 0.0
         self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre = specimen.centre
+        middle = specimen.centre.mean(axis=0)
+        self._pixel = 1 / float(fitter.camera.px_per_mm(middle))
         self._pose, self._photometry = fitter.start(1.0)
         self._whole = self._pose
         self._velocity = np.zeros_like(self._pose)
@@ -116,9 +130,12 @@ class Tracker:
         first = not len(self._gain)
         self._interval, self._time = 0.0 if first else time - self._time, time
         fits = self._fit(image, self._predicted(), self._photometry)
-        if not first and (self._shutter.readout or self._blur):
+        if not first and (self._shutter.readout or self._blur is not None):
             self._improve_velocity(fits.pose)
-            fits = self._fit(image, fits.pose, fits.photometry)
+            if self._open:
+                self._measure_exposure(image, fits)
+            if self._shutter.readout or self.exposure:
+                fits = self._fit(image, fits.pose, fits.photometry)
         if first:
             self._set_reference(fits)
         good = self._complete(image, fits, self._accepted(fits, _SHARE))
@@ -144,13 +161,32 @@ class Tracker:
         rows = self._fitter.camera.size[1]
         drift = self._velocity * (self._shutter.readout / rows) if self._shutter.readout else None
         if self._blur is not None:
-            way = self._velocity * self._shutter.exposure
+            way = self._velocity * self.exposure
             cos, sin = np.cos(self._pose[:, 2]), np.sin(self._pose[:, 2])
             x, y = way[:, 0], way[:, 1]
             own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
             self._blur.redraw(own)
         usual = self._usual if chosen is None else None
         return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
+
+    def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
+        """Takes the exposure that leaves the least residuals of the units that are quick enough."""
+        way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval / self._pixel
+        quick = self._accepted(fits, _SHARE, sharp=False) & (way > _TELLING)
+        if quick.sum() < _FEW_QUICK:
+            return
+        left = []
+        for part in _PARTS:
+            self.exposure = part * self._interval
+            again = self._fit(image, fits.pose, fits.photometry, quick)
+            left.append(float(np.nanmean((again.noise / again.photometry[:, 0])[quick] ** 2)))
+        best = int(np.argmin(left))
+        part = _PARTS[best]
+        if 0 < best < len(left) - 1:  # the lowest point of the parabola through it and those beside
+            before, here, after = left[best - 1 : best + 2]
+            part += 0.5 * (before - after) / (before - 2 * here + after) * _PARTS[1]
+        self.exposure = float(part) * self._interval
+        self._open = False
 
     def _improve_velocity(self, pose: Floats) -> None:
         """Takes the velocities from the poses of this frame, where they are found."""
@@ -179,7 +215,7 @@ class Tracker:
         self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
         self._fitter.full = np.nan_to_num(fits.information)
 
-    def _accepted(self, fits: PoseFits, share: float) -> Mask:
+    def _accepted(self, fits: PoseFits, share: float, sharp: bool = True) -> Mask:
         """Judges fits; one of a unit that is seen in part has to be the better."""
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
@@ -187,6 +223,9 @@ class Tracker:
         with np.errstate(invalid="ignore", divide="ignore"):
             fitting = fits.noise / np.abs(gain) < self._limit * 0.5 * (1 + seen)
         settled = fits.last < _SETTLED * seen**2
+        if sharp and not self.exposure and self._interval > 0:
+            quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
+            fitting &= ~(quick & (seen < _SHARP))
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
         return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit
 
@@ -206,7 +245,7 @@ class Tracker:
         self._pose = placed
         most = self._relocaliser.in_view(placed).mean() > _WHOLE
         for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
-            guess = placed + [0.0, 0.0, own]
+            guess = placed + np.array([0.0, 0.0, own])
             new = self._try(image, again, new, (guess, self._photometry, None, _SHARE))
             if new.sum() > _HALF * len(new):
                 break

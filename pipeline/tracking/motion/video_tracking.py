@@ -48,8 +48,8 @@ LOG = logging.getLogger(__name__)
 _USUAL = RecordingSetup()
 _End = BrokenOffError | KeyboardInterrupt
 _Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float]
-"""Time, number, poses, sigma, quality, whether it is the one before, likeness of its residuals within
-blocks: what is kept of a frame."""
+"""Time, number, poses, sigma, quality, whether it is the one before again, likeness of residuals
+within blocks: what is kept of a frame."""
 _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _CHANGED = 0.005
@@ -119,11 +119,14 @@ def track_video(
     times, numbers, motion, sigmas, qualities, same, likeness = (
         np.array(values) for values in zip(*rows, strict=True)
     )
+    exposure = tracker.exposure
     del rows, tracker
+    if setup.exposure is None and exposure:
+        LOG.info("exposure, by the blur of quick motions: %.2g ms", 1000 * exposure)
     time = times - times[0]
-    if setup.readout or setup.exposure:
+    if setup.readout or exposure:
         late = row_times(motion, specimen, calibration, setup)
-        motion = at_frame_times(motion, time, late, setup.exposure)
+        motion = at_frame_times(motion, time, late, exposure)
     motion = _since_rest(motion, shown.count, offset)
     _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion, sigmas, same)
@@ -243,8 +246,7 @@ def _tracker(
     look = calibration.blur, calibration.pixel, setup.kind
     templates = learn_templates(shown.image, camera, grid, *look)
     walls = None if depth is None else SideWalls(specimen, depth, grid, templates, *look)
-    exposed = setup.exposure > 0 and walls is None
-    blur = ExposureBlur(templates, calibration.pixel) if exposed else None
+    blur = ExposureBlur(templates, calibration.pixel) if walls is None else None
     noise = shown.noise * float(np.sqrt(1 + 1 / shown.count))
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)

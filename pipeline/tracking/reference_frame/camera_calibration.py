@@ -72,7 +72,7 @@ class RecordingSetup(NamedTuple):
         kind: what the units show: auto, dots, speckle or bare.
         turned: how far the specimen is turned in the picture, counter-clockwise, rad.
         mirrored: whether it is seen from behind.
-        exposure: of a frame, s.
+        exposure: of a frame, s; without it, quick motions tell.
         readout: from the first row of a frame to its last, s.
         held: (units,) which are clamped.
         follows_supports: whether the camera's place is that of the clamped units.
@@ -83,7 +83,7 @@ class RecordingSetup(NamedTuple):
     kind: str = "auto"
     turned: float | None = None
     mirrored: bool | None = None
-    exposure: float = 0.0
+    exposure: float | None = None
     readout: float = 0.0
     held: Mask | None = None
     follows_supports: bool = False

@@ -1,4 +1,4 @@
-"""Averages the frames in which a specimen rests before it moves, and measures the sensor's noise."""
+"""Averages the frames in which a specimen rests before it moves, and measures their noise."""
 
 from __future__ import annotations
 
