@@ -1,7 +1,7 @@
 """Measures patches of photographs and of DIC Challenge images whose motions are known.
 
-Every patch is found unaided (SIFT and RANSAC: Lowe, IJCV 60 (2004) 91), then fitted by the tracker's
-own correlation and, from the same start, by OpenCV's pyramidal optical flow.
+Every patch is found unaided (SIFT and RANSAC: Lowe, IJCV 60 (2004) 91), then fitted by the
+tracker's correlation and, from the same start, by OpenCV's pyramidal optical flow.
 """
 
 from __future__ import annotations
