@@ -100,12 +100,12 @@ def _square(x: float, y: float) -> Floats:
 
 def found_unaided(patch: Patch) -> Floats | None:
     """Finds the motion (3,) of a patch roughly, by features; nothing if too few agree."""
-    sift, mask = cv2.SIFT_create(), np.zeros_like(patch.before)
+    sift, mask = cv2.SIFT.create(), np.zeros_like(patch.before)
     cv2.fillPoly(mask, [np.round(patch.outline).astype(np.int32)], 255)
-    mask = cv2.dilate(mask, np.ones((_MARGIN, _MARGIN), np.uint8))
-    first, described = sift.detectAndCompute(patch.before, mask)
+    about = cv2.dilate(mask, np.ones((_MARGIN, _MARGIN), np.uint8))
+    first, described = sift.detectAndCompute(patch.before, about)
     second, others = sift.detectAndCompute(patch.after, None)
-    if described is None or others is None or len(described) < 4:
+    if len(first) < 4 or len(second) < 4:
         return None
     pairs = cv2.BFMatcher(cv2.NORM_L2).knnMatch(described, others, k=2)
     good = [near for near, next_ in pairs if near.distance < 0.8 * next_.distance]
@@ -114,7 +114,7 @@ def found_unaided(patch: Patch) -> Floats | None:
     start = np.array([first[one.queryIdx].pt for one in good])
     end = np.array([second[one.trainIdx].pt for one in good])
     matrix, kept = cv2.estimateAffinePartial2D(start, end, ransacReprojThreshold=2.0)
-    if matrix is None or kept.sum() < 4:
+    if np.ndim(matrix) < 2 or kept.sum() < 4:
         return None
     turn = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
     return np.append(matrix[:, :2] @ patch.centre + matrix[:, 2] - patch.centre, turn)
@@ -182,9 +182,9 @@ def table(folder: Path = IMAGES) -> str:
         "|---|---|---|---|---|---|",
     ]
     for group, found in errors.items():
-        both = np.array(found)
-        seen = np.isfinite(both[:, 0, 0])
-        own, flow = (_cells(both[seen, method]) for method in range(2))
+        measured = np.array(found)
+        seen = np.isfinite(measured[:, 0, 0])
+        own, flow = (_cells(measured[seen, method]) for method in range(2))
         lines.append(f"| {group} | {seen.sum()} of {len(seen)} | {own} | {flow} |")
     return "\n".join(lines)
 

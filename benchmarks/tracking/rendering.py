@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, cast
 
 import av
 import cv2
@@ -123,7 +123,8 @@ class Renderer:
         )
         fine = np.asarray(view.light + (view.dark - view.light) * share, np.float32)
         blurred = cv2.GaussianBlur(fine, (0, 0), _FINE * view.blur)
-        image = np.asarray(cv2.resize(blurred, (columns, rows), interpolation=cv2.INTER_AREA))
+        small = cv2.resize(blurred, (columns, rows), interpolation=cv2.INTER_AREA)
+        image = np.asarray(small, np.float32)
         if self._cover is not None:
             self._cover(image, time)
         return np.asarray(image, np.float32)
@@ -191,7 +192,7 @@ def write_video(
     """Writes pictures of one format (gray, bgr24, gray16le) at their own times."""
     step = Fraction(1, 90000)
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=Fraction(30))
+        stream = cast("av.VideoStream", container.add_stream(codec, rate=Fraction(30)))
         stream.height, stream.width = images[0].shape[:2]
         stream.pix_fmt, stream.codec_context.time_base = pixels, step
         stream.options = (

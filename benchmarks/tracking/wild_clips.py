@@ -62,7 +62,7 @@ class WildClip(NamedTuple):
 
 
 class _Script(NamedTuple):
-    """What happens in a clip: motions of specimen and camera, the view, things beside."""
+    """Scripts a clip: motions of specimen and camera, the view, things beside."""
 
     shift: Callable[[Floats], Floats] | None = None
     pace: Callable[[Floats], Floats] = lambda time: np.sin(2.4 * time) ** 2

@@ -42,7 +42,7 @@ class ExposureBlur:
         length = np.linalg.norm(arm, axis=1) / self._pixel
         changed = np.linalg.norm(arm - before, axis=1) / self._pixel > _LEAST / 3
         changed &= (length > _LEAST) | (np.linalg.norm(before, axis=1) > 0)
-        for unit in np.flatnonzero(changed):
+        for unit in np.flatnonzero(changed).tolist():
             self._draw(unit, way[unit] if length[unit] > _LEAST else np.zeros(3), length[unit])
 
     def _draw(self, unit: int, way: Floats, length: float) -> None:

@@ -174,7 +174,7 @@ def _fit_lens(points: Floats, pixels: Floats, sigma: float, start: Camera) -> Ca
         )
         return np.concatenate([((made.project(points) - pixels) / sigma).ravel(), prior])
 
-    given = [start.homography.ravel()[:8], start.centre, start.radial, [start.fisheye]]
+    given = [start.homography.ravel()[:8], start.centre, start.radial, np.array([start.fisheye])]
     first = np.concatenate(given) / unit
     near = least_squares(residuals, first, x_scale="jac", xtol=1e-12)
     found = least_squares(residuals, near.x, loss="soft_l1", f_scale=3.0, x_scale="jac", xtol=1e-12)
