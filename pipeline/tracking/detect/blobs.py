@@ -44,6 +44,7 @@ class LatticeDetection:
         blobs: number of blobs of a unit's size.
         bright: whether the units are brighter than what is behind them.
         missing: number of units without one that should be in the picture.
+        surplus: number of blobs without a unit that go on with the lattice.
     """
 
     camera: Camera
@@ -52,11 +53,12 @@ class LatticeDetection:
     blobs: int
     bright: bool
     missing: int
+    surplus: int = 0
 
     @property
     def score(self) -> int:
-        """Returns matches less what should be there and is not."""
-        return len(self.unit) - self.missing
+        """Returns matches less what should be there and is not, and the reverse."""
+        return len(self.unit) - self.missing - self.surplus
 
 
 def specimen_orientation(camera: Camera) -> tuple[float, bool]:
@@ -162,6 +164,7 @@ def _detections(
                             unit=one.unit,
                             blob=patches[one.patch],
                             missing=one.missing,
+                            surplus=one.surplus,
                         ),
                     )
                 )

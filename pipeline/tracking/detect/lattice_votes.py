@@ -37,7 +37,8 @@ _SURE = 0.98
 """Score, over the number of units, after which no other shift is tried."""
 _NEAREST, _RIDGE = 8, 0.05
 _ROUNDS = 80
-_BESIDE = 1.25
+_BESIDE, _APART = 1.55, 0.6
+"""Distance of neighbours, diagonal ones too, between these, pitches."""
 
 Inside = Callable[[Floats], Mask]
 
@@ -49,8 +50,8 @@ class Placement(NamedTuple):
         unit, patch: (matches,) pairs, one unit a patch.
         place: (units, 2) where all are, by the matches and what they say of the others.
         turn: of the lattice against its reference, rad.
-        missing: number of units without a patch that should be in view, and of patches without a
-            unit that go on with the lattice.
+        missing: number of units without a patch that should be in view.
+        surplus: number of patches without a unit that go on with the lattice.
     """
 
     unit: Ints
@@ -58,11 +59,12 @@ class Placement(NamedTuple):
     place: Floats
     turn: float
     missing: int
+    surplus: int
 
     @property
     def score(self) -> int:
-        """Returns matches less what should be there and is not."""
-        return len(self.unit) - self.missing
+        """Returns matches less what should be there and is not, and the reverse."""
+        return len(self.unit) - self.missing - self.surplus
 
 
 def locate_lattice(
@@ -92,7 +94,7 @@ def locate_lattice(
     for factor in _linear_factors(vectors, patches, scale, pitch, most_turn):
         turned = _turned(points, factor)
         seeds = [
-            _Growth(points, joint, turned + shift, patches, pitch)
+            _Growth(points, joint, turned + shift, patches, pitch * abs(factor) / scale)
             for shift in _shifts(turned, patches, _BIN * pitch)
         ]
         for seed in sorted(seeds, key=lambda one: -one.first_score(inside))[:_MOST_SEEDS]:
@@ -205,17 +207,29 @@ class _Growth:
         unit = np.flatnonzero(self._patch >= 0)
         if len(unit) < _LEAST:
             return None
-        missing = int((inside(place) & (self._patch < 0)).sum()) + self._continuing()
+        missing = int((inside(place) & (self._patch < 0)).sum())
         return Placement(
-            unit, self._patch[unit], self._seen(place), float(np.angle(factor)), missing
+            unit,
+            self._patch[unit],
+            self._seen(place),
+            float(np.angle(factor)),
+            missing,
+            self._continuing(),
         )
 
     def _continuing(self) -> int:
-        """Counts patches without a unit about a pitch from two or more that have one."""
-        free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
-        taken = self._patches[self._patch[self._patch >= 0]]
-        near = cdist(self._patches[free], taken) < _BESIDE * self._pitch
-        return int((near.sum(axis=1) > 1).sum())
+        """Counts patches without a unit that go on with the lattice, about a pitch from others."""
+        taken = np.zeros(len(self._patches), bool)
+        taken[self._patch[self._patch >= 0]] = True
+        apart = cdist(self._patches, self._patches)
+        beside = (apart < _BESIDE * self._pitch) & (apart > _APART * self._pitch)
+        before = int(taken.sum())
+        for _ in range(_ROUNDS):
+            more = ~taken & (beside[:, taken].sum(axis=1) > 1)
+            if not more.any():
+                break
+            taken |= more
+        return int(taken.sum()) - before
 
     def _seen(self, place: Floats) -> Floats:
         """Replaces expected places by those of the units' own patches."""

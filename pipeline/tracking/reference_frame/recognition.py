@@ -28,6 +28,8 @@ LOG = logging.getLogger(__name__)
 _DARK = 8.0
 _SCALE = 0.15
 _ENOUGH = 0.6
+_SURPLUS = 0.06
+"""Patches that go on with the lattice where the design has no unit, at most, over the units."""
 _SOME = 0.3
 """Least parts that a first look must find: of the units that are in the picture, and of all."""
 _FAR = 0.15
@@ -68,8 +70,10 @@ def recognise(
 
 
 def _enough(found: LatticeDetection, specimen: SpecimenOutlines) -> bool:
-    """Tells whether most of the units that are in the picture were found, and some of all."""
+    """Tells whether most of the units in the picture were found, some of all, and few others."""
     units = len(found.unit)
+    if found.surplus > _SURPLUS * units:
+        return False
     return units >= max(_ENOUGH * (units + found.missing), _SOME * specimen.count)
 
 
