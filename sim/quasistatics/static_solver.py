@@ -10,7 +10,7 @@ from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
 from sim.quasistatics.equilibrium_path import Branch, adjoint, follow
-from sim.solvers import PrescribedMotion, check_connected, check_start
+from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
@@ -107,6 +107,7 @@ class StaticSolver:
         if reached < len(loads):
             raise self._ended(values, branch.states[: reached + 1], fraction)
         record = self._record(branch, counts)
+        check_ligaments(top, values, record.states)
         return record.states.copy(), np.zeros_like(record.states), record
 
     def _ended(

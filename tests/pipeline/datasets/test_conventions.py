@@ -1,7 +1,5 @@
 """Files of every kind keep the CF conventions, and those of the first version are still read."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
