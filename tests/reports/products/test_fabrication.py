@@ -120,3 +120,14 @@ def test_a_package_of_another_version_makes_one_message(
     assert told in said
     assert "make the package again" in said
     assert not out.exists()
+
+
+def test_the_page_maps_the_shims_that_are_bent(tmp_path: Path) -> None:
+    built.write(tmp_path / "cloaked", {"slots": {"direction": "centroid"}})
+    out = tmp_path / "index.html"
+    words = ["--problem", str(built.PROBLEM), "--packages", str(tmp_path / "cloaked")]
+    assert main(["fabrication", *words, "--out", str(out), "--quiet"]) == 0
+    page = out.read_text(encoding="utf-8")
+    assert "Shims before any load" in page
+    assert "3.0 %" in page
+    assert "0 of 7 beyond 5 %" in page
