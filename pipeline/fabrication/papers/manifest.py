@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from pipeline.runtime import UserError
 
 MANIFEST = "manifest.json"
 _AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
-_READ = ("units", "letters_for_ids", "shims", "prebend", "thin_walls_mm", "files")
+_READ = ("units", "letters_for_ids", "shims", "prebend", "as_built", "thin_walls_mm", "files")
 
 
 PREBEND_NOTE = (
@@ -42,7 +43,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return content
 
 
-def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, design: Path) -> None:
+def write_manifest(
+    folder: Path,
+    specimen: BuiltSpecimen,
+    problem: Problem,
+    design: Path,
+    as_built: Mapping[str, float | str] | None = None,
+) -> None:
     """Writes the manifest of all other files in a package's folder.
 
     Args:
@@ -50,6 +57,7 @@ def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, desi
         specimen: what is built.
         problem: the problem whose section `fabrication` holds.
         design: the design dataset.
+        as_built: what the simulation makes of the shims as drawn, if it was asked.
     """
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
     content = {
@@ -64,6 +72,7 @@ def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, desi
         "shims": {shim.id: shim.count for shim in specimen.shims},
         "prebend": {ligament.name: _prebend(ligament) for ligament in specimen.ligaments},
         "prebend_note": PREBEND_NOTE,
+        "as_built": as_built,
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),
         "git_commit": git_commit(),

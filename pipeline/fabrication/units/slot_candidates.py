@@ -42,7 +42,7 @@ class Corner:
 
     @property
     def straight(self) -> bool:
-        """Whether a slot along the ligament leaves the shim straight, as far as is known."""
+        """Tests that a slot along the ligament leaves the shim straight, as far as is known."""
         other = self.other
         return other is None or abs(signed_angle(-self.along, other.direction)) < _STRAIGHT
 

@@ -34,6 +34,7 @@ YIELD = 0.05
 """Strain of polyester foil (biaxially drawn) beyond which it stays bent: about where the stress in
 makers' tensile curves leaves the straight line for good."""
 
+_HOWS = ("designed", "built")
 _BENT = "the specimen from the top, with the strain of every shim that is bent by its slots"
 
 
@@ -82,14 +83,35 @@ def report(args: argparse.Namespace) -> None:
         for folder in args.packages:
             made.append(package(folder, asked))
             bar.update()
+    packages = list(zip(made, args.packages, strict=True))
     values = {
         "title": f"{asked.title}: what is built",
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
         "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
         "structures": made,
+        "as_built": list(_as_built({made.name: read_manifest(p) for made, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),
     }
     write_page(args.out, "fabrication.html.j2", values)
+
+
+def _as_built(told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yields rows of a table by structure: what is told, as designed, as built."""
+    found = {name: each["as_built"] for name, each in told.items() if each["as_built"]}
+    for name, each in found.items():
+        title = TITLES.get(name, name)
+        if "failure" in each:
+            yield title, "", f"cannot be simulated: {each['failure']}"
+            continue
+        turn = f"{each['turn_mean_deg']:.2f}° on average, {each['turn_max_deg']:.2f}° at most"
+        yield f"{title}: units turn before any load by", "0", turn
+        if name != "intact":
+            losses = (f"{each[f'loss_as_{how}']:.4g}" for how in _HOWS)
+            yield f"{title}: loss J", *losses
+    pair = [found.get(name, {}) for name in ("cloaked", "altered")]
+    if all("loss_as_built" in each for each in pair):
+        ratios = (pair[0][f"loss_as_{how}"] / pair[1][f"loss_as_{how}"] for how in _HOWS)
+        yield "Loss J, cloaked over altered", *(f"{100 * ratio:.1f} %" for ratio in ratios)
 
 
 def package(folder: Path, problem: Problem) -> PackageSection:
