@@ -183,6 +183,9 @@ def assembly_steps(
     steps = [
         "Measure the bar at the foot of each page: 100 mm, or the print is not to scale.",
         joining,
+        "Tolerances: vertices within 0.1 mm of the plan, slots "
+        f"{settings.slot_width:.2f} mm wide within 0.05 mm, shims no longer than listed and at "
+        "most 0.2 mm shorter.",
         f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
