@@ -36,6 +36,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         for name in (
             *("design", "response", "sweep", "scatter", "verification", "geometric-design"),
             *("geometric-response", "spectrum", "gains", "calibration", "track"),
+            *("samples", "cycles"),
         )
     },
     "--datasets": _path("NC", "what was measured", nargs="+"),
@@ -95,6 +96,12 @@ REPORTS = {
         "reports.products.calibration",
         "--calibration --out-dir",
         "Draws a calibration: fit.pdf, fit.svg and fit.png.",
+        study=False,
+    ),
+    "validation": ReportCommand(
+        "reports.products.validation.validation_report",
+        "--samples --cycles --out-dir",
+        "Draws measured specimens beside their prediction: figures, tables, and one page.",
         study=False,
     ),
     "tracking": ReportCommand(

@@ -1,4 +1,5 @@
 from .designs import NETWORK as NETWORK
+from .load_cycles import ROLES as ROLES
 from .schemas import SCHEMA_VERSION as SCHEMA_VERSION
 from .schemas import SCHEMAS as SCHEMAS
 from .schemas import TABLES as TABLES

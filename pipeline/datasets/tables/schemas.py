@@ -11,6 +11,8 @@ from pipeline.datasets.tables.calibrations import CALIBRATION, WARNED
 from pipeline.datasets.tables.comparisons import COMPARED, COMPARISON
 from pipeline.datasets.tables.designs import DESIGN, DESIGNMETHOD
 from pipeline.datasets.tables.gains import GAINS
+from pipeline.datasets.tables.load_cycles import LOAD_CYCLES, RECORDED_CYCLES
+from pipeline.datasets.tables.populations import CREDITED, POPULATION
 from pipeline.datasets.tables.responses import RESPONSE, SWEEP
 from pipeline.datasets.tables.spectra import SPECTRUM
 from pipeline.datasets.tables.tracks import RECORDED, SPECIMEN, TRACK, TRUTH
@@ -33,6 +35,8 @@ Kind = Literal[
     "truth",
     "comparison",
     "calibration",
+    "population",
+    "load_cycles",
     "benchmark",
     "contest",
     "tracking",
@@ -78,6 +82,14 @@ SCHEMAS: Mapping[Kind, Schema] = {
     "comparison": Schema(COMPARISON, "Motion in a recording beside its simulation", COMPARED),
     "calibration": Schema(
         CALIBRATION, "Constants of a specimen, found from measurements, with their errors", WARNED
+    ),
+    "population": Schema(
+        POPULATION,
+        "Constants of several samples, and the test of another that they predict",
+        CREDITED,
+    ),
+    "load_cycles": Schema(
+        LOAD_CYCLES, "Load cycles as measured, beside equilibria along the drive", RECORDED_CYCLES
     ),
     "benchmark": Schema(BENCHMARK, "Run time, error and work of several methods", MEASURED),
     "contest": Schema(
