@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.calibration.experiments import load_cycles
-from pipeline.calibration.experiments.load_cycles import LoadBranch, Snap
+from pipeline.calibration.experiments import LoadBranch, Snap, load_cycles
 from pipeline.calibration.inputs import Constants, CycleRecord, LoadCycles
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError

@@ -8,5 +8,7 @@ from .force_displacement import ForceTest as ForceTest
 from .free_decay import DecayTest as DecayTest
 from .full_field import FullFieldExperiment as FullFieldExperiment
 from .full_field import per_dof as per_dof
+from .load_cycles import LoadBranch as LoadBranch
+from .load_cycles import Snap as Snap
 from .tracked_specimen import TrackedSpecimen as TrackedSpecimen
 from .tracked_specimen import pose_specimen as pose_specimen

@@ -105,12 +105,11 @@ def find_snaps(branch: LoadBranch) -> list[Snap]:
     found = []
     for sign in (1.0, -1.0):
         peaks, _ = find_peaks(sign * force, prominence=height)
-        ends, _ = find_peaks(-sign * force, prominence=height / 2)
+        turns, _ = find_peaks(-sign * force)
         for peak in peaks:
-            later = ends[ends > peak]
-            near = len(later) and abs(way[later[0]] - way[peak]) < SUDDEN * np.ptp(way)
-            if sign * force[peak] > 0 and near:
-                end = later[0]
+            fallen = (turns > peak) & (sign * (force[peak] - force[turns]) > height)
+            end = turns[fallen][0] if fallen.any() else peak
+            if sign * force[peak] > 0 and 0 < abs(way[end] - way[peak]) < SUDDEN * np.ptp(way):
                 found.append(Snap(*map(float, (way[peak], force[peak], way[end], force[end]))))
     return found
 

@@ -109,9 +109,9 @@ class Sampling(Section):
         simulated_draws: steps of each that are kept, after as many that are not.
     """
 
-    chains: Count = 4
+    chains: Count = 2
     warm_up: Count = 300
-    draws: Samples = 500
+    draws: Samples = 600
     simulated_sets: Count = 200
     simulated_draws: Samples = 250
 

@@ -21,7 +21,12 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import numpyro
 from jax import Array
+from numpyro.distributions import LogNormal, MultivariateNormal, Normal
+from numpyro.infer import NUTS, init_to_median
+from numpyro.infer.util import log_density
+from scipy.optimize import minimize
 
 from pipeline.calibration.inputs import Priors
 from pipeline.calibration.population.curve_emulator import log_force
@@ -106,9 +111,6 @@ def prior_numbers(priors: Priors, centre: Floats) -> PriorNumbers:
 
 def hierarchical_model(readings: Readings, priors: PriorNumbers) -> None:
     """States the model in NumPyro's terms."""
-    import numpyro
-    from numpyro.distributions import LogNormal, MultivariateNormal, Normal
-
     n_kinds, _, n_samples = jnp.shape(readings.shares)
     each, medians = jnp.zeros(n_kinds), jnp.asarray(priors.medians)
     mean = numpyro.sample("mean", Normal(priors.centre, priors.constants).to_event(1))
@@ -155,8 +157,6 @@ def sample_posteriors(
 def _walks(
     readings: Readings, priors: PriorNumbers, keys: Array, *, warm_up: int, draws: int
 ) -> dict[str, Array]:
-    from numpyro.infer import NUTS, init_to_median
-
     of_set = Readings(0, 0, None, None, None, None, None)  # type: ignore[arg-type]
 
     def walk(seen: Readings, given: PriorNumbers, key: Array) -> dict[str, Array]:
@@ -178,3 +178,44 @@ def _walks(
         return jax.lax.scan(step, state, length=draws)[1]
 
     return jax.vmap(walk, in_axes=(of_set, 0, 0))(readings, priors, keys)
+
+
+FACTORS = np.geomspace(1 / 4, 4, 21)
+"""Of each constant, over its posterior median."""
+_FLAT = 1e3
+"""Width of a prior that tells nothing, in logarithms."""
+
+
+def profile_likelihoods(
+    readings: Readings, priors: PriorNumbers, medians: Mapping[str, Floats]
+) -> Floats:
+    """Computes twice the logarithm of the likelihood lost (3, n_factors) as one constant is held.
+
+    The other mean constants and those of all samples are at their best; spreads and errors stay at
+    the posterior's medians.
+    """
+    flat = priors._replace(constants=_FLAT)
+    spread, middle, samples = (medians[name] for name in ("spread", "mean", "constants"))
+    held = {name: medians[name] for name in ("spread", "discrepancy", "mounting", "reading")}
+
+    @jax.jit
+    @jax.value_and_grad
+    def lost(free: Floats, fixed: Floats, which: Floats) -> jax.Array:
+        mean = jnp.where(which, fixed, jnp.asarray(free[:3]))
+        logs = jnp.reshape(free[3:], samples.shape)
+        apart = (logs[:, :1] - mean[0]) / spread[0]
+        given = held | {"mean": mean, "apart": apart, "known": logs[:, 1:]}
+        return -2 * log_density(hierarchical_model, (readings, flat), {}, given)[0]
+
+    found = np.empty((3, len(FACTORS)))
+    best = minimize(
+        lost, np.r_[middle, samples.ravel()], (middle, np.zeros(3, bool)), "BFGS", jac=True
+    )
+    for constant in range(3):
+        start = best.x
+        for k, factor in enumerate(FACTORS):
+            fixed = middle.copy()
+            fixed[constant] += np.log(factor)
+            end = minimize(lost, start, (fixed, np.arange(3) == constant), "BFGS", jac=True)
+            found[constant, k], start = end.fun, end.x
+    return found - best.fun

@@ -18,7 +18,7 @@ REPEATS = 8
 _JITTER = 1e-10
 
 
-class Band(NamedTuple):
+class PredictionBand(NamedTuple):
     """Holds the logarithms of forces (n,): median, and ends between which 95 % of curves lie.
 
     The ends are so far from the median, in units of the pointwise spread, that 95 % of all curves
@@ -103,15 +103,15 @@ def new_curves(
 _DRAWN = ("mean", "spread", "constants", "discrepancy", "mounting", "reading")
 
 
-def find_band(curves: Floats) -> Band:
+def find_band(curves: Floats) -> PredictionBand:
     """Finds the band of drawn curves (n, n_points)."""
     below, median, above = np.quantile(curves, [0.16, 0.5, 0.84], axis=0)
     unit = (above - below) / 2
     reach = np.quantile((np.abs(curves - median) / unit).max(axis=1), LEVEL)
-    return Band(median, median - reach * unit, median + reach * unit)
+    return PredictionBand(median, median - reach * unit, median + reach * unit)
 
 
-def student_band(curve: PosedCurve, constants: Floats) -> Band:
+def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
     """Finds Student's interval of a new sample from so many samples' own predictions.
 
     Args:
@@ -122,7 +122,7 @@ def student_band(curve: PosedCurve, constants: Floats) -> Band:
     count = len(each)
     quantile = student.ppf((1 + LEVEL) / 2, count - 1) * np.sqrt(1 + 1 / count)
     middle, reach = each.mean(axis=0), quantile * each.std(axis=0, ddof=1)
-    return Band(middle, middle - reach, middle + reach)
+    return PredictionBand(middle, middle - reach, middle + reach)
 
 
 def medians(draws: Draws) -> Mapping[str, Floats]:

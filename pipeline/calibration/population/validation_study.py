@@ -10,15 +10,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
+from numpyro.diagnostics import gelman_rubin
 
 from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
 from pipeline.calibration.population.coverage import try_band
 from pipeline.calibration.population.curve_emulator import CurveEmulator, emulate, log_force
 from pipeline.calibration.population.hierarchical_model import (
+    FACTORS,
     Draws,
     PriorNumbers,
     Readings,
     prior_numbers,
+    profile_likelihoods,
     sample_posteriors,
 )
 from pipeline.calibration.population.missing_physics import (
@@ -28,15 +31,14 @@ from pipeline.calibration.population.missing_physics import (
     rank_mechanisms,
 )
 from pipeline.calibration.population.prediction import (
-    Band,
     PosedCurve,
+    PredictionBand,
     find_band,
     medians,
     new_curves,
     pose_curve,
     student_band,
 )
-from pipeline.calibration.population.profile import FACTORS, profile_likelihoods
 from pipeline.calibration.population.sample_readings import (
     SampleCurve,
     ends,
@@ -179,8 +181,6 @@ def _ranked(
 
 def _constants(found: FittedPopulation) -> dict[str, tuple]:
     """Tells the posterior of means, spreads, samples and errors by quantiles."""
-    from numpyro.diagnostics import gelman_rubin
-
     draws = found.posteriors[""]
     logs = np.quantile(draws["mean"], QUANTILES, axis=0)
     chains = [
@@ -211,7 +211,7 @@ def _constants(found: FittedPopulation) -> dict[str, tuple]:
 def _predictions(
     found: FittedPopulation,
     curve: PosedCurve,
-    bands: Mapping[str, Band],
+    bands: Mapping[str, PredictionBand],
     truth: Floats,
     folder: Path,
 ) -> dict[str, tuple]:
@@ -293,13 +293,17 @@ def _predicted(
 
 
 def _points(found: FittedPopulation) -> dict[str, tuple]:
-    """Tells every reading of the fit, and what the fit has there."""
-    middle = medians(found.posteriors[""])
-    fitted = np.exp(np.asarray(found.readings.expected(middle["constants"])))
+    """Tells every reading of the fit, and the curves of the samples' median constants."""
+    logs = medians(found.posteriors[""])["constants"]
+    made = [pose_curve(each, each.displacement, 0) for each in found.emulators.values()]
     used = found.readings.used > 0
     return {
         "curve": ("point", [name for row in found.names for name in row]),
         "point_displacement": ("point", np.exp(found.readings.base)[used]),
         "point_force": ("point", np.exp(found.readings.log_force)[used]),
-        "point_fitted": ("point", fitted[used]),
+        "fit_displacement": (("test", "step"), np.array([each.displacement for each in made])),
+        "fit_force": (
+            ("test", "sample", "step"),
+            np.exp(np.array([each.predict(logs) for each in made])),
+        ),
     }

@@ -45,7 +45,10 @@ POPULATION: Table = {
     "curve": Variable(_POINT, "1", "curve that the reading is of", "str"),
     "point_displacement": Variable(_POINT, "mm", "displacement of the grips"),
     "point_force": Variable(_POINT, "N", "force that was read"),
-    "point_fitted": Variable(_POINT, "N", "force by the medians of the samples' constants"),
+    "fit_displacement": Variable(("test", "step"), "mm", "displacement of the fitted curves"),
+    "fit_force": Variable(
+        ("test", "sample", "step"), "N", "force by the medians of each sample's constants"
+    ),
     "displacement": Variable(_AT, "mm", "displacement of the grips in the predicted test"),
     "measured": _force("force that was measured"),
     "simulated": _force("force that others simulated", gaps=True),

@@ -111,12 +111,16 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
         raise UserError(f"only {len(lines)} lines of numbers", file=path, remedy=remedy)
     found = np.empty((len(lines), len(wanted)))
     for place, (number, row) in enumerate(lines):
-        for column, at in enumerate(named[name] for name in wanted):
+        for column, (name, at) in enumerate((name, named[name]) for name in wanted):
             if (value := cells.number(row, at)) is None:
-                remedy = "mend or delete the line: all wanted columns need finite numbers"
-                text = row[at] if at < len(row) else ""
-                what = "not a finite number"
-                raise UserError(what, file=path, line=number, value=text, remedy=remedy)
+                raise UserError(
+                    "not a finite number",
+                    file=path,
+                    line=number,
+                    key=name,
+                    value=row[at] if at < len(row) else "",
+                    remedy="mend or delete the line: all wanted columns need finite numbers",
+                )
             found[place, column] = value
     return np.asarray(found * factors)
 

@@ -14,8 +14,7 @@ from pipeline import datasets
 from pipeline.calibration.inputs import UNITS
 from reports.base import Table
 from reports.page import PageTable, Report, publish
-from reports.products.validation.cycle_figure import draw_cycles
-from reports.products.validation.sample_figure import draw_samples
+from reports.products.validation.figures import draw_cycles, draw_samples
 from sim.core import Floats
 
 
@@ -50,6 +49,7 @@ def report(args: argparse.Namespace) -> None:
             (f"{name}: {key}", str(value))
             for name, made in (("hinges.nc", samples), ("morpher.nc", cycles))
             for key, value in made.attrs.items()
+            if key not in ("population", "load_cycles")
         ),
     }
     publish(Report(figures, "validation.html.j2", values, _tables(samples)), args.out_dir)

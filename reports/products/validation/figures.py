@@ -1,4 +1,4 @@
-"""Draws samples with their fits, the prediction with its band, and what weakens both."""
+"""Draws samples with their fits and the prediction with its band; and load cycles with snaps."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipeline.datasets.tables import ROLES
 from reports.base import style
 
 SYMBOLS = (r"$k_\ell$", r"$k_s$", r"$k_\theta$")
@@ -36,22 +37,21 @@ def draw_samples(made: xr.Dataset) -> Figure:
 
 
 def _fit(axes: Axes, made: xr.Dataset, test: str) -> None:
-    curves = made["curve"].values.astype(str)
-    samples = made["sample"].values.tolist()
+    curves, samples = made["curve"].values.astype(str), made["sample"].values.tolist()
     for curve in dict.fromkeys(name for name in curves if name.startswith(f"{test}_")):
         mine = curves == curve
         names = curve.removeprefix(f"{test}_").split("_")
         single = len(names) == 1
         colour = COLOURS[samples.index(names[0]) % len(COLOURS)] if single else style.INTACT
         label = f"sample {names[0]}" if single else "mean"
-        x, y, fitted = (
-            made[name].values[mine]
-            for name in ("point_displacement", "point_force", "point_fitted")
-        )
+        x, y = made["point_displacement"].values[mine], made["point_force"].values[mine]
         axes.plot(x, y, "o", color=colour, markersize=2.4, markeredgewidth=0, label=label)
-        axes.plot(x, fitted, color=colour, linewidth=0.7)
+    fitted = made.isel(test=made["test"].values.tolist().index(test))
+    for k, force in enumerate(fitted["fit_force"].values):
+        colour = COLOURS[k % len(COLOURS)]
+        axes.plot(fitted["fit_displacement"], force, color=colour, linewidth=0.7)
     axes.set(xlabel="displacement, mm", ylabel="force, N", xlim=(0, None), ylim=(0, None))
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper left" if test != "compression" else "lower right")
 
 
 def _prediction(axes: Axes, made: xr.Dataset) -> None:
@@ -65,8 +65,9 @@ def _prediction(axes: Axes, made: xr.Dataset) -> None:
     axes.plot(x, made["median"], color=style.CLOAKED, label="median")
     axes.plot(x, made["simulated"], "--", color=style.ALTERED, label="simulated by the authors")
     axes.plot(x, made["measured"], "o", color=style.INTACT, markersize=2.2, label="measured")
-    axes.set(xlabel="displacement, mm", ylabel="force, N", xlim=(0, None), ylim=(0, None))
-    axes.legend(loc="upper left")
+    most = 1.45 * float(made["high"].max())  # room for the legend
+    axes.set(xlabel="displacement, mm", ylabel="force, N", xlim=(0, None), ylim=(0, most))
+    axes.legend(loc="upper left", ncols=2)
 
 
 def _residual(axes: Axes, made: xr.Dataset) -> None:
@@ -92,7 +93,7 @@ def _profile(axes: Axes, made: xr.Dataset) -> None:
     axes.set(xlabel="factor on the median", ylabel="−2 ln L lost", xscale="log", ylim=(0, _MOST))
     axes.set_xticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
     axes.minorticks_off()
-    axes.legend(loc="upper center", ncols=3)
+    axes.legend(loc="lower right")
 
 
 def _mechanisms(axes: Axes, made: xr.Dataset) -> None:
@@ -103,3 +104,44 @@ def _mechanisms(axes: Axes, made: xr.Dataset) -> None:
     axes.set_yticks(place, names)
     axes.axvline(0, color=style.INTACT, linewidth=0.5)
     axes.set(xlabel="% of the residual, at a plausible size", ylim=(len(names) - 0.4, -0.6))
+
+
+_STYLES = {
+    "closing": ("-", style.INTACT, "measured, nearing"),
+    "opening": ("-", style.GREY, "measured, parting"),
+    "equilibrium_closing": ("-", style.CLOAKED, "equilibria, nearing"),
+    "equilibrium_opening": ("--", style.ALTERED, "equilibria, parting"),
+}
+
+
+def draw_cycles(made: xr.Dataset) -> Figure:
+    """Draws one panel a record, two in a row."""
+    count = made.sizes["record"]
+    rows = -(-count // 2)
+    drawn = style.page(58.0 * rows)
+    for k in range(count):
+        row, column = divmod(k, 2)
+        left, top = 12.0 + 89.0 * column, 58.0 * row
+        style.letter(drawn, left - 10.0, top + 1.0, "abcdefgh"[k], str(made["title"].values[k]))
+        axes = style.place(drawn, left, top + 8.0, 72.0, 40.0)
+        mine = made["record_of_point"].values == k
+        seen = made["force"].values[mine & (made["role"].values < 2)]
+        for role, number in ROLES.items():
+            chosen = mine & (made["role"].values == number)
+            if chosen.any():
+                line, colour, label = _STYLES[role]
+                x, y = made["displacement"].values[chosen], made["force"].values[chosen]
+                axes.plot(x, y, line, color=colour, linewidth=0.8, label=label)
+                if number < 2:
+                    wide = np.nan_to_num(made["scatter"].values[chosen])
+                    axes.fill_between(x, y - wide, y + wide, color=style.PALE, linewidth=0)
+        snaps = made["record_of_snap"].values == k
+        for end, force in (("snap_start", "snap_peak"), ("snap_end", "snap_rest")):
+            label = "ends of a snap" if end == "snap_start" and snaps.any() else None
+            x, y = made[end].values[snaps], made[force].values[snaps]
+            axes.plot(x, y, "o", mfc="none", color=style.ALTERED, markersize=4, label=label)
+        reach = 1.25 * np.abs(seen).max()
+        axes.set(xlabel="approach of the clamps, mm", ylabel="tension, N", ylim=(-reach, reach))
+        axes.axhline(0, color=style.GREY, linewidth=0.4)
+        axes.legend(loc="best")
+    return drawn
