@@ -96,6 +96,6 @@ def emulate(
     ]
     coefficients = np.einsum("ai,bj,ijn->abn", *inverses, values)
     trials = np.random.default_rng(seed).uniform(-1, 1, (TRIALS, 2))
-    found = [chebyshev.chebval2d(*place, coefficients) for place in trials]
+    found = [chebyshev.chebval2d(place[0], place[1], coefficients) for place in trials]
     wrong = np.abs(np.array(found) - [scaled(place) for place in trials]).max()
     return CurveEmulator(displacement, ratios, coefficients, float(np.expm1(wrong)))

@@ -74,7 +74,9 @@ class Readings(NamedTuple):
         forces = jnp.exp(self.of_samples(logs))
         return jnp.log(jnp.einsum("tns,tsn->tn", self.shares, forces))
 
-    def covariance(self, discrepancy: Numbers, mounting: Numbers, reading: Numbers) -> Array:
+    def covariance(
+        self, discrepancy: Numbers | float, mounting: Numbers, reading: Numbers
+    ) -> Array:
         """Computes (n_kinds, n, n) of what is added; the last two scales are by kind."""
         common = jnp.einsum("tns,tms->tnm", self.shares, self.shares)
         alike = jax.vmap(correlation)(self.place)
@@ -83,7 +85,10 @@ class Readings(NamedTuple):
         read = jnp.square(reading)[:, None, None] * own
         whole = jnp.square(discrepancy) * alike + mounted + read
         seen = self.used[:, :, None] * self.used[:, None, :]
-        return seen * whole + jnp.eye(alike.shape[-1]) * (1 - self.used + _JITTER)[:, :, None]
+        return (
+            jnp.asarray(seen * whole)
+            + jnp.eye(alike.shape[-1]) * (1 - self.used + _JITTER)[:, :, None]
+        )
 
 
 def correlation(place: Numbers) -> Array:
@@ -194,7 +199,7 @@ def profile_likelihoods(
     The other mean constants and those of all samples are at their best; spreads and errors stay at
     the posterior's medians.
     """
-    flat = priors._replace(constants=_FLAT)
+    flat = priors._replace(constants=np.asarray(_FLAT))
     spread, middle, samples = (medians[name] for name in ("spread", "mean", "constants"))
     held = {name: medians[name] for name in ("spread", "discrepancy", "mounting", "reading")}
 

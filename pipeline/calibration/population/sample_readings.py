@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.calibration.experiments import force_displacement
-from pipeline.calibration.inputs import SampleTest
+from pipeline.calibration.inputs import SampleTest, TestKind
 from pipeline.calibration.population.curve_emulator import CurveEmulator
 from pipeline.calibration.population.hierarchical_model import Readings
 from pipeline.runtime import UserError
@@ -21,13 +21,13 @@ class SampleCurve(NamedTuple):
 
     Attributes:
         name: of the set.
-        test: of its kind.
+        test: its kind.
         samples: that it is the mean of.
         displacement, force: (n,) mm, N.
     """
 
     name: str
-    test: str
+    test: TestKind
     samples: tuple[str, ...]
     displacement: Floats
     force: Floats
@@ -69,7 +69,7 @@ def read_curve(asked: SampleTest, folder: Path) -> SampleCurve:
     return curve
 
 
-def ends(curves: Sequence[SampleCurve]) -> dict[str, float]:
+def ends(curves: Sequence[SampleCurve]) -> dict[TestKind, float]:
     """Finds the largest displacement in mm that all curves of each kind of test reach."""
     kinds = dict.fromkeys(curve.test for curve in curves)
     return {
@@ -80,7 +80,7 @@ def ends(curves: Sequence[SampleCurve]) -> dict[str, float]:
 
 def stack_readings(
     curves: Sequence[SampleCurve],
-    emulators: Mapping[str, CurveEmulator],
+    emulators: Mapping[TestKind, CurveEmulator],
     samples: Sequence[str],
     points: int,
 ) -> tuple[Readings, list[list[str]]]:

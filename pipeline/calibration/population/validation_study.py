@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpyro.diagnostics import gelman_rubin
 
-from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
+from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population, TestKind
 from pipeline.calibration.population.coverage import try_band
 from pipeline.calibration.population.curve_emulator import CurveEmulator, emulate, log_force
 from pipeline.calibration.population.hierarchical_model import (
@@ -46,7 +46,7 @@ from pipeline.calibration.population.sample_readings import (
     stack_readings,
 )
 from pipeline.problem.fields import csv_columns, units
-from sim.core import Floats
+from sim.core import Floats, Numbers
 
 POINTS = 18
 """Of the prediction, evenly spaced."""
@@ -66,7 +66,7 @@ class FittedPopulation(NamedTuple):
 
     asked: Population
     curves: Sequence[SampleCurve]
-    emulators: Mapping[str, CurveEmulator]
+    emulators: Mapping[TestKind, CurveEmulator]
     predicted: CurveEmulator
     readings: Readings
     names: Sequence[Sequence[str]]
@@ -131,7 +131,7 @@ def _fits(
 ) -> dict[str, Draws]:
     """Samples at once the posteriors of everything, with doubled priors, with parts left out."""
     effort = asked.sampling
-    masks: dict[str, Floats] = {"": readings.used, "doubled": readings.used}
+    masks: dict[str, Numbers] = {"": readings.used, "doubled": readings.used}
     for k in range(readings.shares.shape[2]):
         masks[asked.samples[k]] = readings.used * (readings.shares[:, :, k] == 0)
     for k, row in enumerate(names):

@@ -137,9 +137,9 @@ def draw_cycles(made: xr.Dataset) -> Figure:
                     axes.fill_between(x, y - wide, y + wide, color=style.PALE, linewidth=0)
         snaps = made["record_of_snap"].values == k
         for end, force in (("snap_start", "snap_peak"), ("snap_end", "snap_rest")):
-            label = "ends of a snap" if end == "snap_start" and snaps.any() else None
+            named = "ends of a snap" if end == "snap_start" and snaps.any() else None
             x, y = made[end].values[snaps], made[force].values[snaps]
-            axes.plot(x, y, "o", mfc="none", color=style.ALTERED, markersize=4, label=label)
+            axes.plot(x, y, "o", mfc="none", color=style.ALTERED, markersize=4, label=named)
         reach = 1.25 * np.abs(seen).max()
         axes.set(xlabel="approach of the clamps, mm", ylabel="tension, N", ylim=(-reach, reach))
         axes.axhline(0, color=style.GREY, linewidth=0.4)

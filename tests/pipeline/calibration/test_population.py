@@ -78,7 +78,9 @@ def test_readings_are_thinned_and_shared(emulator: CurveEmulator) -> None:
     )
     assert found.used.shape == (1, 15)
     assert names[0][::5] == ["compression_s1", "compression_s2", "compression_s1_s2"]
-    np.testing.assert_allclose(found.shares[0, ::5], [[1, 0], [0, 1], [0.5, 0.5]])
+    np.testing.assert_allclose(
+        np.asarray(found.shares)[0, ::5], np.array([[1, 0], [0, 1], [0.5, 0.5]])
+    )
     np.testing.assert_allclose(found.place[0, :5], np.linspace(0.2, 1, 5), atol=0.05)
     ratio = np.exp(np.asarray(found.log_force)[0, 5:10] - np.asarray(found.log_force)[0, :5])
     np.testing.assert_allclose(ratio, 1.2)
