@@ -3,8 +3,6 @@
 Its times are those of this machine now: unlike all other datasets these are not byte-reproducible.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import sys

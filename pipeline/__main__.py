@@ -9,13 +9,18 @@ from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
 
-from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, version
+from pipeline.runtime import PREFIX, STAGES, Stage, UserError, cli, delegate, streams, version
 
 _HELP = ("-h", "--help")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Looks up the stage that the first word names, and runs it with the others."""
+    with streams.unread():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     words = sys.argv[1:] if argv is None else list(argv)
     if not words or words[0] in _HELP:
         print(overview())  # noqa: T201
@@ -29,6 +34,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"error: no stage is named {words[0]!r}: {remedy}", file=sys.stderr)  # noqa: T201
         return 2
     return run_stage(words[0], words[1:])
+
+
+def _delegated() -> int | None:
+    """Has a server of the workflow run the stage, where there is one; returns its exit code."""
+    stage = STAGES.get("".join(sys.argv[1:2]))
+    if stage is None or stage.passes_on:
+        return None
+    return delegate(f"{PREFIX}pipeline", PREFIX + stage.module)
 
 
 def run_stage(name: str, words: Sequence[str]) -> int:
@@ -68,4 +81,5 @@ def overview() -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    code = _delegated()
+    sys.exit(main() if code is None else code)

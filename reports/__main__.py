@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from pipeline.runtime import PREFIX, cli
+from pipeline.runtime import PREFIX, cli, delegate, streams
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
 
 
@@ -15,6 +15,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     The same datasets give the same bytes.
     """
+    with streams.unread():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     kind, *words = [*(sys.argv[1:] if argv is None else argv), ""]
     if kind in REPORTS:
         return _run(kind, REPORTS[kind], words[:-1])
@@ -35,4 +40,6 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    asked = REPORTS.get("".join(sys.argv[1:2]))
+    code = delegate(f"{PREFIX}reports", PREFIX + asked.module) if asked else None
+    sys.exit(main() if code is None else code)

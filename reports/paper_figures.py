@@ -1,7 +1,5 @@
 """Reads figures.yaml: which kind of figure shows which studies, and in which movie they move."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from functools import cache
 from pathlib import Path

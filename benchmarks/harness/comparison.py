@@ -4,8 +4,6 @@ The yardstick is a fixed job of LAPACK and of the interpreter, timed on the same
 so that another machine, or the same one with other company, is compared fairly.
 """
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Mapping

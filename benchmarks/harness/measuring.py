@@ -1,7 +1,5 @@
 """Measures methods: in turn on one core, or setting after setting."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial

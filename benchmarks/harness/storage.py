@@ -1,7 +1,5 @@
 """Writes measurements as datasets with machine, notes and targets, and reads baselines again."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Runs methods in processes of their own, bound to one core."""
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 import os
@@ -71,7 +69,7 @@ class Worker:
         self._process.start()
         there.close()
 
-    def __enter__(self) -> Worker:
+    def __enter__(self) -> "Worker":
         return self
 
     def __exit__(

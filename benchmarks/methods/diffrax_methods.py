@@ -1,7 +1,5 @@
 """Lists methods of diffrax: the law in JAX, with its adjoints; statics as slow dynamics."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from functools import cache, partial
@@ -38,16 +36,10 @@ Pose = Callable[[LoadCase, Array], DiffraxProblem]
 
 def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
     """Lists Runge-Kutta methods with checkpointed adjoints, and one with a continuous adjoint."""
-    settings = settings_of(tolerances)
-    plain = tuple(
-        Method(
-            f"diffrax {solver}",
-            partial(_prepare, name, partial(_by_steps, solver, "RecursiveCheckpointAdjoint")),
-            settings,
-            own=False,
-        )
-        for solver in SOLVERS
-    )
+    settings, checkpoints = settings_of(tolerances), "RecursiveCheckpointAdjoint"
+    poses = {solver: partial(_by_steps, solver, checkpoints) for solver in SOLVERS}
+    runs = {f"diffrax {solver}": partial(_prepare, name, pose) for solver, pose in poses.items()}
+    plain = (Method(method, run, settings, own=False) for method, run in runs.items())
     backsolve = partial(_prepare, name, partial(_by_steps, "Tsit5", "BacksolveAdjoint"))
     continuous = "diffrax Tsit5, backsolve"
     return (*plain, Method(continuous, backsolve, settings[:2], own=False, tasks=("gradient",)))

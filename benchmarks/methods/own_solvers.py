@@ -111,7 +111,9 @@ def loss_run(posed: LoadCase, solver: Solver) -> Run:
 def gradient_run(posed: LoadCase, solver: Solver, work: Mapping[str, int]) -> Run:
     """Makes the run of a load case's loss and gradient by a solver."""
     evaluate = partial(
-        GradientChain(posed.of_design, posed.measure), solver=solver, cases=posed.scene.loads.cases
+        GradientChain(posed.of_design, posed.measure, designed=True),
+        solver=solver,
+        cases=posed.scene.loads.cases,
     )
     start = np.zeros(posed.scene.space.n_variables)
 

@@ -3,9 +3,8 @@
 The right-hand side is the project's compiled force, called from Python at every stage.
 """
 
-from __future__ import annotations
-
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -82,15 +81,10 @@ def _harmonic(drive: Harmonic, time: float) -> float:
 
 def in_time(name: str, tolerances: tuple[float, ...]) -> tuple[Method, ...]:
     """Lists the explicit method and the two implicit ones; they have no gradient."""
+    made = {method: partial(_prepare, name, method) for method in (REFERENCE, *IMPLICIT)}
+    settings = settings_of(tolerances)
     return tuple(
-        Method(
-            f"scipy {method}",
-            partial(_prepare, name, method),
-            settings_of(tolerances),
-            own=False,
-            tasks=("loss",),
-        )
-        for method in (REFERENCE, *IMPLICIT)
+        Method(f"scipy {key}", run, settings, False, ("loss",)) for key, run in made.items()
     )
 
 
@@ -117,17 +111,10 @@ def _solve(
         ArithmeticError: scipy gave up.
     """
     motion = FirstOrderSystem(posed, values)
-    more = {"jac": motion.jacobian} if method in IMPLICIT else {}
-    found = solve_ivp(
-        motion.rates,
-        (0.0, posed.scene.loads.duration),
-        np.zeros(2 * len(motion.free)),
-        method=method,
-        t_eval=posed.times,
-        rtol=tolerance,
-        atol=tolerance,
-        **more,
-    )
+    start, span = np.zeros(2 * len(motion.free)), (0.0, posed.scene.loads.duration)
+    more: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "t_eval": posed.times}
+    more |= {"jac": motion.jacobian} if method in IMPLICIT else {}
+    found = solve_ivp(motion.rates, span, start, method=method, **more)
     if not found.success:
         raise ArithmeticError(found.message)
     states = [

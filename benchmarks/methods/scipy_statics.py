@@ -1,7 +1,5 @@
 """Lists scipy's ways to an equilibrium as methods, and the reference by one of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise

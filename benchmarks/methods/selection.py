@@ -1,7 +1,5 @@
 """Selects the methods and the reference of a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

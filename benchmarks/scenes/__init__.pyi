@@ -10,5 +10,6 @@ from .paper_constants import CUTOFF as CUTOFF
 from .paper_constants import LIGAMENT as LIGAMENT
 from .paper_constants import MATERIAL as MATERIAL
 from .paper_constants import SPACING as SPACING
+from .paper_scenes import HEAVY as HEAVY
 from .paper_scenes import counted as counted
 from .paper_scenes import work_of as work_of

@@ -1,7 +1,5 @@
 """Poses the scenes that methods are compared on, each with one load case, at the initial design."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property

@@ -1,7 +1,5 @@
 """Defines the paper's lattice and material, for scenes that need no problem file."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.structure import Material, damping_of_ratio

@@ -4,8 +4,6 @@ Command line: ``python -m benchmarks.stress [family ...]``. The counts go to JSO
 shows.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -16,7 +14,7 @@ from typing import Any
 
 from benchmarks.harness import aligned
 from benchmarks.stress import families
-from benchmarks.stress.verdicts import Check, StressFamily, Tally, attempted
+from benchmarks.stress.verdicts import StressFamily, Tally, attempted
 from pipeline.runtime import write_atomically
 
 ENOUGH = 0.99
@@ -40,8 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         1 if an answer is wrong or too few cases in range are solved, otherwise 0.
     """
     args = _parser().parse_args(arguments)
-    unknown = sorted(set(args.names) - set(FAMILIES))
-    if unknown:
+    if unknown := sorted(set(args.names) - set(FAMILIES)):
         known = ", ".join(FAMILIES)
         print(f"error: no family {', '.join(unknown)}; there are {known}", file=sys.stderr)
         return 2
@@ -83,11 +80,10 @@ def _failures(tally: Tally) -> Iterator[str]:
 
 def table(tallies: Sequence[Tally]) -> str:
     """Formats the counts of each family, and of all."""
-    rows = [["family", "tried", "solved", "refused", "wrong", "in range", "of these solved", ""]]
-    rows += [[tally.family.name, *map(str, _counts(tally).values()), ""] for tally in tallies]
-    counts = [_counts(tally).values() for tally in tallies]
-    totals = [sum(column) for column in zip(*counts, strict=True)]
-    return aligned([*rows, ["all", *map(str, totals), ""]])
+    head = ["family", "tried", "solved", "refused", "wrong", "in range", "of these solved", ""]
+    counts = {tally.family.name: [*_counts(tally).values()] for tally in tallies}
+    counts["all"] = [sum(column) for column in zip(*counts.values(), strict=True)]
+    return aligned([head, *([name, *map(str, row), ""] for name, row in counts.items())])
 
 
 def _counts(tally: Tally) -> dict[str, int]:
@@ -104,22 +100,16 @@ def _record(tally: Tally) -> dict[str, Any]:
         "tried_what": tally.family.tried,
         "judged_how": tally.family.judged,
         **_counts(tally),
-        "worst": [_check(check) for check in tally.worst],
+        "worst": [
+            {"name": name, "value": float(f"{value:.2e}"), "limit": float(limit)}
+            for name, value, limit, _ in tally.worst
+        ],
         "not_solved": [
-            {
-                "case": outcome.case.name,
-                "verdict": outcome.verdict,
-                "wanted": outcome.case.wanted,
-                "message": outcome.message,
-            }
-            for outcome in tally.outcomes
-            if outcome.verdict != "solved"
+            {"case": case.name, "verdict": verdict, "wanted": case.wanted, "message": message}
+            for case, verdict, message, _ in tally.outcomes
+            if verdict != "solved"
         ],
     }
-
-
-def _check(check: Check) -> dict[str, Any]:
-    return {"name": check.name, "value": float(f"{check.value:.2e}"), "limit": float(check.limit)}
 
 
 def _parser() -> argparse.ArgumentParser:

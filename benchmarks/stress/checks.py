@@ -1,7 +1,5 @@
 """Checks answers independently: balance, stability, barriers, overlaps, energy, smaller steps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

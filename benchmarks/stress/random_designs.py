@@ -1,7 +1,5 @@
 """Draws designs at random, all of which keep to what can be made."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

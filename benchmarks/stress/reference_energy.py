@@ -5,8 +5,6 @@ Forces and stiffness are automatic derivatives of ``sim.energy.ligament`` and
 ligament by ligament; which units are near one another is found by computational geometry.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

@@ -1,7 +1,5 @@
 """Poses stress cases: lattices of the paper's constants under any drive."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -79,7 +77,7 @@ class StressScene:
         """Returns the solver that the plan chooses for output at these times."""
         return make_plan(self.scene, self.vertices, asked, every_case=True).solver
 
-    def with_material(self, **constants: Any) -> StressScene:  # noqa: ANN401  (numbers or arrays)
+    def with_material(self, **constants: Any) -> "StressScene":  # noqa: ANN401  (numbers or arrays)
         """Changes constants of the material."""
         material = self.scene.structure.material._replace(**constants)
         return replace(self, scene=self.scene.updated(material=material))

@@ -4,8 +4,6 @@ A case is solved if everything that is checked of its answer keeps within its
 limit, refused if it ends in an error that says what to do, and wrong otherwise.
 """
 
-from __future__ import annotations
-
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
@@ -123,12 +121,11 @@ class Tally:
     @property
     def worst(self) -> list[Check]:
         """Lists the check of each name that came closest to its limit in solved cases."""
+        solved = (outcome.checks for outcome in self.outcomes if outcome.verdict == "solved")
         found: dict[str, Check] = {}
-        for outcome in self.outcomes:
-            for check in outcome.checks if outcome.verdict == "solved" else ():
-                known = found.get(check.name)
-                if known is None or check.share > known.share:
-                    found[check.name] = check
+        for check in (check for checks in solved for check in checks):
+            known = found.setdefault(check.name, check)
+            found[check.name] = check if check.share > known.share else known
         return list(found.values())
 
 

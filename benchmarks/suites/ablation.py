@@ -4,8 +4,6 @@ A skip is prepared with the scene it stands on and whether it is made; its run g
 must not depend on that beyond the tolerance stated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Measures Figure 2's loss and gradient over four load angles: one evaluation of a design."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

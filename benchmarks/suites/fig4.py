@@ -70,7 +70,9 @@ def _equilibrium(loads: Floats, relative: float) -> Run:
         return value, value
 
     evaluate = partial(
-        GradientChain(parameters_of_design(scene), final), solver=solver, cases=scene.loads.cases
+        GradientChain(parameters_of_design(scene), final, designed=True),
+        solver=solver,
+        cases=scene.loads.cases,
     )
     start = np.zeros(scene.space.n_variables)
     work = paper_scenes.counted(scene, solver, [0])

@@ -4,8 +4,6 @@ The constants of compiled loops are part of their machine code, so a change of o
 Packages are lazy: their modules, and Numba with them, are loaded by the first use of a name.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

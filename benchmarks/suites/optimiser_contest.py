@@ -1,7 +1,5 @@
 """Compares optimisers on the same problems: every evaluation counted, timed and judged alike."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import suppress

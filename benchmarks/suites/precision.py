@@ -1,7 +1,5 @@
 """Measures work against precision of our own integrators, on Figure 2's load case at 45 deg."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 
@@ -31,43 +29,28 @@ STEPS = (("leapfrog", 20_000), ("leapfrog", 40_000), ("Blanes-Moan", 12_000))
 
 def suite() -> Suite:
     """Makes the suite."""
-    implicit: list[tuple[Accuracy, int]] = [("draft", 0), *(("default", k) for k in range(3))]
-    return in_turn(
-        "precision",
-        "time against error, loss and gradient of one load angle (45 deg)",
-        (
-            "our explicit method of order 4 with 36 000 steps",
-            partial(_run_with, partial(_explicit, "Blanes-Moan", 36_000), warm=False),
-        ),
-        (
-            *(
-                Method(_implicit_name(*grid), partial(_run_with, partial(_implicit, *grid)))
-                for grid in implicit
-            ),
-            *(
-                Method(
-                    f"explicit, {method}, {n_steps} steps",
-                    partial(_run_with, partial(_explicit, method, n_steps)),
-                    repeats=2,
-                )
-                for method, n_steps in STEPS
-            ),
-            Method(AUTHORS_NAME, _stored, own=False, timed=False, note=AUTHORS_NOTE),
-        ),
-        tuple(
-            Target(told, error_of(name, quantity), at_most=limit)
-            for told, name, quantity, limit in (
-                ("loss error at default", "implicit, default", "loss", 2e-4),
-                ("gradient error at default", "implicit, default", "gradient", 3e-4),
-                ("reference against the authors' loss", AUTHORS_NAME, "loss", 1e-6),
-            )
-        ),
-        225,
+    grids: list[tuple[Accuracy, int]] = [("draft", 0), *(("default", k) for k in range(3))]
+    methods = [
+        Method(
+            f"implicit, {accuracy}" + (f", steps / {2**halvings}" if halvings else ""),
+            partial(_run_with, partial(_implicit, accuracy, halvings)),
+        )
+        for accuracy, halvings in grids
+    ]
+    for method, n_steps in STEPS:
+        run = partial(_run_with, partial(_explicit, method, n_steps))
+        methods.append(Method(f"explicit, {method}, {n_steps} steps", run, repeats=2))
+    methods.append(Method(AUTHORS_NAME, _stored, own=False, timed=False, note=AUTHORS_NOTE))
+    errors = (
+        ("loss error at default", "implicit, default", "loss", 2e-4),
+        ("gradient error at default", "implicit, default", "gradient", 3e-4),
+        ("reference against the authors' loss", AUTHORS_NAME, "loss", 1e-6),
     )
-
-
-def _implicit_name(accuracy: Accuracy, halvings: int) -> str:
-    return f"implicit, {accuracy}" + (f", steps / {2**halvings}" if halvings else "")
+    subject = "time against error, loss and gradient of one load angle (45 deg)"
+    strict = partial(_run_with, partial(_explicit, "Blanes-Moan", 36_000), warm=False)
+    reference = ("our explicit method of order 4 with 36 000 steps", strict)
+    targets = (Target(told, error_of(*of), at_most=limit) for told, *of, limit in errors)
+    return in_turn("precision", subject, reference, tuple(methods), tuple(targets), 225)
 
 
 def _scene() -> Scene:

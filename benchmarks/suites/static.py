@@ -1,7 +1,5 @@
 """Measures the growth of an equilibrium with the lattice: squares compressed by a tenth at once."""
 
-from __future__ import annotations
-
 from functools import cache, partial
 
 import numpy as np
@@ -20,12 +18,12 @@ from benchmarks.harness import (
     measure_settings,
     result_of,
 )
-from benchmarks.scenes import work_of
+from benchmarks.scenes import HEAVY, work_of
 from sim.energy import Topology, observe, topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
 from sim.solvers import LinearRamp, PrescribedMotion, held_dofs, solve_case
-from sim.structure import ConcreteParameters, Material, VoidAngleContact, parameters, quads, shape
+from sim.structure import ConcreteParameters, VoidAngleContact, parameters, quads, shape
 
 SIDES = (15, 30, 60, 120)
 ALL_IN_BANDS = 60
@@ -92,8 +90,7 @@ def _posed(side: int) -> tuple[Topology, ConcreteParameters, PrescribedMotion]:
     lattice = quads(side, side, 15.0, 2.3, np.deg2rad(20.0))
     left = side * np.arange(side)
     right = left + side - 1
-    material = Material(1.0, 120.0, 1.19, 1.5, 1.5, 0.0, 0.0)
-    made = parameters(lattice, shape(lattice, lattice.vertices), material)
+    made = parameters(lattice, shape(lattice, lattice.vertices), HEAVY)
     posed = topology(lattice, held_dofs(left, right), VoidAngleContact(*np.deg2rad([-15.0, -10.0])))
     drive = PrescribedMotion(right, LinearRamp(-COMPRESSION * side * lattice.spacing, 1.0))
     return posed, ConcreteParameters(*(np.asarray(part) for part in made)), drive

@@ -1,7 +1,5 @@
 """Measures the growth of a sweep with its cases, each a problem of its own on Figure 2's units."""
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import islice
 

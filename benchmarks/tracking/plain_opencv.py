@@ -7,8 +7,6 @@ with a parabola through the peak; these places give a rigid motion, and one numb
 millimetres.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import cv2

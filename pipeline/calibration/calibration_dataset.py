@@ -1,7 +1,5 @@
 """Writes the dataset `calibration`, and the lines that a problem file takes from it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulates a study's structure under its own drive, and adds a tracker's noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

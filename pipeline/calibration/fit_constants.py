@@ -1,7 +1,5 @@
 """Fits constants to the sets that the YAML of a calibration names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

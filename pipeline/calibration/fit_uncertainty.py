@@ -1,7 +1,5 @@
 """Estimates the errors of a fit, and the constants that its data do not tell."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

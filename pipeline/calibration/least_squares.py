@@ -6,8 +6,6 @@ covariance; and they cover the cut-off of contact, by which the adjoint does not
 adjoint's exact gradient is what the solution is checked by (``uncertainty``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,9 +1,7 @@
 """Finds snaps and loops of measured load cycles, beside equilibria along a drive's path."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import xarray as xr
@@ -34,7 +32,7 @@ class CyclePath(NamedTuple):
     turn: int
     jumps: int
 
-    def with_play(self, play: float) -> CyclePath:
+    def with_play(self, play: float) -> Self:
         """Shifts the clamps by half their play, against the force that they transmit."""
         return self._replace(approach=self.approach - np.sign(self.tension) * play / 2)
 

@@ -5,8 +5,6 @@ driven units, to a fraction of a frame. A quasi-static one has no time: equal di
 driven units is equal load, on the way there and back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

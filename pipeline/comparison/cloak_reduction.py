@@ -1,7 +1,5 @@
 """Computes the reduction of a measured quantity by a cloak, with its interval."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats

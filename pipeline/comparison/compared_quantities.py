@@ -1,7 +1,5 @@
 """Computes quantities along a recording: rotation, displacement, mimicking, contraction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple

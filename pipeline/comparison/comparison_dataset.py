@@ -1,7 +1,5 @@
 """Assembles a comparison: both sides at the frames, metrics, and their alignment."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -192,19 +190,13 @@ def _curves(made: Compared, random: np.random.Generator) -> Variables:
 def _alignment(made: Compared) -> Variables:
     found, lag = made.measurement.registration, made.axis.lag
     calibrated, stated = made.pixel
+    kept = ("rotation", "rotation_sigma", "scale", "scale_sigma", "residual")
+    drive = ("time_lag", "time_lag_sigma", "drive_correlation", "drive_gain", "drive_gain_sigma")
     scalars = {
-        "registration_rotation": found.rotation,
-        "registration_rotation_sigma": found.rotation_sigma,
-        "registration_scale": found.scale,
-        "registration_scale_sigma": found.scale_sigma,
-        "registration_residual": found.residual,
+        **{f"registration_{name}": getattr(found, name) for name in kept},
         "pixel_size": calibrated,
         "pixel_size_stated": stated,
-        "time_lag": np.nan if lag is None else lag.value,
-        "time_lag_sigma": np.nan if lag is None else lag.sigma,
-        "drive_correlation": np.nan if lag is None else lag.correlation,
-        "drive_gain": np.nan if lag is None else lag.gain,
-        "drive_gain_sigma": np.nan if lag is None else lag.gain_sigma,
+        **dict(zip(drive, (np.nan,) * 5 if lag is None else lag[:5], strict=True)),
         "drive_turn": made.axis.turn,
     }
     return {

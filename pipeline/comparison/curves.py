@@ -1,7 +1,5 @@
 """Computes curves along the frames and maps, peak to peak of every unit, of both sides."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Selects frames and units of a track to compare, and turns them into the design's frame."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

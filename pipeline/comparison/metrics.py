@@ -5,8 +5,6 @@ The intervals are those of a bootstrap over units and over blocks of frames (Kue
 is taken out again, so that the interval holds it and the value is not shifted by it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -38,13 +36,13 @@ class Pair(NamedTuple):
     slope: Floats | None = None
     added: bool = False
 
-    def taken(self, frames: Ints, units: Ints) -> Pair:
+    def taken(self, frames: Ints, units: Ints) -> "Pair":
         """Selects frames and units by number, which may come more than once."""
         chosen = np.ix_(frames, units)
         slope = None if self.slope is None else self.slope[chosen]
         return Pair(self.measured[chosen], self.simulated[chosen], self.sigma[chosen], slope)
 
-    def noisier(self, random: np.random.Generator) -> Pair:
+    def noisier(self, random: np.random.Generator) -> "Pair":
         """Adds noise to the measured side."""
         noise = random.standard_normal(self.measured.shape) * np.nan_to_num(self.sigma)
         return self._replace(measured=self.measured + noise, added=True)

@@ -1,7 +1,5 @@
 """Interpolates the study's own response at the times or loads of the measured frames."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ residuals over sigma is the number of frames. Its knots gather where the motion 
 at the start of a drive. Frames in which a unit was not seen are bridged by it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax.numpy as jnp

@@ -1,7 +1,5 @@
 """Simulates a structure and imperfect copies of it under the measured motion."""
 
-from __future__ import annotations
-
 import logging
 from typing import NamedTuple
 

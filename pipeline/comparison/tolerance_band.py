@@ -6,8 +6,6 @@ two quantiles of theirs, taken at p (n + 1) (Weibull's), holds the next specimen
 probability, at each instant and for each unit by itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Runs stages that work in parts, and joins the parts."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path

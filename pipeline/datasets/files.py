@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 import psutil
@@ -18,8 +19,11 @@ from pipeline.runtime import UserError, write_atomically
 _CHUNK = bytes(1 << 20)
 _MOST = 1100
 """Bytes of data in a byte of a file: deflate makes nothing smaller than by 1032."""
+_REMEDY = "delete it and run the stage that makes it again"
 _UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError)
 """What xarray and its libraries raise for files that are not as they should be."""
+
+Loaded = TypeVar("Loaded")
 
 
 class SchemaError(ValueError):
@@ -64,12 +68,44 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
             has it.
     """
     path = Path(path)
-    remedy = "delete it and run the stage that makes it again"
+    remedy = _REMEDY
+    sealed, dataset = _opened(path, _loaded)
+    _check_origin(dataset, path, kind, remedy)
+    dataset = migrate(dataset, kind)
+    for fault in find_faults(dataset, kind):
+        raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
+    _check_kept(dataset.attrs, sealed, path)
+    return dataset
+
+
+def read_attributes(path: str | Path) -> Mapping[str, Any]:
+    """Reads the attributes of a dataset of any kind, its seal checked and its data left alone.
+
+    Raises:
+        UserError: missing, unreadable, or not what was written.
+    """
+
+    def attributes(path: Path) -> dict[str, Any]:
+        with xr.open_dataset(path, engine="netcdf4", decode_times=False) as opened:
+            return dict(opened.attrs)
+
+    sealed, found = _opened(Path(path), attributes)
+    _check_kept(found, sealed, Path(path))
+    return found
+
+
+def _opened(path: Path, load: Callable[[Path], Loaded]) -> tuple[seal.State, Loaded]:
+    """Checks the seal of a file and loads from it.
+
+    Raises:
+        UserError: missing, truncated, foreign or damaged.
+    """
+    remedy = _REMEDY
     try:
         sealed = seal.check_seal(path)
         if sealed == "broken":
             raise UserError("damaged: it is not what was written", file=path, remedy=remedy)
-        dataset = _loaded(path)
+        return sealed, load(path)
     except FileNotFoundError as error:
         remedy = "run the stage that makes it first"
         raise UserError("no such dataset", file=path, remedy=remedy) from error
@@ -77,18 +113,17 @@ def read(path: str | Path, kind: Kind) -> xr.Dataset:
         raise UserError("no permission to read it", file=path, remedy="check its mode") from error
     except _UNREADABLE as error:
         raise UserError("not a readable netCDF file", file=path, remedy=remedy) from error
-    _check_origin(dataset, path, kind, remedy)
-    dataset = migrate(dataset, kind)
-    for fault in find_faults(dataset, kind):
-        raise UserError(fault.what, file=path, key=fault.name, value=fault.value, remedy=remedy)
-    if dataset.attrs.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
+
+
+def _check_kept(attributes: dict[Any, Any], sealed: seal.State, path: Path) -> None:
+    """Takes the words about a seal off the attributes; refuses a file that has lost it."""
+    if attributes.pop(seal.ATTRIBUTE, None) is not None and sealed == "absent":
         raise UserError(
             "its seal is missing: it was cut off, or changed by other software",
             file=path,
             key=seal.ATTRIBUTE,
-            remedy=f"{remedy}; or remove this attribute, if the change was meant",
+            remedy=f"{_REMEDY}; or remove this attribute, if the change was meant",
         )
-    return dataset
 
 
 def _loaded(path: Path) -> xr.Dataset:

@@ -4,8 +4,6 @@ HDF5 ends where its own header says, and minds nothing that follows: any softwar
 file. One that was changed by other software has lost its seal.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 from pathlib import Path

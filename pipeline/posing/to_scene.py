@@ -24,7 +24,17 @@ from pipeline.problem.sections import (
 from pipeline.runtime import UserError
 from sim.constraints import Limits
 from sim.energy import activation_distance
-from sim.scene import Clamp, Design, Loads, Numerics, Objective, Scene, Structure
+from sim.scene import (
+    Clamp,
+    Design,
+    Loads,
+    Numerics,
+    Objective,
+    Scene,
+    SceneError,
+    Structure,
+    check_scene,
+)
 from sim.solvers import PrescribedMotion, loads
 from sim.structure import ContactModel, DistanceContact, Lattice, Material, VoidAngleContact
 
@@ -53,7 +63,7 @@ def scene_of(
         motions: drives to use in place of the problem's load cases.
 
     Raises:
-        UserError: the file of a measured drive cannot be read.
+        UserError: the file of a measured drive cannot be read, or the scene has no meaning.
     """
     made = motions_of(problem, folder) if motions is None else motions
     intact, altered = lattice_of(problem), altered_lattice_of(problem)
@@ -71,7 +81,7 @@ def scene_of(
         ),
         numerics=Numerics(problem.solver.accuracy, problem.solver.integrator),
     )
-    return replace(
+    posed = replace(
         scene,
         structure=Structure(altered, _stiffened(problem, altered, material), law),
         loads=_loads(problem, altered, made, weights),
@@ -86,6 +96,12 @@ def scene_of(
             symmetry=problem.optimiser.symmetry,
         ),
     )
+    try:
+        check_scene(posed)
+    except SceneError as error:
+        what, _, remedy = str(error).partition("; ")
+        raise UserError(what, key=error.key, remedy=remedy) from error
+    return posed
 
 
 def _loads(

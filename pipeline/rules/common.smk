@@ -16,6 +16,8 @@ wildcard_constraints:
 
 onstart:
     rule_inputs.check_room("results")
+    if not workflow.non_local_exec:
+        stage_server.start()
 
 
 # What was built, and the caches of compiled solvers and plots.

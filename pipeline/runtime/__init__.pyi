@@ -1,5 +1,6 @@
 from . import case_log as case_log
 from . import cli as cli
+from . import stage_server as stage_server
 from . import streams as streams
 from .atomic_write import write_atomically as write_atomically
 from .atomic_write import write_folder_atomically as write_folder_atomically
@@ -22,6 +23,7 @@ from .pixel_loops import Picture as Picture
 from .pixel_loops import compiled as compiled
 from .pixel_loops import inlined as inlined
 from .source_closure import source_hash as source_hash
+from .stage_server import delegate as delegate
 from .stage_table import REPORTED as REPORTED
 from .stage_table import STAGES as STAGES
 from .stage_table import Stage as Stage

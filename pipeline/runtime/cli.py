@@ -104,13 +104,16 @@ def _guarded(work: Work, args: argparse.Namespace) -> int:
         LOG.error("interrupted: run the same command again to finish")
         return 130
     except Exception as error:  # noqa: BLE001  (told, and kept in the log)
-        return _told(error, args.log)
+        return _told(error, args)
     return 0
 
 
-def _told(error: Exception, log: Path | None) -> int:
+def _told(error: Exception, args: argparse.Namespace) -> int:
     """Tells of an error in words, and returns the exit code."""
+    log: Path | None = args.log
     if isinstance(error, UserError):
+        if error.file is None and error.key is not None:
+            error.file = str(getattr(args, "problem", None) or "") or None
         LOG.error("error: %s", error)
         return 2
     if isinstance(error, OSError):

@@ -28,8 +28,9 @@ def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
     """Lists the files whose content decides what `python -m module` does, sorted.
 
     These are the modules reached by import statements, at any depth and inside functions too, the
-    packages that hold them, and the resources (templates, styles) in the folders of those packages.
-    A name that is imported from a lazy package leads to the module that its stub names.
+    packages that hold them, and the resources (templates, styles) in the folders of those packages;
+    one that bears the name of a module beside it goes with that module. A name that is imported
+    from a lazy package leads to the module that its stub names.
 
     Raises:
         ModuleNotFoundError: there is no such module below `root`.
@@ -38,8 +39,11 @@ def source_files(module: str, root: Path = ROOT) -> tuple[Path, ...]:
         raise ModuleNotFoundError(f"no module {module!r} below {root}", name=module)
     modules = import_closure([module], root)
     packages = {path.parent for path in modules.values() if path.name == "__init__.py"}
+    found = set(modules.values())
     resources = (file for package in packages for file in _resources(package))
-    return tuple(sorted({*modules.values(), *resources}))
+    module_of = {file: file.with_suffix(".py") for file in resources}
+    own = {file for file, module in module_of.items() if module in found or not module.exists()}
+    return tuple(sorted(found | own))
 
 
 def _digest(files: Iterable[Path], root: Path) -> str:

@@ -4,8 +4,23 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 _STANDARD_ERROR = 2
+
+
+@contextmanager
+def unread() -> Iterator[None]:
+    """Ends quietly where nobody reads on what is printed, as in `metacloak --help | head -1`."""
+    try:
+        try:
+            yield
+        finally:
+            if sys.stdout is not None:
+                sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def complete() -> None:

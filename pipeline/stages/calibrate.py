@@ -1,7 +1,5 @@
 """Stage: finds the constants of a specimen from measurements, with their errors."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 from pathlib import Path

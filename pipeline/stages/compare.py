@@ -1,7 +1,5 @@
 """Stage: lays a recording beside the simulation of what it shows, and measures how far they are."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import logging

@@ -1,7 +1,5 @@
 """Stage: writes what a lab cuts, prints and assembles of one structure of a design."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import shutil

@@ -143,6 +143,7 @@ def _described(
     return {
         "title": asked.title or None,
         "video": video.name,
+        "sha256": datasets.file_hash(video),
         "design": os.path.relpath(design.resolve(), video.resolve().parent),
         "structure": asked.structure,
         "case": asked.case,

@@ -1,7 +1,5 @@
 """Stage: imperfect copies of the shipped design, simulated in parts that are then joined."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 

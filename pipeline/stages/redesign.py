@@ -1,7 +1,5 @@
 """Stage: a design by the angle law under contact on distance, optimised again if that matters."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 

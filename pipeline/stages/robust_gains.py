@@ -1,7 +1,5 @@
 """Stage: what the presets that ask for more than a study's own drive gain over its own design."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Mapping
 from pathlib import Path

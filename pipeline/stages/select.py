@@ -61,6 +61,6 @@ def join(designs: dict[str, xr.Dataset], best: str) -> xr.Dataset:
     methods = xr.DataArray(list(designs), dims="method", name="method")
     parts = [design[history] for design in designs.values()]
     whole = xr.concat(parts, dim=methods, join="outer", fill_value={"accepted": 0})
-    joined = designs[best].drop_vars(["evaluation", *history]).merge(whole)
+    joined = designs[best].drop_vars(["evaluation", *history]).merge(whole, compat="no_conflicts")
     joined.attrs = {"shipped_method": best}
     return joined

@@ -1,7 +1,5 @@
 """Stage: simulates the intact, altered and cloaked structures of a design, with error estimates."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stage: small vibrations of a design's structures, and waves in the unit cell of its lattice."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Stage: the losses of a design and of the altered structure over a sweep, in parts then joined."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import logging

@@ -163,7 +163,16 @@ def _sources(asked: Recording, path: Path, study: Path | None) -> tuple[Path, Pa
     if asked.video is None:
         remedy = "render it first (python -m pipeline film) and track the YAML beside it"
         raise UserError("a recording without a video", file=path, key="virtual", remedy=remedy)
-    return path.parent / asked.video, _design(asked.design, path, study)
+    video = path.parent / asked.video
+    if asked.sha256 is not None and video.is_file() and datasets.file_hash(video) != asked.sha256:
+        raise UserError(
+            f"damaged: {asked.video} is not the video that was described",
+            file=path,
+            key="sha256",
+            value=asked.sha256,
+            remedy="copy or render it again, or remove this key if the change was meant",
+        )
+    return video, _design(asked.design, path, study)
 
 
 def _design(named: str | None, path: Path, study: Path | None) -> Path:

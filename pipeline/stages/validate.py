@@ -1,7 +1,5 @@
 """Stage: predicts a measured test from tests of other samples; measures load cycles."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 

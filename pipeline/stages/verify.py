@@ -1,7 +1,5 @@
 """Stage: a design under finer steps of load or time, and other contact, beside those of the run."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 from pathlib import Path

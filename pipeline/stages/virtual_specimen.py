@@ -1,7 +1,5 @@
 """Stage: simulates the specimen of a virtual recording, off its design as those of labs are."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses the camera of the virtual lab before the specimen's plane."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

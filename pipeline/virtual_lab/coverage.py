@@ -5,8 +5,6 @@ its running sum along the rows is the picture. It is linear, so polygons that li
 carry the difference of their shades, and all go into one buffer.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Draws marks on the faces of the units: dots, speckle, or nothing."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

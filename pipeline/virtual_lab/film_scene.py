@@ -5,8 +5,6 @@ before these the faces; on the faces the marks. Each lies within the one before 
 coverages with the differences of the shades add up to the picture.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Samples a response at the instants that a video, and its load cell, show."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

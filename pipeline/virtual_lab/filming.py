@@ -1,7 +1,5 @@
 """Films a response: frames from shades to bytes, and the exact truth of what they show."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

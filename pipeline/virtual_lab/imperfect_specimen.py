@@ -1,7 +1,5 @@
 """Draws specimens as a lab has them: off their design, and driven as shakers drive."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Predicts the noise of a planned set-up: short clips are rendered, tracked, and compared."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from pathlib import Path

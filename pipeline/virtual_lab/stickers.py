@@ -1,7 +1,5 @@
 """Draws faces of the units at true size, to cut out and stick on: dots or speckle, with ids."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal

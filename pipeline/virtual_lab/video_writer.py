@@ -1,7 +1,5 @@
 """Writes frames as a video: the same frames give the same bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Makes a study of one's own: a commented problem file that builds as it is."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import re

@@ -1,7 +1,5 @@
 """Writes the JSON schema of problem files, for editors that complete and check."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

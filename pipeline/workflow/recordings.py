@@ -4,8 +4,6 @@ A recording is a file experiments/STUDY/recordings/NAME.yaml. It names a video b
 how the virtual lab films the study's own response.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from snakemake.iocontainers import Wildcards

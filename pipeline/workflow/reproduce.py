@@ -3,8 +3,6 @@
 Both builds have a results folder of their own in a temporary place, and these sources.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import subprocess

@@ -19,7 +19,16 @@ from pipeline.problem import Problem, outputs, section_hash
 from pipeline.problem.sections import group_count
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow.recordings import shown_recordings
-from pipeline.workflow.studies import Study, asked_for, check_names, problem_of, studies, together
+from pipeline.workflow.studies import (
+    Study,
+    asked_for,
+    check_calibrations,
+    check_names,
+    check_targets,
+    problem_of,
+    studies,
+    together,
+)
 
 ROOM = 64 << 20  # bytes, somewhat more than a study takes
 
@@ -87,6 +96,9 @@ def check_problems(words: Collection[str]) -> None:
     Snakemake would only find no rule to make its files, and count those that exist as up to date.
     """
     try:
+        check_targets()
+        if any("calibrat" in word for word in words):
+            check_calibrations()
         for study in asked_for(words) or studies()[:1]:
             check_names(study)
             problem_of(study)

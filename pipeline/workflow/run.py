@@ -5,8 +5,6 @@ cleared first, unless another snakemake is at work here; snakemake itself then c
 incomplete.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

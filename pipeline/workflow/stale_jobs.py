@@ -1,7 +1,5 @@
 """Cancels jobs that a killed run left on a SLURM cluster: they would write into the next one."""
 
-from __future__ import annotations
-
 import subprocess
 import time
 from pathlib import Path

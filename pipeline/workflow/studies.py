@@ -14,7 +14,7 @@ from pathlib import Path
 from pipeline.problem import Problem
 from pipeline.problem.reading import joint_figure, load, overlay_keys, preset_names, yaml_file
 from pipeline.problem.sections import design_count, design_name
-from pipeline.runtime import WORK, UserError
+from pipeline.runtime import ROOT, WORK, UserError
 from pipeline.workflow.recordings import RECORDINGS
 
 PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", RECORDINGS)
@@ -161,13 +161,70 @@ def check_names(study: Study, root: Path = WORK) -> None:
         *(("a recording", path.stem, path) for path in recordings),
     ]
     for what, name, path in named:
-        if not re.fullmatch(r"\w+", name):
-            raise UserError(
-                f"the name of {what} may have letters, digits and underscores only",
-                file=path.relative_to(root),
-                value=name,
-                remedy=f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}",
-            )
+        _check_name(what, name, path, root)
+
+
+def _check_name(what: str, name: str, path: Path, root: Path) -> None:
+    if not re.fullmatch(r"\w+", name):
+        raise UserError(
+            f"the name of {what} may have letters, digits and underscores only",
+            file=path.relative_to(root),
+            value=name,
+            remedy=f"name it {re.sub(r'[^0-9A-Za-z]+', '_', name).strip('_') or 'mine'}",
+        )
+
+
+def check_targets(root: Path = WORK) -> None:
+    """Refuses studies and presets whose targets are those of others, of rules, or of products.
+
+    Raises:
+        UserError: of all of them, the first with its file, key and remedy.
+    """
+    owners = dict.fromkeys(_rule_names(), "a rule of the workflow")
+    named = [*studies(root), *(Study.parse(name) for name in joints(root))]
+    faults = []
+    for study in sorted(named, key=lambda each: (each.preset, each.name)):
+        for target in [f"{name}{end}" for name in study.targets for end in ("", *PRODUCTS)]:
+            if owners.setdefault(target, f"the study {study}") != f"the study {study}":
+                faults.append((study, target, owners[target]))
+                break
+    if not faults:
+        return
+    (study, target, owner), *others = faults
+    preset = study.preset.partition(".")[0]
+    also = ", ".join(str(each) for each, *_ in others)
+    raise UserError(
+        f"the target {target} would be both of {study} and of {owner}",
+        file=_definition(study, root),
+        key=f"presets.{preset}" if preset else None,
+        value=preset or study.name,
+        remedy=f"rename {'the preset' if preset else 'its folder'}"
+        + (f"; and likewise of: {also}" if also else ""),
+    )
+
+
+def _definition(study: Study, root: Path) -> Path:
+    """Finds the file that a study, or a figure of several, is described in."""
+    path = root / study.problem
+    return (path if path.exists() else path.with_name("figure.yaml")).relative_to(root)
+
+
+@cache
+def _rule_names() -> tuple[str, ...]:
+    """Lists the names of the rules, and of the folders of results that are no study's."""
+    text = "".join(path.read_text() for path in sorted((ROOT / "pipeline/rules").glob("*.smk")))
+    found = re.findall(r"^rule (\w+):|\bresults/(\w+)/", text, flags=re.MULTILINE)
+    return tuple(sorted({rule or folder for rule, folder in found}))
+
+
+def check_calibrations(root: Path = WORK) -> None:
+    """Refuses calibrations whose names cannot be those of folders of results.
+
+    Raises:
+        UserError: one has more than letters, digits and underscores.
+    """
+    for path in sorted((root / "experiments/calibration").glob("*.yaml")):
+        _check_name("a calibration", path.stem, path, root)
 
 
 @cache

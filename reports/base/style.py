@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, ListedColormap, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from sim.core import Floats
 
@@ -30,48 +31,10 @@ STRUCTURE_COLOURS = {"intact": INTACT, "reference": INTACT, "altered": ALTERED, 
 METHOD_COLOURS = {"sqp": CLOAKED, "mma": "#1d7f78"}
 GREY, PALE = "#6b6f75", "#d4d7db"
 
-TEXT, SMALL, TITLE, PANEL = 7.0, 6.0, 7.5, 9.0
+RC = mpl.rc_params_from_file(Path(__file__).with_name("paper.mplstyle"), use_default_template=False)
+TEXT, SMALL, TITLE = RC["font.size"], RC["legend.fontsize"], RC["axes.titlesize"]
+PANEL = 9.0
 """Font sizes in points: labels, ticks and notes, titles, panel letters."""
-
-RC: dict[Any, Any] = {
-    "font.family": ["DejaVu Sans"],
-    "mathtext.fontset": "dejavusans",
-    "font.size": TEXT,
-    "axes.titlesize": TITLE,
-    "axes.labelsize": TEXT,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.fontsize": SMALL,
-    "axes.linewidth": 0.5,
-    "axes.labelpad": 2.0,
-    "axes.edgecolor": INTACT,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.major.width": 0.5,
-    "ytick.major.width": 0.5,
-    "xtick.minor.width": 0.35,
-    "ytick.minor.width": 0.35,
-    "xtick.major.size": 2.2,
-    "ytick.major.size": 2.2,
-    "xtick.minor.size": 1.3,
-    "ytick.minor.size": 1.3,
-    "xtick.major.pad": 1.8,
-    "ytick.major.pad": 1.8,
-    "lines.linewidth": 1.0,
-    "lines.solid_capstyle": "round",
-    "patch.linewidth": 0.4,
-    "hatch.linewidth": 0.4,
-    "legend.frameon": False,
-    "legend.handlelength": 1.6,
-    "legend.handletextpad": 0.5,
-    "legend.borderaxespad": 0.2,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
-    "pdf.fonttype": 42,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "metacloak",
-    "path.simplify": False,
-}
 
 _METADATA: dict[str, dict[str, str | None]] = {
     "pdf": {"Creator": "metacloak", "Producer": None, "CreationDate": None},
@@ -167,6 +130,29 @@ def write(figure: Figure, left: float, top: float, text: str, **style: str | flo
     settings: dict[str, Any] = {"ha": "left", "va": "top"} | style
     x, y = left / (inches_wide * MM_PER_INCH), 1 - top / (inches_high * MM_PER_INCH)
     figure.text(x, y, text, **settings)
+
+
+def literal(text: str) -> str:
+    """Returns the words of a user as they stand: a dollar begins no formula."""
+    return text.replace("$", r"\$")
+
+
+def write_upwards(figure: Figure, left: float, top: float, text: str, **style: str | float) -> None:
+    """Writes text that runs upwards; `left`, `top` mm are the middle of its right side."""
+    settings: dict[str, Any] = {"ha": "right", "va": "center", "multialignment": "center"}
+    write(figure, left, top, text, **(settings | {"rotation": 90, "fontsize": TEXT} | style))
+
+
+def note(
+    axes: Axes,
+    at: tuple[float, float],
+    text: str,
+    shift: tuple[float, float] = (0, 1.5),
+    **style: str | float | tuple[str, str],
+) -> Annotation:
+    """Writes a small text beside a point, `shift` points from it."""
+    settings: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": SMALL} | style
+    return axes.annotate(text, at, xytext=shift, textcoords="offset points", **settings)
 
 
 def letter(figure: Figure, left: float, top: float, name: str, title: str = "") -> None:

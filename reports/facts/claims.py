@@ -3,8 +3,6 @@
 reports/facts/claims.yaml lists them; everything but the paper's value is computed here.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

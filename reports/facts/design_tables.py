@@ -1,7 +1,5 @@
 """Tabulates designs and their optimisation."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """States facts: numbers of a report beside those that the paper quotes, and their origin."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Reduces the datasets of a study to numbers: reductions, peak-to-peak values, symmetry."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 import xarray as xr

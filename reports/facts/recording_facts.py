@@ -1,7 +1,5 @@
 """Describes the numbers of recordings beside their simulation, the same for every study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Chooses the report of a study, by what its problem asks for and not by its name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

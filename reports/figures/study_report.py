@@ -1,7 +1,5 @@
 """Makes the report of a study: figure, page, facts and data tables."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import get_args

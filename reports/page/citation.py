@@ -1,7 +1,5 @@
 """Tells how to cite this software, in words and as BibTeX, from CITATION.cff."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache

@@ -1,7 +1,5 @@
 """Lays out a page of one figure with its tables, for products of a study beside its report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -15,6 +15,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from pipeline.datasets import file_hash
 from pipeline.runtime import refusal, write_atomically
 from reports.base import Table, style
 from reports.facts import Fact, fact_records
@@ -72,21 +73,23 @@ def _write(report: Report, folder: Path) -> list[Path]:
         with style.styled():
             drawn[name] = style.save(draw(), folder / name)
     written = [path for paths in drawn.values() for path in paths]
+    seal = ""
     if report.facts:
         fact_records.write_json(report.facts, folder / "facts.json")
         written.append(folder / "facts.json")
+        seal = file_hash(folder / "facts.json")
     for table in report.tables:
         (folder / table.name).write_bytes(table.csv)
         written.append(folder / table.name)
     if report.template:
         page = folder / "index.html"
-        page.write_text(rendered(report, drawn), encoding="utf-8", newline="\n")
+        page.write_text(rendered(report, drawn, seal), encoding="utf-8", newline="\n")
         written.append(page)
     return written
 
 
-def rendered(report: Report, drawn: Mapping[str, Sequence[Path]]) -> str:
-    """Returns the HTML of a report, whose figures lie in the files `drawn`."""
+def rendered(report: Report, drawn: Mapping[str, Sequence[Path]], facts_sha256: str = "") -> str:
+    """Returns the HTML of a report, whose figures lie in the files `drawn`; it seals its facts."""
     svgs = {
         name: templating.inlined(path.read_text(encoding="utf-8"))
         for name, paths in drawn.items()
@@ -100,6 +103,7 @@ def rendered(report: Report, drawn: Mapping[str, Sequence[Path]]) -> str:
         "svg": svgs.get(first, ""),
         "drawn": files,
         "files": files.get(first, []),
+        "facts_sha256": facts_sha256,
     }
     return templating.rendered(report.template, {"tables": report.tables, **shown, **report.values})
 

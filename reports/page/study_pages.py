@@ -115,6 +115,7 @@ def study_page(
         "problem": _json(asked or problems),
         "skipped": list(dict.fromkeys(line for study in several for line in _skipped(study))),
         "draft": draft,
+        "warnings": list(dict.fromkeys(line for study in several for line in _warnings(study))),
         "recordings": recordings,
         "synthetic": LABEL if any(each.synthetic for each in recordings) else "",
         "claims": judged,
@@ -156,6 +157,12 @@ def _skipped(study: StudyResults) -> list[str]:
         text if len(found) == len(plans) else f"{text} ({', '.join(found)})"
         for text, found in names.items()
     ]
+
+
+def _warnings(study: StudyResults) -> list[str]:
+    """Lists what may not be meant in the structures that were simulated, each once."""
+    plans = json.loads(study.response.attrs["plan"]).values()
+    return list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
 
 
 def sources(study: StudyResults, label: str = "") -> Iterator[Source]:

@@ -1,7 +1,5 @@
 """Renders HTML from templates; text is escaped, what is not given is an error."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -18,7 +18,13 @@ from .animation_parts import with_recordings as with_recordings
 from .convergence import loss_history as loss_history
 from .panel_figure import Panel as Panel
 from .panel_figure import PanelFigure as PanelFigure
+from .structure_drawing import CLAMP_TINT as CLAMP_TINT
+from .structure_drawing import CLOAK_TINT as CLOAK_TINT
+from .structure_drawing import arrow as arrow
+from .structure_drawing import colour_bar as colour_bar
 from .structure_drawing import draw as draw
 from .structure_drawing import draw_clamps as draw_clamps
 from .structure_drawing import drive_arrows as drive_arrows
 from .structure_drawing import outline as outline
+from .structure_drawing import point as point
+from .structure_drawing import tints as tints

@@ -27,8 +27,6 @@ size, and knows nothing of what moves them. Its data is one JSON object:
 Arrays are base64 of little-endian float32, int32, int16 or uint8, decoded without a library.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Builds parts of an animation from responses: clips of structures, colour fields, axes."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draws the loss against the evaluation of the design, for every method, as a panel of a figure."""
 
-from __future__ import annotations
-
 import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
@@ -46,15 +44,7 @@ def _history(axes: Axes, history: xr.Dataset, colour: str, name: str) -> None:
     at, best = int(history["best_evaluation"]), float(history["best_loss"])
     axes.plot(at, best, "o", ms=3.6, mfc="white", mec=colour, mew=1.0, zorder=6)
     aside = at < loss.size / 2  # where another method's curve may run below
-    label = axes.annotate(
-        f"{best:.3f}",
-        (at, best),
-        xytext=(3, 2) if aside else (0, -4.5),
-        textcoords="offset points",
-        ha="left" if aside else "right",
-        va="bottom" if aside else "top",
-        fontsize=style.SMALL,
-        color=colour,
-        zorder=7,
-    )
+    side = {"ha": "left", "va": "bottom"} if aside else {"ha": "right", "va": "top"}
+    shift = (3, 2) if aside else (0, -4.5)
+    label = style.note(axes, (at, best), f"{best:.3f}", shift, color=colour, zorder=7, **side)
     label.set_path_effects([effects.withStroke(linewidth=1.5, foreground="white")])

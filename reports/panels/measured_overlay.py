@@ -3,8 +3,6 @@
 Measured curves are dashed with markers, simulated ones continuous, prediction bands behind both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Composes a figure of lettered panels, each with its sentence of the caption and its tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,20 +1,36 @@
 """Draws structures: units, clamps, outlines and arrows of the drive."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal
 
 import matplotlib.patheffects as effects
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from reports.base import GREY, INTACT, PALE
+from reports.base import GREY, INTACT, PALE, style
 from reports.study import CLAMPED, RigidUnits, deformed
 from sim.core import Floats
+
+CLOAK_TINT, CLAMP_TINT = "#c9b3e0", "#4a4d52"
+
+
+def tints(
+    structure: RigidUnits,
+    of_support: Mapping[int, str],
+    of_region: Mapping[int, str],
+    others: str | Sequence[str],
+) -> list[str]:
+    """Chooses the colours of units by their support, else by their region; of the `others` too."""
+    rest = [others] * structure.n_units if isinstance(others, str) else others
+    units = zip(structure.support, structure.region, rest, strict=True)
+    return [of_support.get(held) or of_region.get(region, other) for held, region, other in units]
 
 
 def draw(
@@ -59,37 +75,52 @@ def frame(axes: Axes, structure: RigidUnits, margin: float) -> None:
     axes.set_axis_off()
 
 
+def colour_bar(
+    figure: Figure,
+    norm: Normalize,
+    colours: Colormap,
+    place: tuple[float, float, float],
+    label: str,
+    extend: Literal["neither", "max"] = "neither",
+) -> Colorbar:
+    """Draws a bar of colours in the middle of `place`: mm from the left and the top, and height."""
+    left, top, height = place
+    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
+    made = figure.colorbar(ScalarMappable(norm, colours), cax=bar, extend=extend)
+    made.set_label(label, labelpad=1.5)
+    bar.tick_params(length=1.5)
+    return made
+
+
 def draw_clamps(axes: Axes, structure: RigidUnits, pad: float) -> None:
     """Draws hatched pad of `pad` mm under every clamped unit."""
     for x, y in structure.centroid[structure.support == CLAMPED]:
-        axes.add_patch(
-            Rectangle(
-                (x - pad / 2, y - pad / 2),
-                pad,
-                pad,
-                facecolor="white",
-                edgecolor=INTACT,
-                hatch="/" * 6,
-                linewidth=0.4,
-                zorder=1,
-            )
-        )
+        look: dict[str, Any] = {"facecolor": "white", "edgecolor": INTACT, "hatch": "/" * 6}
+        corner = (x - pad / 2, y - pad / 2)
+        axes.add_patch(Rectangle(corner, pad, pad, linewidth=0.4, zorder=1, **look))
 
 
 def outline(axes: Axes, centre: Floats, radii: Iterable[float], colour: str) -> None:
     """Draws dashed circles (mm) around a region."""
+    look: dict[str, Any] = {"linestyle": (0, (3.0, 1.6)), "linewidth": 0.8, "edgecolor": colour}
     for radius in radii:
-        axes.add_patch(
-            Circle(
-                (float(centre[0]), float(centre[1])),
-                radius,
-                fill=False,
-                edgecolor=colour,
-                linewidth=0.8,
-                linestyle=(0, (3.0, 1.6)),
-                zorder=5,
-            )
-        )
+        axes.add_patch(Circle(point(centre), radius, fill=False, zorder=5, **look))
+
+
+def point(place: Floats) -> tuple[float, float]:
+    """Returns a place (2,) as patches take it."""
+    return float(place[0]), float(place[1])
+
+
+def arrow(
+    axes: Axes, start: Floats, end: Floats, colour: str, head: float = 6.0, **look: float
+) -> FancyArrowPatch:
+    """Draws a solid arrow between two places (2,), its `head` in points."""
+    settings: dict[str, Any] = {"linewidth": 1.3, "shrinkA": 0, "shrinkB": 0, "color": colour}
+    settings |= {"arrowstyle": "-|>", "mutation_scale": head}
+    made = FancyArrowPatch(point(start), point(end), **settings | look)
+    axes.add_patch(made)
+    return made
 
 
 def drive_arrows(
@@ -99,16 +130,5 @@ def drive_arrows(
     along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
     for sign in (1.0, -1.0):
         start, end = (centre + sign * distance * along for distance in reach)
-        arrow = FancyArrowPatch(
-            (float(start[0]), float(start[1])),
-            (float(end[0]), float(end[1])),
-            arrowstyle="-|>",
-            mutation_scale=7.0,
-            shrinkA=0,
-            shrinkB=0,
-            linewidth=1.5,
-            color=colour,
-            zorder=7,
-        )
-        arrow.set_path_effects([effects.withStroke(linewidth=3.0, foreground="white")])
-        axes.add_patch(arrow)
+        made = arrow(axes, start, end, colour, 7.0, linewidth=1.5, zorder=7)
+        made.set_path_effects([effects.withStroke(linewidth=3.0, foreground="white")])

@@ -1,8 +1,7 @@
 """Draws a calibration: every set with its fit and residuals, then the constants."""
 
-from __future__ import annotations
-
 import argparse
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -65,30 +64,20 @@ def _set(drawn: Figure, made: xr.Dataset, number: int, corner: tuple[float, floa
     x = chosen["abscissa"].values
     axes = style.place(drawn, *corner, _WIDE, _HIGH)
     few = len(x) <= 100
-    axes.plot(
-        x,
-        factor * chosen["measured"].values,
-        ".",
-        color=style.GREY,
-        markersize=3.0 if few else 1.2,
-        markeredgewidth=0,
-        label="measured",
-    )
+    values, size = factor * chosen["measured"].values, 3.0 if few else 1.2
+    dots: dict[str, Any] = {"color": style.GREY, "markeredgewidth": 0}
+    axes.plot(x, values, ".", markersize=size, label="measured", **dots)
+    fitted, width = factor * chosen["fitted"].values, 0.9 if few else 0.5
     for course in np.unique(channel := chosen["channel"].values):
-        axes.plot(
-            x[channel == course],
-            factor * chosen["fitted"].values[channel == course],
-            color=style.CLOAKED,
-            linewidth=0.9 if few else 0.5,
-            label="fit" if course == channel[0] else None,
-        )
+        mine, name = channel == course, "fit" if course == channel[0] else None
+        axes.plot(x[mine], fitted[mine], color=style.CLOAKED, linewidth=width, label=name)
     axes.set(ylabel=label, xticklabels=[])
     if number == 0:
         axes.legend(loc="upper left")
     below = style.place(drawn, corner[0], corner[1] + _HIGH + 3.0, _WIDE, _REST)
     below.axhspan(-2, 2, color=style.PALE, linewidth=0)
     rest = chosen["residual"].values
-    below.plot(x, rest, ".", color=style.GREY, markersize=2.0 if few else 1.0, markeredgewidth=0)
+    below.plot(x, rest, ".", markersize=2.0 if few else 1.0, **dots)
     most = max(4.0, float(np.abs(rest).max()) * 1.05)
     below.set(xlabel=along, ylabel="residual/σ", ylim=(-most, most), xlim=axes.get_xlim())
 

@@ -1,7 +1,5 @@
 """Draws what robust presets gain: losses of the altered structure and of both designs."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np
@@ -11,15 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from pipeline import datasets, problem
-from reports.base import Table, style
+from reports.base import Table, prose, style
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 
-_CAPTION = (
-    "(a) Loss under all loads and imperfect copies that a preset asks for: of the altered"
-    " structure, of the study's own design, and of the preset's. The copies are others than those"
-    " that the design was made with. (b) How the loss changes from the study's own design to the"
-    " preset's, under what the preset asks for, and under the study's own drive: the price."
-)
+_PROSE = prose(__file__)
 _COLUMNS = (
     "preset", "asks for", "loads", "copies", "loss of the study's own design",
     "loss of the preset's design", "gain", "loss under the study's own drive",
@@ -36,12 +29,9 @@ def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
     data = datasets.read(args.gains, "gains")
     columns = {str(name): data[name].values for name in data.variables if data[name].dims}
-    lead = (
-        "Designs that hold against more than the study's own drive, and what each gains over"
-        f" the study's own design, whose loss is {float(data['loss_drive']):.4g}."
-    )
+    lead = _PROSE["lead"].format(loss=float(data["loss_drive"]))
     title = titled(problem.load(args.problem), args.problem)
-    text = FigureText(title, "designs that hold against more", lead, _CAPTION)
+    text = FigureText(title, _PROSE["subject"], lead, _PROSE["caption"])
     tables = [Table("gains.csv", "losses of every preset", columns)]
     rows = [_row(data.sel(preset=name)) for name in data["preset"].values]
     shown = PageTable(_COLUMNS, rows)

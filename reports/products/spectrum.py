@@ -1,7 +1,5 @@
 """Draws a spectrum: lowest modes, transmission of the drive, bands of the unit cell."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np
@@ -13,27 +11,12 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from pipeline import datasets, problem
 from pipeline.problem import Problem
-from reports.base import Table, style
+from reports.base import Table, prose, style
 from reports.page import FigureText, figure_page, publish, titled
 from reports.panels import draw
 from reports.study import from_dataset, study_results
 
-_LEAD = (
-    "Small vibrations of the structures about their equilibria, and waves in the unit cell of the"
-    " lattice."
-)
-_CAPTION = (
-    "(a) Lowest modes, exaggerated and coloured by their motion; frequencies without damping."
-    " (b) Steady motion under a small harmonic motion of the driven units, with damping; the mean"
-    " over the load cases where there are several. (c) Waves round the triangle of the Brillouin"
-    " zone, without damping, about the lattice at rest and compressed along x with the stress"
-    " across relieved."
-)
-_TABLES = {
-    "transmission": "Motion of the region of interest per motion of the drive (rms)",
-    "frequency": "Eigenfrequencies (Hz), undamped",
-    "band_frequency": "Frequencies of waves in the unit cell (Hz)",
-}
+_PROSE = prose(__file__)
 _FILES = ("transmission.csv", "modes.csv", "bands.csv")
 MODES = 4
 """Modes of each structure that are drawn, the lowest ones."""
@@ -51,10 +34,12 @@ def report(args: argparse.Namespace) -> None:
     asked = problem.load(args.problem, args.preset)
     data = datasets.read(args.spectrum, "spectrum")
     study_results.check_problem(asked, "spectrum", data, args.spectrum)
-    text = FigureText(titled(asked, args.problem), "small vibrations", _LEAD, _CAPTION)
+    text = FigureText(
+        titled(asked, args.problem), "small vibrations", _PROSE["lead"], _PROSE["caption"]
+    )
     tables = [
         Table(file, words, _columns(data[name]))
-        for file, (name, words) in zip(_FILES, _TABLES.items(), strict=True)
+        for file, (name, words) in zip(_FILES, _PROSE["tables"].items(), strict=True)
     ]
     made = figure_page("spectrum", text, lambda: draw_spectrum(data, asked), tables, data)
     publish(made, args.out_dir)
@@ -98,17 +83,10 @@ def draw_spectrum(data: xr.Dataset, asked: Problem) -> Figure:
 def _mode(axes: Axes, data: xr.Dataset, mode: int, spacing: float) -> None:
     structure = from_dataset(data, spacing)
     motion = data["mode_shape"].isel(mode=mode).transpose("unit", "dof").values
-    size = np.linalg.norm(motion[:, :2], axis=1)
+    size, reach = np.linalg.norm(motion[:, :2], axis=1), SHOWN * spacing
     base = np.nan_to_num(data["equilibrium"].transpose("unit", "dof").values)
-    draw(
-        axes,
-        structure,
-        base + SHOWN * spacing * np.nan_to_num(motion),
-        values=size,
-        colour_map=style.MAGNITUDE,
-        norm=None,
-        margin=SHOWN * spacing,
-    )
+    moved = base + reach * np.nan_to_num(motion)
+    draw(axes, structure, moved, values=size, colour_map=style.MAGNITUDE, margin=reach)
     axes.set_title(f"{data['frequency'].values[mode]:.1f} Hz", pad=1.5, fontsize=style.SMALL)
 
 
@@ -124,10 +102,9 @@ def _transmission(axes: Axes, data: xr.Dataset, asked: Problem) -> None:
             )  # fmt: skip
     if asked.frequency is not None and excited[0] <= asked.frequency <= excited[-1]:
         axes.axvline(asked.frequency, color=style.GREY, linewidth=0.6, linestyle=":")
-        axes.annotate(
-            "drive", (asked.frequency, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -7),
-            textcoords="offset points", color=style.GREY, fontsize=style.SMALL,
-        )  # fmt: skip
+        across, at = ("data", "axes fraction"), (asked.frequency, 1.0)
+        look = {"ha": "left", "va": "baseline", "color": style.GREY}
+        style.note(axes, at, "drive", (2, -7), xycoords=across, **look)
     axes.set(
         xlabel="frequency (Hz)",
         ylabel="rms |u| / amplitude of the drive",

@@ -1,7 +1,5 @@
 """Tells the counts of the stress suite: one page, and its table as CSV."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Tells why a report shows a draft and not the study itself."""
 
-from __future__ import annotations
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -40,16 +40,5 @@ def _sizes(problem: Problem) -> dict[str, float]:
 
 def mark(figure: Figure) -> None:
     """Says across the page that this is not the study itself."""
-    figure.text(
-        0.5,
-        0.5,
-        "DRAFT",
-        fontsize=110,
-        fontweight="bold",
-        color=ALTERED,
-        alpha=0.16,
-        rotation=45,
-        ha="center",
-        va="center",
-        zorder=100,
-    )
+    pale: dict[str, Any] = {"color": ALTERED, "alpha": 0.16, "fontsize": 110, "fontweight": "bold"}
+    figure.text(0.5, 0.5, "DRAFT", rotation=45, ha="center", va="center", zorder=100, **pale)

@@ -1,7 +1,5 @@
 """Holds recordings of a study beside its simulation, along the same course: time, or the load."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Tells what the figures need to know of a problem, in their own units: mm, s, Hz and degrees."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

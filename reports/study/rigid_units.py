@@ -4,8 +4,6 @@ A unit moves as a rigid body: vertex = centroid + u + R(theta) (vertex - centroi
 PolyCollection and ligaments one broken line, so that a figure of a dozen structures stays small.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

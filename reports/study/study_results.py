@@ -1,7 +1,5 @@
 """Describes a study as a report sees it: its problem and the datasets that its stages made."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -67,7 +67,7 @@ def _imported(path: Path, module: str, root: Path) -> tuple[str, ...]:
 
 def _names(path: Path, package: str) -> Iterator[tuple[str, str]]:
     """Walks over the import statements of a file: what is imported from, and the name if any."""
-    for node in ast.walk(ast.parse(path.read_bytes(), filename=str(path))):
+    for node in _statements(ast.parse(path.read_bytes(), filename=str(path))):
         if isinstance(node, ast.Import):
             yield from ((alias.name.removeprefix(_INSTALLED), "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -75,6 +75,15 @@ def _names(path: Path, package: str) -> Iterator[tuple[str, str]]:
             above = parts[: len(parts) + 1 - node.level] if node.level else []
             base = ".".join([*above, *filter(None, [node.module])])
             yield from ((base.removeprefix(_INSTALLED), alias.name) for alias in node.names)
+
+
+def _statements(block: ast.AST) -> Iterator[ast.AST]:
+    """Walks over a block's statements at any depth; expressions, which hold no import, are left."""
+    for field in ("body", "orelse", "handlers", "finalbody", "cases"):
+        for statement in getattr(block, field, ()):
+            yield statement
+            if not isinstance(statement, ast.Expr | ast.Assign | ast.Return):
+                yield from _statements(statement)
 
 
 def _defined_in(package: str, name: str, root: Path) -> list[str]:

@@ -29,4 +29,6 @@ from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
+from .soundness import SceneError as SceneError
+from .soundness import check_scene as check_scene
 from .warm_starts import Paths as Paths

@@ -22,7 +22,7 @@ from sim.scene.plan import Plan, make_plan
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking, parameters_of_design
 from sim.scene.warm_starts import Paths
-from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, solve_cases
+from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
 from sim.structure import Parameters
 
 CONFIRMING = 4
@@ -50,13 +50,18 @@ class GradientChain:
         of_design: differentiable map of a design vector to parameters.
         measure: value and further numbers of displacements (n_cases, n_times, n_units, 3),
             parameters, and what a call passes besides.
+        designed: whether ``of_design`` is that of a scene: what its adjoint need not compute is
+            then skipped.
     """
 
     def __init__(
         self,
         of_design: Callable[[Array], Parameters[Array]],
         measure: Callable[..., tuple[Array, Any]],
+        *,
+        designed: bool = False,
     ) -> None:
+        self._designed = designed
         self._parameters = jax.jit(of_design)
         self._measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
         self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
@@ -82,6 +87,7 @@ class GradientChain:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
         made = self._parameters(design)
+        solver = solver if self._designed else everywhere(solver)
         motion, velocity, records = solve_cases(
             solver, concrete(made), cases, _started(solver, memory)
         )
@@ -132,7 +138,9 @@ class Evaluator:
         self._cases = tuple(scene.loads.cases[case] for case in simulated)
         self._memory = memory if copies is None else None
         numbers = [None] if copies is None else range(len(copies))
-        self._chains = [GradientChain(parameters_of_design(scene, k), mean) for k in numbers]
+        self._chains = [
+            GradientChain(parameters_of_design(scene, k), mean, designed=True) for k in numbers
+        ]
 
     def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
         """Loss, gradient (n_variables,) in 1/mm and losses (n_cases,) of a design vector, mm.

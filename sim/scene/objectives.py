@@ -52,9 +52,20 @@ class RelativeMimicking(NamedTuple):
     size: Floats
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
-        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
+        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3).
+
+        Raises:
+            ValueError: the motion to mimic is of other load cases, times or units.
+        """
         del parameters
-        missed = (displacement[:, :, self.units] - self.target) / scales(self.spacing)
+        region = displacement[:, :, self.units]
+        if region.shape != self.target.shape:
+            raise ValueError(
+                f"the motion to mimic is of {self.target.shape[:3]} load cases, times and units,"
+                f" the structure's of {region.shape[:3]}; give the reference the scene's cases,"
+                " steps and region"
+            )
+        missed = (region - self.target) / scales(self.spacing)
         return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
 
 

@@ -9,17 +9,11 @@ import numpy as np
 
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
+from sim.scene.equal_cases import equal_cases
 from sim.scene.scene import Accuracy, Scene
-from sim.solvers import Harmonic, LinearRamp, Pulse, Solver, TanhRamp, check_free_dofs, concrete
-from sim.structure import (
-    QUARTER_TURN,
-    ConcreteParameters,
-    equal_directions,
-    is_invariant,
-    parameters,
-    shape,
-    unit_image,
-)
+from sim.scene.soundness import check_scene
+from sim.solvers import Solver, check_free_dofs, concrete
+from sim.structure import ConcreteParameters, parameters, shape
 from sim.time_integration import BLANES_MOAN, ExplicitSolver, ImplicitSolver, adapted, time_grid
 from sim.vibration import highest_frequency, lowest_frequency
 
@@ -32,8 +26,6 @@ SLOW = 0.75
 STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
 STIFFENING = 1.7
 """Highest eigenfrequency in motion over that at rest (4.6 -> 7 kHz for the paper's lattices)."""
-
-_DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
 
 
 @dataclass(frozen=True)
@@ -62,7 +54,7 @@ GRIDS: dict[Accuracy, GridRule] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """Holds the decisions for one scene.
 
@@ -72,6 +64,7 @@ class Plan:
         case_of: (n_cases,) the simulated case that each load case takes its loss from.
         decisions: one line for each thing decided.
         skipped: one line for each thing left out.
+        warnings: one line for each thing that may not be meant; logged when the plan is made.
     """
 
     integrator: Literal["static", "implicit", "explicit"]
@@ -79,6 +72,7 @@ class Plan:
     case_of: Ints
     decisions: tuple[str, ...]
     skipped: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def simulated(self) -> Ints:
@@ -95,6 +89,7 @@ class Plan:
             "integrator": self.integrator,
             "decisions": list(self.decisions),
             "skipped": list(self.skipped),
+            "warnings": list(self.warnings),
         }
 
 
@@ -117,22 +112,22 @@ def make_plan(
 
     Raises:
         SimulationError: nothing can move, or nothing acts on what does.
+        SceneError: the scene has no meaning.
     """
-    check_free_dofs(scene.topology)
     structure = scene.lattice.vertices if vertices is None else vertices
-    values = concrete_parameters(scene, structure)
     times = sample_times(scene) if times is None else times
+    warnings = check_scene(scene, structure, times)
+    check_free_dofs(scene.topology)
+    values = concrete_parameters(scene, structure)
     decisions: list[str] = []
     skipped = [_reference_line(scene)]
 
     symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
     may_repeat = not every_case and (vertices is not None or symmetric)
-    case_of = _equal_cases(scene, structure) if may_repeat else np.arange(len(scene.loads.motions))
-    if len(np.unique(case_of)) < len(case_of):
-        skipped.append(
-            f"{len(case_of) - len(np.unique(case_of))} of {len(case_of)} load cases: copies turned"
-            " by 90 deg"
-        )
+    every = np.arange(len(scene.loads.cases))
+    case_of = equal_cases(scene, structure, values) if may_repeat else every
+    if copies := int((case_of != every).sum()):
+        skipped.append(f"{copies} of {len(every)} load cases: copies turned by 90 deg")
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
     if vertices is not None:
         skipped.append("parameter derivatives: none are asked for")
@@ -165,7 +160,7 @@ def make_plan(
                 decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
             solver = explicit
     decisions.insert(0, f"integrator: {integrator}")
-    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped))
+    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), warnings)
 
 
 def _reference_line(scene: Scene) -> str:
@@ -187,23 +182,6 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     """Computes the parameters of a structure as NumPy arrays."""
     made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
     return concrete(made)
-
-
-def _equal_cases(scene: Scene, vertices: Floats) -> Ints:
-    every = np.arange(len(scene.loads.motions))
-    directed = [m for m in scene.loads.motions if isinstance(m, _DIRECTED)]
-    if len(directed) < len(scene.loads.motions) or scene.objective.reference is not None:
-        return every
-    image = unit_image(scene.lattice, vertices, QUARTER_TURN, tolerance=1e-9)
-    clamped_units = np.unique(scene.loads.clamped // 3)
-    whole_units = len(clamped_units) * 3 == len(scene.loads.clamped)
-    if image is None or not whole_units:
-        return every
-    if not is_invariant(image, clamped_units, scene.loads.driven, scene.objective.region):
-        return every
-    besides = [motion._replace(direction=0.0) for motion in directed]
-    kind = np.array([besides.index(other) for other in besides])
-    return equal_directions(np.array([motion.direction for motion in directed], dtype=float), kind)
 
 
 def _choose(

@@ -23,6 +23,7 @@ from sim.scene.objectives import (
 )
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
+from sim.scene.soundness import check_units
 from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters, parameters, shape
 from sim.time_integration import simpson_weights
@@ -125,6 +126,7 @@ def simulate(
 
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
+        SceneError: the scene or its structure has no meaning.
     """
     made = plan or make_plan(scene, vertices, times, threads, every_case=True)
     chosen = tuple(int(case) for case in (made.simulated if cases is None else cases))
@@ -135,9 +137,10 @@ def simulate(
         values = parameters_of_design(scene)(jnp.asarray(design))
     if isinstance(values.arm, jax.core.Tracer):
         drives = tuple(scene.loads.cases[case] for case in chosen)
-        return Response(
-            scene, made, values, chosen, *differentiable_motion(made.solver, values, drives)
-        )
+        motion = differentiable_motion(made.solver, values, drives, designed=True)
+        return Response(scene, made, values, chosen, *motion)
+    if vertices is None and design is not None:
+        check_units(scene.lattice, np.asarray(scene.space.vertices(design)))
     empty = Response(scene, made, concrete(values), chosen, np.empty(0), np.empty(0))
     return _solved(empty, (made.solver,) * len(chosen))
 

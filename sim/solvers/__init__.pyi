@@ -5,6 +5,7 @@ from .base import Solver as Solver
 from .base import adjoint_cases as adjoint_cases
 from .base import concrete as concrete
 from .base import differentiable_motion as differentiable_motion
+from .base import everywhere as everywhere
 from .base import solve_case as solve_case
 from .base import solve_cases as solve_cases
 from .batch import Case as Case

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -20,7 +21,12 @@ from jax.custom_derivatives import SymbolicZero
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology
 from sim.solvers.loads import MotionLaw, held_values
-from sim.solvers.validation import check_free_dofs, check_parameters
+from sim.solvers.validation import (
+    check_free_dofs,
+    check_ligaments,
+    check_masses,
+    check_parameters,
+)
 from sim.structure import ConcreteParameters, Parameters
 
 T = TypeVar("T")
@@ -133,12 +139,14 @@ def solve_case(
     """
     check_free_dofs(solver.topology)
     check_parameters(values, drive.motion)
+    check_masses(values, at_rest=True)
     try:
         displacement, velocity, record = solver.forward(values, drive)
     except NewContactPairs as met:
         return solve_case(solver.coupling(met.pairs), values, drive)
     held = solver.topology.held
     displacement[:, held] = drive.values(held, solver.output_times)
+    check_ligaments(solver.topology, values, displacement)
     velocity[:, held] = drive.rates(held, solver.output_times)
     return displacement, velocity, record
 
@@ -225,8 +233,21 @@ def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats
     return Gradients(summed, list(times), list(drive))
 
 
+def everywhere(solver: Any) -> Any:
+    """Returns a solver whose adjoint skips no ligament."""
+    top = solver.topology
+    every = np.arange(len(top.ligament_units))
+    if len(top.designed) == len(every):
+        return solver
+    return replace(solver, topology=replace(top, designed=every))
+
+
 def differentiable_motion(
-    solver: Solver, parameters: Parameters[Any], cases: tuple[PrescribedMotion, ...]
+    solver: Solver,
+    parameters: Parameters[Any],
+    cases: tuple[PrescribedMotion, ...],
+    *,
+    designed: bool = False,
 ) -> CaseMotions:
     """Integrates every case; differentiable by the parameters and the numbers of the motions.
 
@@ -234,15 +255,19 @@ def differentiable_motion(
     ``jax.vmap`` (and so ``jax.jacrev``) it cannot run: the solvers loop over concrete arrays. There
     are no forward or second derivatives.
 
-    Derivatives by ligaments that are not ``designed`` in the solver's topology are skipped and read
-    zero: for a gradient by stiffness, make the plan of a scene in which every unit may change.
+    Args:
+        solver: of each case.
+        parameters: of the structure.
+        cases: what drives it.
+        designed: whether the parameters are those of a design vector alone: derivatives by
+            ligaments that the design does not change are then skipped, and read zero.
 
     Raises:
         SimulationError: a step failed even after it was cut; the error names it.
         TypeError: a transform that is not supported.
     """
     try:
-        return _motion(solver, parameters, cases)
+        return _motion(solver if designed else everywhere(solver), parameters, cases)
     except TypeError as error:
         if "jvp" not in str(error):
             raise

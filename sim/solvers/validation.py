@@ -23,6 +23,8 @@ NEVER_NEGATIVE = {
     "contact": "stiffness of contact",
     "damping": "damping",
 }
+COLLAPSED = 1e-3
+"""Length of a ligament in motion, over that at rest, below which it has none."""
 
 
 def check_parameters(values: ConcreteParameters, motion: MotionLaw) -> None:
@@ -67,10 +69,13 @@ def check_connected(topology: Topology) -> None:
         )
 
 
-def check_masses(values: ConcreteParameters) -> None:
-    """Raises an error that names a unit which nothing accelerates, or the wrong way round."""
+def check_masses(values: ConcreteParameters, *, at_rest: bool = False) -> None:
+    """Raises an error that names a unit which nothing accelerates, or the wrong way round.
+
+    Where inertia plays no part, ``at_rest``, a unit may be without mass, but not turned inside out.
+    """
     lightest = values.mass.min(axis=1)
-    if (lightest <= 0.0).any():
+    if (lightest < 0.0).any() or (not at_rest and (lightest == 0.0).any()):
         unit = int(lightest.argmin())
         raise SimulationError(
             f"unit {unit} has no mass, or less than none ({lightest[unit]:.3g}); try another design"
@@ -101,6 +106,36 @@ def check_start(
                 " try a drive that starts from rest",
                 unit=int(one),
             )
+
+
+def check_ligaments(topology: Topology, values: ConcreteParameters, states: Floats) -> None:
+    """Raises an error that names a ligament without length in some of the states (n, n_dofs).
+
+    Its energy has a tip there: forces vanish in a state that is far from balance.
+    """
+    motion = states.reshape(len(states), -1, 3)
+    one, other = (
+        _ligament_ends(motion[:, topology.ligament_units[:, end]], values.arm[:, end])
+        for end in range(2)
+    )
+    length = np.linalg.norm(values.vector + other - one, axis=2)
+    share = length / np.linalg.norm(values.vector, axis=1)
+    if share.min(initial=np.inf) < COLLAPSED:
+        state, ligament = np.unravel_index(share.argmin(), share.shape)
+        a, b = topology.ligament_units[ligament]
+        raise SimulationError(
+            f"the ligament between units {a} and {b} has no length left in state {state}, where its"
+            " law has no meaning; try more load steps or a smaller drive",
+            step=int(state),
+            unit=int(a),
+        )
+
+
+def _ligament_ends(motion: Floats, arm: Floats) -> Floats:
+    """Displacements (n, n_ligaments, 2) of the ends of ligaments at units that move."""
+    c, s = np.cos(motion[..., 2]), np.sin(motion[..., 2])
+    turned = np.stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]], axis=2)
+    return motion[..., :2] + turned - arm
 
 
 def inadmissible(

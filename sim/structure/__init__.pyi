@@ -8,6 +8,7 @@ from .gaps import clearance as clearance
 from .gaps import close_pairs as close_pairs
 from .gaps import displaced as displaced
 from .gaps import overlapping_pairs as overlapping_pairs
+from .gaps import polygons as polygons
 from .gaps import smallest_gap as smallest_gap
 from .geometry import VOID_BRANCH as VOID_BRANCH
 from .geometry import angle_between as angle_between
@@ -28,7 +29,3 @@ from .perturbation import MOST_ROUNDS as MOST_ROUNDS
 from .perturbation import Perturbation as Perturbation
 from .perturbation import PerturbedStructure as PerturbedStructure
 from .perturbation import perturbed as perturbed
-from .symmetry import QUARTER_TURN as QUARTER_TURN
-from .symmetry import equal_directions as equal_directions
-from .symmetry import is_invariant as is_invariant
-from .symmetry import unit_image as unit_image

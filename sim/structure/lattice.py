@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from sim.core import Floats, Ints
 
@@ -235,6 +232,8 @@ def listed(
     Raises:
         ValueError: a polygon without area, or a ligament that does not end at two units' vertices.
     """
+    from scipy.spatial import cKDTree
+
     rings = [_counter_clockwise(np.array(polygon, dtype=float)) for polygon in polygons]
     vertices = np.concatenate(rings)
     unit = np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
@@ -286,6 +285,9 @@ def _network(polygons: list[Floats], ligaments: Ints, index: Ints, spacing: floa
 
 def _groups(n_vertices: int, ligaments: Ints) -> Ints:
     """Numbers the design groups by their first vertex: joined vertices together, others alone."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     joined = coo_array(
         (np.ones(len(ligaments)), (ligaments[:, 0], ligaments[:, 1])), shape=(n_vertices,) * 2
     )

@@ -1,7 +1,5 @@
 """The benchmarks' frame on a toy suite; nothing is asserted about times but that there are some."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Every method comes to the reference of another family, on lattices of 5 x 5 units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

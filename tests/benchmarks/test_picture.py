@@ -1,7 +1,5 @@
 """The picture on the page of benchmarks shows the page's own tables."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.picture import PAGE, TableRow, figure, tables

@@ -1,7 +1,5 @@
 """The stress suite: its verdicts, its checks on spoilt answers, and itself in small."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

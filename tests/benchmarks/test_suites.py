@@ -1,7 +1,5 @@
 """Skips change nothing beyond their tolerance; optimisers, cases and scenes are what they say."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import jax.numpy as jnp

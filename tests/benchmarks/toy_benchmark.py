@@ -1,7 +1,5 @@
 """Defines a toy suite: the integral of exp over [0, 1] and its derivative by a stretch."""
 
-from __future__ import annotations
-
 import os
 import time
 from functools import partial

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from pipeline.runtime import ROOT
 from tests.docs.pages import PAGES
 
@@ -32,3 +34,9 @@ def test_the_site_is_whole_and_offline(tmp_path: Path) -> None:
         assert not [name for name in loaded if "//" in name], page
     for style in (tmp_path / "site").rglob("*.css"):
         assert not re.search(r"@import|url\([\"']?http", style.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_tests_that_pages_name_are_there(page: str) -> None:
+    for file, name in re.findall(r"`(tests/\S+\.py)::(\w+)`", (ROOT / page).read_text()):
+        assert f"def {name}(" in (ROOT / file).read_text(), f"{file}::{name}"

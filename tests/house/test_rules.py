@@ -70,7 +70,6 @@ FRAGMENTS = {
     "pipeline.problem.unit_roles",
     "reports.paper_figures",
     "sim.optimise.quasi_newton",
-    "sim.structure.symmetry",
 }
 """Shorter modules with one importer that are a concept of their own; there are to be no more."""
 LOCAL_WORDS = ("asked", "told", "wanted", "beside", "whole", "casebook", "meeting", "strangers",

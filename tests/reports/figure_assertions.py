@@ -1,7 +1,5 @@
 """What a drawn figure shows: its texts, and where they are."""
 
-from __future__ import annotations
-
 import io
 from itertools import combinations
 

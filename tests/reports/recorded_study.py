@@ -1,7 +1,5 @@
 """Comparisons in closed form: what was measured is the simulation, a tenth more and with noise."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -11,8 +9,7 @@ import xarray as xr
 
 from pipeline import datasets
 from pipeline.datasets import provenance
-from pipeline.datasets.tables import NETWORK, TABLES
-from pipeline.datasets.tables.comparisons import COMPARED
+from pipeline.datasets.tables import NETWORK, SCHEMAS, TABLES
 from reports.study import StudyResults
 
 GAIN = 1.1
@@ -74,7 +71,10 @@ def comparison(study: StudyResults, structure: str, case: int) -> xr.Dataset:
         "estimate": ["value", "low", "high"],
         "drive_displacement": (("time", "xy"), drive),
     }
-    told = dict.fromkeys(COMPARED, "told") | {"structure": structure, "case": str(case)}
+    told = dict.fromkeys(SCHEMAS["comparison"].attributes, "told") | {
+        "structure": structure,
+        "case": str(case),
+    }
     return xr.Dataset(variables, coordinates, told)
 
 

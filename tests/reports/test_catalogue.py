@@ -1,7 +1,5 @@
 """The one command of all reports, and the figures of the paper."""
 
-from __future__ import annotations
-
 import inspect
 from importlib import import_module
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,16 @@ def test_a_response_holds_motion_forces_and_loss() -> None:
     np.testing.assert_allclose(held, -pushed, rtol=1e-6)
     loss, _ = sim.evaluate(scene())
     assert float(response.loss) == pytest.approx(loss, rel=1e-12)
+
+
+def test_evaluations_by_a_plan_of_ones_own_are_not_mixed_up() -> None:
+    """What is compiled for a scene and a plan is kept; another plan finds none of it."""
+    twice = scene().driven_by(sim.LinearRamp(-2.0, 1.0), sim.LinearRamp(-1.0, 1.0))
+    plan = sim.make_plan(twice)
+    both, _ = sim.evaluate(twice, design(), plan)
+    first, _ = sim.evaluate(twice, design(), replace(plan, case_of=np.zeros(2, dtype=int)))
+    losses = sim.simulate(twice, design(), plan=plan).losses
+    assert (both, first) == pytest.approx((float(losses.mean()), float(losses[0])), rel=1e-9)
 
 
 def test_a_structure_is_given_by_its_design_or_its_vertices() -> None:

@@ -28,6 +28,9 @@ FILES = {
     "pipeline/through_a_face.py": "from sim.lazy import law\n",
     "reports/__init__.py": "",
     "reports/build.py": "import pipeline.errors\n",
+    "reports/build.yaml": "prose of the module",
+    "reports/unused.py": "",
+    "reports/unused.yaml": "prose of another module",
     "reports/templates/page.html": "<html>",
     "reports/style.mplstyle": "",
     "reports/other/__init__.py": "",
@@ -86,6 +89,7 @@ def test_closure_holds_the_resources_of_its_packages_only(tree: Path) -> None:
         "pipeline/errors.py",
         "reports/__init__.py",
         "reports/build.py",
+        "reports/build.yaml",
         "reports/style.mplstyle",
         "reports/templates/page.html",
     }

@@ -1,11 +1,10 @@
 """Compares answers with those of the same problem posed differently, and with those of SciPy."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -111,12 +110,8 @@ def _restatement(kind: str, lattice: Lattice, random: np.random.Generator) -> Eq
 
 
 def _same(lattice: Lattice) -> EquivalentProblem:
-    return EquivalentProblem(
-        np.eye(2),
-        np.zeros(2),
-        np.arange(lattice.n_units),
-        np.zeros(lattice.n_ligaments, dtype=bool),
-    )
+    kept = np.zeros(lattice.n_ligaments, dtype=bool)
+    return EquivalentProblem(np.eye(2), np.zeros(2), np.arange(lattice.n_units), kept)
 
 
 def _restated(lattice: Lattice, restated: EquivalentProblem) -> Lattice:
@@ -196,32 +191,23 @@ def _equilibria(draws: RandomDesigns, seed: int) -> Sequence[Check]:
     found = []
     for load in drive:
         state[held] = load
-        minimum = minimize(
-            lambda x: _at(case, state, x)[0],
-            state[free],
-            jac=lambda x: _at(case, state, x)[1],
-            hess=lambda x: stiffness(case.structure, _with(case, state, x))[
-                np.ix_(free, free)
-            ].toarray(),
-            method="trust-exact",
-            options={"gtol": 1e-10},
-        )
-        state[free] = minimum.x
+        energy, slope = (partial(_energy, case, state, order=order) for order in (0, 1))
+        curvature, precise = partial(_energy, case, state, order=2), {"gtol": 1e-10}
+        given = {"jac": slope, "hess": curvature, "method": "trust-exact", "options": precise}
+        state[free] = minimize(energy, state[free], **given).x
         found.append(state.copy())
     other = Answer(np.array(found), answer.velocity, answer.record)
     return [Check("distance from SciPy's minima", apart(case, answer, other), 1e-6)]
 
 
-def _with(case: StressScene, state: Floats, free: Floats) -> Floats:
-    whole = state.copy()
-    whole[case.topology.free_dofs] = free
-    return whole
-
-
-def _at(case: StressScene, state: Floats, free: Floats) -> tuple[float, Floats]:
-    """Computes the energy and its gradient by the free dofs."""
-    found = balance(case.structure, _with(case, state, free))
-    return found.energy, -found.force[case.topology.free_dofs]
+def _energy(case: StressScene, state: Floats, free: Floats, order: int) -> Any:  # noqa: ANN401
+    """Computes the energy, or its first or second derivatives, by the free dofs."""
+    dofs, whole = case.topology.free_dofs, state.copy()
+    whole[dofs] = free
+    if order == 2:
+        return stiffness(case.structure, whole)[np.ix_(dofs, dofs)].toarray()
+    found = balance(case.structure, whole)
+    return -found.force[dofs] if order else found.energy
 
 
 def _motions(draws: RandomDesigns, seed: int) -> Sequence[Check]:
@@ -231,12 +217,11 @@ def _motions(draws: RandomDesigns, seed: int) -> Sequence[Check]:
     implicit = ImplicitSolver(top, np.linspace(0.0, KNOTS[-1], 601), KNOTS[1:], tolerance=1e-6)
     explicit = ExplicitSolver(top, KNOTS[-1], 400, KNOTS[1:])
     checks = []
-    for name, solver, error in (("implicit", implicit, 2e-3), ("explicit", explicit, 2e-3)):
+    solvers: dict[str, Solver] = {"implicit": implicit, "explicit": explicit}
+    for name, solver in solvers.items():
         answer = solved(case, solver)
-        other = Answer(exact, answer.velocity, answer.record)
-        checks.append(
-            Check(f"distance of {name} steps from SciPy's", apart(case, answer, other), error)
-        )
+        off = apart(case, answer, Answer(exact, answer.velocity, answer.record))
+        checks.append(Check(f"distance of {name} steps from SciPy's", off, 2e-3))
     return checks
 
 
@@ -250,8 +235,8 @@ def _by_scipy(case: StressScene) -> Floats:
 
     def rates(t: float, y: Floats) -> Floats:
         state[free], state[held] = y[: len(free)], np.asarray(at(np.array([t])))[0]
-        force = balance(case.structure, state).force - damping * _whole(n, free, y[len(free) :])
-        return np.concatenate([y[len(free) :], (force / mass)[free]])
+        force = balance(case.structure, state).force[free] - damping[free] * y[len(free) :]
+        return np.concatenate([y[len(free) :], force / mass[free]])
 
     start = np.zeros(2 * len(free))
     found = np.zeros((len(KNOTS) - 1, n))
@@ -261,9 +246,3 @@ def _by_scipy(case: StressScene) -> Floats:
         found[k, free] = start[: len(free)]
     found[:, held] = drive.values(held, KNOTS[1:])
     return found
-
-
-def _whole(n: int, free: np.ndarray, values: Floats) -> Floats:
-    out = np.zeros(n)
-    out[free] = values
-    return out

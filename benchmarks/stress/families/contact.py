@@ -1,7 +1,5 @@
 """Tries contact at its barrier and cutoff, and inputs of 32 bits, none, far too large."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,6 +11,7 @@ from benchmarks.stress import (
     Check,
     StressCase,
     StressScene,
+    Wanted,
     apart,
     attempt,
     equilibria,
@@ -64,13 +63,9 @@ def _starts(angles: Sequence[float]) -> Iterator[StressCase]:
         beyond = angle <= -15.0
         for share in (0.02, -0.05):
             name = f"voids of {angle:g} deg at rest, {'pressed' if share > 0 else 'pulled'}"
-            yield attempt(
-                name,
-                equilibria,
-                pressed(lattice, share),
-                np.array([0.0, 0.5, 1.0]),
-                wanted="refusal" if beyond else "solution",
-            )
+            plate = pressed(lattice, share)
+            wanted: Wanted = "refusal" if beyond else "solution"
+            yield attempt(name, equilibria, plate, np.array([0.0, 0.5, 1.0]), wanted=wanted)
         gentle = shaken(lattice, Harmonic(0.2, 30.0), duration=0.01, frequency=30.0)
         for integrator in ("implicit", "explicit"):
             case = replace(gentle, scene=gentle.scene.updated(integrator=integrator))
@@ -173,15 +168,8 @@ def _nonsense() -> Iterator[StressCase]:
         for field, value in (("mass", 0.0), ("mass", -1.0), ("law", -1.0), ("damping", -1e3)):
             if name == "static" and field != "law":
                 continue
-            yield attempt(
-                f"{field} is {value:g}, {name}",
-                _spoilt,
-                name,
-                solver,
-                field,
-                value,
-                wanted="refusal",
-            )
+            said = f"{field} is {value:g}, {name}"
+            yield attempt(said, _spoilt, name, solver, field, value, wanted="refusal")
 
 
 def _spoilt(name: str, solver: Solver, field: str, value: float) -> Sequence[Check]:

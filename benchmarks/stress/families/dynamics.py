@@ -1,7 +1,5 @@
 """Tries constants far from the paper's, 0.1 to 200 Hz, 1 to a million steps; balances energy."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

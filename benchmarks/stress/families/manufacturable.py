@@ -1,7 +1,5 @@
 """Tries designs drawn at random, all of which can be made, and the most slender of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Tries paths that end in a limit point or branch, and turns beyond 180 deg."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -55,19 +53,13 @@ def _paths(length: int) -> Iterator[tuple[str, StressScene]]:
     centre = np.array([[0, 0, 0], [-bow / 2, bow, 0], [-bow / 2, -bow, 0]])
     end = np.array([[0, 0, 0], [-bow, 0, 0], [-bow, 0, 0]])
     snap = TimeSeries(times, np.stack([centre, end], axis=1))
-    yield (
-        "a bowed chain snapping through",
-        posed(chain, [0], [middle, length - 1], snap, static=True),
-    )
+    through = posed(chain, [0], [middle, length - 1], snap, static=True)
+    yield "a bowed chain snapping through", through
     strip = squares(length, 2)
     ends = strip.index[:, 0]
     fold = LinearRamp(-1.5 * length, 1.0)
-    yield (
-        "a strip of two rows",
-        posed(
-            strip, np.flatnonzero(ends == 0), np.flatnonzero(ends == length - 1), fold, static=True
-        ),
-    )
+    left, right = (np.flatnonzero(ends == place) for place in (0, length - 1))
+    yield "a strip of two rows", posed(strip, left, right, fold, static=True)
 
 
 def _followed(case: StressScene, n_loads: int) -> Sequence[Check]:

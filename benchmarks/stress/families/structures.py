@@ -1,7 +1,5 @@
 """Tries lattices from 3 x 3 to 120 x 120 units, and structures in pieces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -49,9 +47,8 @@ def sizes(small: bool) -> Iterator[StressCase]:
         yield attempt(f"{name}, pressed", equilibria, pressed(lattice, 0.1), loads, wanted=wanted)
         if max(columns, rows) <= TOUCHING:
             touching = pressed(lattice, 0.1, contact=LAWS["distances"])
-            yield attempt(
-                f"{name}, contact on distances", equilibria, touching, loads, wanted=wanted
-            )
+            said = f"{name}, contact on distances"
+            yield attempt(said, equilibria, touching, loads, wanted=wanted)
         if min(columns, rows) > 2:
             case = shaken(lattice, Harmonic(1.0, 60.0, 0.8), duration=2e-3, frequency=60.0)
             for integrator in ("implicit", "explicit"):
@@ -69,6 +66,7 @@ def _shaken(case: StressScene, integrator: str) -> Sequence[Check]:
 LOADS = np.array([0.5, 1.0])
 SIDE = 5
 ASKED = np.linspace(0.0, 0.02, 21)
+HUM = Harmonic(0.5, 60.0)
 
 
 @family(
@@ -126,10 +124,8 @@ def _odd() -> Iterator[StressCase]:
     yield attempt("all units held, static", equilibria, held, LOADS, wanted="refusal")
     for integrator in ("implicit", "explicit"):
         more = {"duration": 0.02, "frequency": 60.0, "integrator": integrator}
-        moving = posed(chain, [0], [1], Harmonic(0.5, 60.0), **more)
-        yield attempt(
-            f"all units held, {integrator}", motions, moving, ASKED, 0.05, wanted="refusal"
-        )
+        said, moving = f"all units held, {integrator}", posed(chain, [0], [1], HUM, **more)
+        yield attempt(said, motions, moving, ASKED, 0.05, wanted="refusal")
     sliding = pressed(squares(SIDE), 0.04)
     along = sliding.scene.updated(supports=(Clamp(5 * np.arange(5), ("ux",)),))
     yield attempt("clamped along x alone", equilibria, replace(sliding, scene=along), LOADS)

@@ -1,7 +1,5 @@
 """Defines a set of measurements as the estimator sees it, whatever its kind."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
 
@@ -72,7 +70,7 @@ class MeasuredValues:
         """Applies the transpose of ``whitened`` to whitened numbers (n,)."""
         return self._less_mean(self._less_common(white)) / self.sigma
 
-    def with_common(self, causes: Floats) -> MeasuredValues:
+    def with_common(self, causes: Floats) -> "MeasuredValues":
         """Adds the effect of independent causes on the values, (n, m) per standard deviation.
 
         The covariance of whitened values is then 1 + C C': along the axes of C they are divided by

@@ -1,7 +1,5 @@
 """Fits the motion of every free unit of a track, driven as its held units were."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -98,7 +96,7 @@ class FullFieldExperiment:
             ]
         )
 
-    def with_drive_noise(self, constants: Constants) -> FullFieldExperiment:
+    def with_drive_noise(self, constants: Constants) -> "FullFieldExperiment":
         """Adds the effect of the measured drive's noise on the prediction.
 
         That is linearised about the drive that the free units speak for as well, by the noise that
@@ -121,7 +119,7 @@ class FullFieldExperiment:
         measured = self.measured.with_common(causes)
         return replace(self, measured=measured, drive=drive, part=causes @ size)
 
-    def finer(self) -> FullFieldExperiment:
+    def finer(self) -> "FullFieldExperiment":
         """Halves the steps in time; of equilibria there are none."""
         return replace(self, simulation=self.simulation.finer())
 

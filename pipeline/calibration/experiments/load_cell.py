@@ -1,7 +1,5 @@
 """Reads the load cell of a track: the force of the drive along its direction, at equilibria."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple

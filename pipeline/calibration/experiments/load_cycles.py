@@ -1,7 +1,5 @@
 """Splits the record of a testing machine into branches, and measures loops and snaps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -13,8 +13,6 @@ The coefficients are linear in the measured values, so that their covariance is 
 of its root is a change of the drive by one standard deviation, independent of all others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -46,7 +46,7 @@ class KnownDrive(PrescribedMotion):
 
     def _once(self, what: Literal["values", "rates"], held: Ints, times: Floats) -> Floats:
         memory = self.__dict__.setdefault("memory", {})
-        if (key := (what, times.tobytes())) not in memory:
+        if (key := (what, held.tobytes(), times.tobytes())) not in memory:
             units = np.asarray(self.units, dtype=np.int64)
             compute = _followed(held.tobytes(), units.tobytes(), what)
             memory[key] = np.asarray(compute(self.motion, times))

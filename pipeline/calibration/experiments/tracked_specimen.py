@@ -1,7 +1,5 @@
 """Poses the structure that a track is of, and turns its motion into the design's frame."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

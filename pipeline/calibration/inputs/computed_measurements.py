@@ -1,7 +1,5 @@
 """Describes computed measurements: the sections `virtual` of a calibration."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Describes records of load cycles, and the path that a simulated unit is driven along."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Describes tests of several samples, what is known of their constants, and a test to predict."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -92,7 +90,7 @@ class Priors(Section):
     wide: Annotated[float, Field(gt=1.0, le=10.0)] = 3.0
 
     @property
-    def doubled(self) -> Priors:
+    def doubled(self) -> Self:
         """Doubles all standard deviations, which are of logarithms."""
         change = {"constants": self.constants**2, "wide": self.wide**2}
         return self.model_copy(update=change)

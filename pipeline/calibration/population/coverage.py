@@ -1,7 +1,5 @@
 """Tries the band on simulated sets of samples: how many new curves it holds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ Equilibria depend on ratios of stiffness alone, so that with the shear constant 
 and g is smooth: a product of Chebyshev polynomials in the two ratios, and a cubic spline in u.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax.numpy as jnp

@@ -12,8 +12,6 @@ The processes are integrated out, so that each kind of test has one normal law. 
 array of one shape, so that many sets of readings are sampled side by side, compiled once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import NamedTuple

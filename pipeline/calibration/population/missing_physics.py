@@ -6,8 +6,6 @@ the power that it takes, over the speed of the grips. Fitted constants take up w
 a change in the tests of the fit; the rest is what the prediction would change by.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Predicts a curve with the band that holds 95 % of new curves as a whole."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

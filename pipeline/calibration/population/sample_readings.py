@@ -1,10 +1,8 @@
 """Reads the curves of all samples, thinned to even displacements, as arrays for the fit."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -32,7 +30,7 @@ class SampleCurve(NamedTuple):
     displacement: Floats
     force: Floats
 
-    def thinned(self, end: float, points: int) -> SampleCurve:
+    def thinned(self, end: float, points: int) -> Self:
         """Averages what was read about each of so many even displacements up to `end`, mm.
 
         The first half of the first step is left out: there the load cell's zero counts most.

@@ -1,7 +1,5 @@
 """Fits a population of samples, predicts another sample's test, and judges the prediction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple

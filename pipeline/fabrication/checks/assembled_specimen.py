@@ -4,8 +4,6 @@ Nothing has to be moved to compare them. The same unit lies elsewhere in other f
 with its outline here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Checks the bill of materials: each unit once, and shims that fit the slots and the sheets."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks the folder laser/ as a whole: every format of every sheet, and all parts exactly once."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks a package before anyone gets to see it; its assembly sheet and its manifest here."""
 
-from __future__ import annotations
-
 import base64
 import re
 import zlib

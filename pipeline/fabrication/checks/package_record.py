@@ -1,7 +1,5 @@
 """Holds a written package that is being checked, beside the parts that it has to hold."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property

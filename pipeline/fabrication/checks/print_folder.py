@@ -1,7 +1,5 @@
 """Checks the folders print/ and fixture/: each part as a file of its own and on one plate."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Checks one drawing: its curves, and its parts inside the margin, apart, cut to size, to scale."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 

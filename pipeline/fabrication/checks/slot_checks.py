@@ -4,8 +4,6 @@ The outline that a file holds is closed by a disc somewhat wider than a slot: th
 areas are the slots, the rest of the design's polygon are truncated tips and fillets.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations

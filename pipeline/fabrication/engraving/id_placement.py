@@ -1,7 +1,5 @@
 """Places the id of a unit, and beside it the mark that tells how the unit stands."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

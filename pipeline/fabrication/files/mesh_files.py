@@ -1,7 +1,5 @@
 """Writes meshes: STL for one part, 3MF for a plate of named parts; always the same bytes."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path

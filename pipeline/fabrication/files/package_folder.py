@@ -1,7 +1,5 @@
 """Writes the drawings and the meshes of a specimen into a folder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

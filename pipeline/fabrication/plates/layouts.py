@@ -1,7 +1,5 @@
 """Lays out flat parts on the sheets of a laser cutter, and solids on the plates of a printer."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

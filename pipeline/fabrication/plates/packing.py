@@ -1,7 +1,5 @@
 """Packs parts side by side on sheets and plates: shelves of parts that go down in height."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, TypeVar
 

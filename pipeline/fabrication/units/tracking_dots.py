@@ -1,7 +1,5 @@
 """Places the tracking dots of a unit."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from shapely import Polygon

@@ -1,7 +1,5 @@
 """Cuts the outline of a unit: corners rounded, slots cut, thin tips taken off."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -47,7 +47,7 @@ class Section(BaseModel):
         known = [field.alias or name for name, field in cls.model_fields.items()]
         for key in data:
             if key not in known:
-                near = get_close_matches(str(key), known, n=1)
+                near = get_close_matches(str(key), known, n=1, cutoff=0.8)
                 hint = f"did you mean {near[0]!r}? " if near else ""
                 raise fault("unknown key", f"{hint}known here: {', '.join(known)}", key=str(key))
         return data

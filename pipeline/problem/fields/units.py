@@ -79,7 +79,7 @@ def _registry() -> UnitRegistry:
 
 def split_quantity(text: str) -> tuple[float, str] | None:
     """Splits a quantity into number and unit ("" for none); None if the text is none."""
-    match = _QUANTITY.fullmatch(text[:_LONGEST])
+    match = None if len(text) > _LONGEST else _QUANTITY.fullmatch(text)
     return None if match is None or match["rest"] else (float(match["number"]), match["unit"] or "")
 
 
@@ -92,7 +92,7 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise UserError("not a quantity", remedy=wanted)
-    match = _QUANTITY.fullmatch(str(text)[:_LONGEST])
+    match = None if len(str(text)) > _LONGEST else _QUANTITY.fullmatch(str(text))
     if match is None:
         raise UserError("not a number with a unit", remedy=wanted)
     if match["rest"] is not None:
@@ -105,6 +105,7 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     return value
 
 
+@lru_cache
 def _factor(unit: str, dimension: Dimension, wanted: str) -> float:
     """Converts one `unit` to working units of `dimension`."""
     from pint.errors import UndefinedUnitError

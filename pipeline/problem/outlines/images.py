@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
@@ -9,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.problem.outlines.plane import Outline
+from pipeline.problem.outlines.plane import Outline, extents
 from pipeline.runtime import UserError, read_bounded
 
 if TYPE_CHECKING:
@@ -23,9 +25,17 @@ SPECK = 1e-3
 """Parts of a smaller share of the largest part's area are dust."""
 LARGEST_SIDE = 4000  # pixels
 LARGEST_FILE = 64 << 20  # bytes
-LARGEST_DRAWING = 1_000_000
+LARGEST_DRAWING = 20_000
 """Elements of a drawing times its copies by `use`, of which none may hold another."""
+DEEPEST = 100
+"""Levels of groups in one another."""
+MOST_NUMBERS = 60_000
+"""In all paths of a drawing, each as often as it is copied."""
+MOST_POINTS = 20_000
+"""Of all outlines: a curve has fewer chords where there are many."""
 SEGMENTS = 24  # chords of a curved piece of a path
+FARTHEST = 1e9
+"""Coordinate of a drawing, in its own unit."""
 
 
 def read_outlines(path: Path) -> tuple[Outline, ...]:
@@ -44,9 +54,13 @@ def read_outlines(path: Path) -> tuple[Outline, ...]:
     outlines = _of_drawing(path) if path.suffix.lower() == ".svg" else _of_pixels(held)
     if not outlines:
         raise UserError("the image shows no shape", remedy="draw the void dark on a light ground")
-    return tuple(
+    read = tuple(
         tuple((round(float(x), 6), round(-float(y), 6)) for x, y in points) for points in outlines
     )
+    if min(extents(tuple(point for outline in read for point in outline))) == 0.0:
+        remedy = "draw it larger, in pixels or millimetres"
+        raise UserError("the image's shape has no width or no height", remedy=remedy)
+    return read
 
 
 def _of_pixels(held: bytes) -> list[NDArray[Any]]:
@@ -104,13 +118,35 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
     from svgelements import Path as Curve
 
     try:
+        _check_depth(path)
         _check_copies(ElementTree.parse(path).getroot())
-        drawing = SVG.parse(str(path), reify=True)
-    except (OSError, ValueError, SyntaxError) as error:  # an XML parse error is a SyntaxError
+        shapes = SVG.parse(str(path), reify=True).elements()
+        paths = [Curve(shape) for shape in shapes if isinstance(shape, Shape)]
+        count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
+        if count < 2:
+            raise ValueError(f"it has more than {MOST_POINTS // 2} pieces; simplify it")
+        found = [points for each in paths for points in _pieces(each, count) if len(points) > 2]
+        if any(not (np.abs(points) < FARTHEST).all() for points in found):
+            raise ValueError(f"it has points further than {FARTHEST:g} from its origin")
+    # an XML parse error is a SyntaxError; a radius or a scale of 1e-300 divides by zero
+    except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
-    shapes = (Curve(element) for element in drawing.elements() if isinstance(element, Shape))
-    pieces = (_chords(Curve(piece)) for shape in shapes for piece in shape.as_subpaths())
-    return [points for points in pieces if len(points) > 2]
+    return found
+
+
+def _check_depth(path: Path) -> None:
+    """Refuses groups in groups without end, before anything follows them.
+
+    Raises:
+        ValueError: they are nested too deeply.
+    """
+    depth = 0
+    for event, element in ElementTree.iterparse(path, ("start", "end")):
+        depth += 1 if event == "start" else -1
+        if depth > DEEPEST:
+            raise ValueError(f"groups are nested deeper than {DEEPEST}")
+        if event == "end":
+            element.clear()
 
 
 def _check_copies(drawing: ElementTree.Element) -> None:
@@ -121,8 +157,11 @@ def _check_copies(drawing: ElementTree.Element) -> None:
     """
     elements = list(drawing.iter())
     copies = [element for element in elements if _is_copy(element)]
-    if len(elements) * (1 + len(copies)) > LARGEST_DRAWING:
-        raise ValueError("too many copies of elements (use)")
+    words = (element.get(key, "") for element in elements for key in ("d", "points"))
+    numbers = sum(len(re.findall(r"\d[\d.]*", word)) for word in words)
+    many = len(elements) * (1 + len(copies)) > LARGEST_DRAWING
+    if many or numbers * (1 + len(copies)) > MOST_NUMBERS:
+        raise ValueError("too many paths, or copies of elements (use)")
     named = {element.get("id"): element for element in elements}
     for copy in copies:
         link = next((word for key, word in copy.items() if key.endswith("href")), "")
@@ -135,16 +174,23 @@ def _is_copy(element: ElementTree.Element) -> bool:
     return element.tag.rpartition("}")[2] == "use"
 
 
-def _chords(piece: SvgPath) -> NDArray[Any]:
+def _pieces(path: SvgPath, chords: int) -> Iterator[NDArray[Any]]:
+    """Yields the outline of each piece of a path, from one move to the next."""
     from svgelements import Close, Line, Move
 
-    points = []
-    for segment in piece:
-        if isinstance(segment, Move) or segment.end is None:
-            continue
-        count = 1 if isinstance(segment, Line | Close) else SEGMENTS
-        points += [segment.point(k / count) for k in range(1, count + 1)]
-    places = [(float(point.x), float(point.y)) for point in points]
+    places: list[tuple[float, float]] = []
+    for segment in path:
+        if isinstance(segment, Move):
+            yield _without_repeats(places)
+            places = []
+        elif segment.end is not None:
+            count = 1 if isinstance(segment, Line | Close) else chords
+            points = (segment.point(k / count) for k in range(1, count + 1))
+            places += [(float(point.x), float(point.y)) for point in points]
+    yield _without_repeats(places)
+
+
+def _without_repeats(places: list[tuple[float, float]]) -> NDArray[Any]:
     before = places[-1:] + places[:-1]
     kept = [here for here, last in zip(places, before, strict=True) if here != last]
     return np.array(kept).reshape(-1, 2)

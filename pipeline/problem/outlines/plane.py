@@ -25,6 +25,8 @@ _FUNCTIONS: dict[str, Callable[[float], float]] = {
 } | {"abs": abs}
 _NAMES = {"pi": math.pi}
 _LONGEST = 500
+_AT_ONCE = 1000
+"""Edges of an outline that all points are compared with at once: more would fill the memory."""
 
 
 def find_inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: float) -> list[bool]:
@@ -35,14 +37,16 @@ def find_inside(points: Sequence[Point], outlines: tuple[Outline, ...], hair: fl
     odd, near = np.zeros(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
     for outline in outlines:
         start = np.array(outline)
-        (x1, y1), (x2, y2) = start.T, np.roll(start, -1, axis=0).T
-        dx, dy = x2 - x1, y2 - y1
-        along = ((px - x1) * dx + (py - y1) * dy) / np.maximum(dx * dx + dy * dy, 1e-300)
-        share = np.clip(along, 0.0, 1.0)
-        near |= (np.hypot(px - x1 - share * dx, py - y1 - share * dy) <= hair).any(axis=1)
-        crossed = (y1 > py) != (y2 > py)
-        ahead = px < x1 + (py - y1) * dx / np.where(dy == 0.0, 1.0, dy)
-        odd ^= np.count_nonzero(crossed & ahead, axis=1) % 2 == 1
+        edges = np.concatenate([start, np.roll(start, -1, axis=0)], axis=1)
+        for first in range(0, len(edges), _AT_ONCE):
+            x1, y1, x2, y2 = edges[first : first + _AT_ONCE].T
+            dx, dy = x2 - x1, y2 - y1
+            along = ((px - x1) * dx + (py - y1) * dy) / np.maximum(dx * dx + dy * dy, 1e-300)
+            share = np.clip(along, 0.0, 1.0)
+            near |= (np.hypot(px - x1 - share * dx, py - y1 - share * dy) <= hair).any(axis=1)
+            crossed = (y1 > py) != (y2 > py)
+            ahead = px < x1 + (py - y1) * dx / np.where(dy == 0.0, 1.0, dy)
+            odd ^= np.count_nonzero(crossed & ahead, axis=1) % 2 == 1
     found: list[bool] = (odd | near).tolist()
     return found
 
@@ -91,8 +95,10 @@ def compile_formula(text: str) -> Callable[[float], float]:
         FormulaError: not a formula, or an unknown name in it. The function raises it too, where it
             has no finite value.
     """
+    if len(text) > _LONGEST:
+        raise FormulaError(f"longer than {_LONGEST} letters")
     try:
-        tree = ast.parse(text[:_LONGEST].replace("^", "**").strip(), mode="eval").body
+        tree = ast.parse(text.replace("^", "**").strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError) as error:
         raise FormulaError("not a formula") from error
 

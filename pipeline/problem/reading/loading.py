@@ -162,6 +162,7 @@ _WORDS = {
     "union_tag_invalid": ("unknown kind", "give one of {expected_tags}"),
     "literal_error": ("not one of the choices", "give {expected}"),
     "model_type": ("keys and values are wanted here", "write them below it, indented"),
+    "model_attributes_type": ("keys and values are wanted here", "write them below it, indented"),
     "dict_type": ("keys and values are wanted here", "write them below it, indented"),
     "tuple_type": ("a list is wanted here", "write it as [first, second]"),
     "finite_number": ("not a finite number", "give a finite number"),

@@ -18,6 +18,12 @@ _DEEPEST = 100
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\ud800-\udfff]")
 """Characters that no text of a file should have: escapes may write them, terminals obey them."""
 
+_AMBIGUOUS = re.compile(
+    r"[-+]?0[0-9_]+|[-+]?0[bo][0-7_]+|[-+]?[0-9][0-9_]*_[0-9_.]*"
+    r"|[-+]?[0-9][0-9_]*(:[0-5]?[0-9])+(\.[0-9_]*)?|[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}(\D.*)?"
+)
+"""Plain words that YAML 1.1 and 1.2 read differently: 0036 is 30 or 36, 3:0 is 180 or a text."""
+
 KeyPath = tuple[str | int, ...]
 
 
@@ -47,6 +53,13 @@ class _Loader(yaml.SafeLoader):
     def construct_scalar(self, node: yaml.ScalarNode | yaml.MappingNode) -> str:
         if isinstance(node, yaml.ScalarNode) and _CONTROL.search(node.value):
             raise _fault("control characters are not supported", node)
+        if (
+            isinstance(node, yaml.ScalarNode)
+            and not node.style
+            and _AMBIGUOUS.fullmatch(node.value)
+        ):
+            what = f"{node.value} reads in two ways: write a plain number, or a text in quotes"
+            raise _fault(what, node)
         return super().construct_scalar(node)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
@@ -54,10 +67,21 @@ class _Loader(yaml.SafeLoader):
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise _fault("a key must be one word", key)
+            if key.value == "<<":
+                raise _fault("merging (<<) is not supported", key)
             if key.value in seen:
                 raise _fault(f"the key {key.value!r} is given twice", key)
             seen.add(key.value)
         return super().construct_mapping(node, deep)
+
+
+_Loader.yaml_implicit_resolvers = {
+    first: [pair for pair in pairs if pair[0] != "tag:yaml.org,2002:bool"]
+    for first, pairs in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+_Loader.add_implicit_resolver(  # of YAML 1.2: yes, no, on and off are texts
+    "tag:yaml.org,2002:bool", re.compile("true|True|TRUE|false|False|FALSE"), list("tTfF")
+)
 
 
 def _refuse(event: yaml.Event) -> None:

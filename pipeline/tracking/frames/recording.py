@@ -64,6 +64,7 @@ class Recording(Section):
     Attributes:
         title: one line about it.
         video: the file, as seen from the recording's own, or a folder of pictures.
+        sha256: of the video, which is refused if it has another; a rendered one has it.
         virtual: how it is rendered, in place of a video.
         design: the design dataset of the specimen, likewise; a study's own need not be named.
         structure: which of the design's structures it is.
@@ -86,6 +87,7 @@ class Recording(Section):
 
     title: str = ""
     video: Annotated[str, Field(min_length=1)] | None = None
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
     virtual: VirtualRecording | None = None
     design: Annotated[str, Field(min_length=1)] | None = None
     structure: Literal["intact", "altered", "cloaked"] = "cloaked"

@@ -1,7 +1,5 @@
 """Writes the page on the public names of sim, from their signatures and docstrings."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator
@@ -11,16 +9,8 @@ from types import FunctionType
 from typing import Any
 
 import sim
-from pipeline.workflow.reference.markdown import table
+from pipeline.workflow.reference.markdown import head, table
 
-HEAD = """\
-# Public names of sim
-
-<!-- Made by `python -m pipeline reference` from the docstrings. -->
-
-`import sim` loads nothing heavy; a name is loaded when it is first used. Units throughout: mm, N,
-s, tonne, rad. A response in 20 lines and a cloak in 30: `docs/example_sim.py`.
-"""
 ROOMS = {
     "structure": "Structures",
     "solvers": "Loads",
@@ -42,7 +32,7 @@ def page() -> str:
     rooms: dict[str, list[str]] = {}
     for room, name in _NAME.findall(stub):
         rooms.setdefault(room, []).append(name)
-    parts = [HEAD]
+    parts = [head(__file__)]
     for room, title in ROOMS.items():
         names = {name: getattr(sim, name) for name in sorted(rooms.pop(room), key=str.lower)}
         rows = ((f"[`{name}`](#{name.lower()})", _opening(found)) for name, found in names.items())

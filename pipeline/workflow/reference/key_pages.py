@@ -1,7 +1,5 @@
 """Writes the pages on the YAML files: every key with its type, its default and its meaning."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -14,20 +12,10 @@ from pipeline.problem.fields import Section, units
 from pipeline.problem.reading import JointFigure
 from pipeline.tracking.frames import Recording
 from pipeline.tracking.output import DicExport
-from pipeline.workflow.reference.markdown import table
+from pipeline.workflow.reference.markdown import head, table
 
 Node = dict[str, Any]
 
-HEAD = """\
-# Keys of {title}
-
-<!-- Made by `python -m pipeline reference` from the models that check the files. -->
-
-Quantities are text with a unit (`15 mm`, `2.5 cm`, `20 deg`, `0.35 rad`); any unit of the right
-kind does, and a number without one is refused. A key without a default has to be given. Unknown
-keys are refused, with the nearest known one. Lengths and places are in the specimen's frame: origin
-at the site of the unit at the lower left, x to the right, y up, angles counter-clockwise.
-"""
 PRESETS = """
 `presets` holds variants by name. Each has keys that are laid over those of the file: mappings
 merge, lists and values replace, `null` removes. `make fig2@edge3` builds one.
@@ -77,7 +65,7 @@ def pages() -> dict[str, str]:
 
 def _page(title: str, files: tuple[File, ...]) -> str:
     told: set[str] = set()
-    parts = [HEAD.format(title=title)]
+    parts = [head(__file__, title=title)]
     for file in files:
         schema = file.model.model_json_schema(mode="validation")
         lead = f"{file.place}. {schema['description']}"

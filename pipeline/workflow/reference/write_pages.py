@@ -1,7 +1,5 @@
 """Writes the pages of the documentation that follow from the code."""
 
-from __future__ import annotations
-
 import argparse
 
 from pipeline.workflow.reference import api_page, dataset_pages, key_pages

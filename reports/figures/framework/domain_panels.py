@@ -1,38 +1,35 @@
 """Draws pictures of the framework: domains with their regions, what is cut, what a camera sees."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.patches import FancyArrowPatch, Rectangle
+from matplotlib.patches import Rectangle
 
 from reports.base import style
-from reports.panels import draw, draw_clamps, drive_arrows, outline
+from reports.panels import (
+    CLAMP_TINT,
+    CLOAK_TINT,
+    arrow,
+    draw,
+    draw_clamps,
+    drive_arrows,
+    outline,
+    tints,
+)
 from reports.study import CLAMPED, DRIVEN, SURROUNDINGS, RigidUnits, deformed
 from sim.core import Floats
 
-INTEREST_TINT, CLOAK_TINT, CLAMP_TINT = "#b9d3ea", "#c9b3e0", "#4a4d52"
+INTEREST_TINT = "#b9d3ea"
 
 
 def domain(axes: Axes, structure: RigidUnits, spacing: float, *, cloaked: bool) -> None:
     """Draws a lattice with its region of interest, and the region of the cloak if there is one."""
     draw_clamps(axes, structure, spacing)
-    draw(axes, structure, colours=list(_tints(structure, cloaked=cloaked)))
-
-
-def _tints(structure: RigidUnits, *, cloaked: bool) -> Iterator[str]:
-    for region, support in zip(structure.region, structure.support, strict=True):
-        if support == CLAMPED:
-            yield CLAMP_TINT
-        elif support == DRIVEN and cloaked:
-            yield style.ALTERED
-        elif region == SURROUNDINGS:
-            yield INTEREST_TINT
-        else:
-            yield CLOAK_TINT if cloaked else style.PALE
+    held = {CLAMPED: CLAMP_TINT} | ({DRIVEN: style.ALTERED} if cloaked else {})
+    inner = CLOAK_TINT if cloaked else style.PALE
+    draw(axes, structure, colours=tints(structure, held, {SURROUNDINGS: INTEREST_TINT}, inner))
 
 
 def excitation(axes: Axes, structure: RigidUnits, spacing: float, radius: float) -> None:
@@ -47,21 +44,17 @@ def inclusion(axes: Axes, structure: RigidUnits, spacing: float, radius: float) 
     """Draws a void within the cloak, and the load on two sides."""
     middle = structure.site.mean(axis=0)
     away = np.linalg.norm(structure.site - middle, axis=1)
-    tints = np.where(
-        away < 0.45 * radius, "white", np.where(away <= radius, CLOAK_TINT, INTEREST_TINT)
-    )
+    colours = np.where(away <= radius, CLOAK_TINT, INTEREST_TINT)
     kept = away >= 0.45 * radius
     inside = kept[structure.ligament_unit].all(axis=1)
     vertices = np.where(kept[:, None, None], structure.vertices, np.nan)
-    holed = RigidUnits(
-        vertices,
-        structure.site,
-        structure.ligament_unit[inside],
-        structure.ligament_vertex[inside],
-        structure.region,
-        structure.support,
+    holed = replace(
+        structure,
+        vertices=vertices,
+        ligament_unit=structure.ligament_unit[inside],
+        ligament_vertex=structure.ligament_vertex[inside],
     )
-    draw(axes, holed, colours=[str(tint) for tint in tints], margin=18.0)
+    draw(axes, holed, colours=colours.tolist(), margin=18.0)
     outline(axes, middle, [radius], style.CLOAKED)
     reach = np.ptp(structure.site[:, 0]) / 2 + 0.8 * spacing
     low, high = axes.get_xlim()
@@ -70,18 +63,7 @@ def inclusion(axes: Axes, structure: RigidUnits, spacing: float, radius: float) 
         for place in (-2.5, 0.0, 2.5):
             tip = middle + np.array([side * reach, place * spacing])
             tail = tip + np.array([side * 2.2 * spacing, 0.0])
-            axes.add_patch(
-                FancyArrowPatch(
-                    (float(tail[0]), float(tail[1])),
-                    (float(tip[0]), float(tip[1])),
-                    arrowstyle="-|>",
-                    mutation_scale=6.0,
-                    shrinkA=0,
-                    shrinkB=0,
-                    lw=1.3,
-                    color=style.ALTERED,
-                )
-            )
+            arrow(axes, tail, tip, style.ALTERED)
 
 
 def cut(axes: Axes, structure: RigidUnits, window: tuple[Floats, float]) -> None:

@@ -1,6 +1,6 @@
 """Composes Figure 1 at two-column width: problem, model, optimisation, making, comparing."""
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,7 @@ from reports.base import style
 from reports.facts import measures
 from reports.figures.framework import domain_panels, model_panel
 from reports.figures.shielding import MONITORED, monitored, monitored_recordings
-from reports.panels import Panel, PanelFigure, measured_overlay
+from reports.panels import CLAMP_TINT, CLOAK_TINT, Panel, PanelFigure, measured_overlay
 from reports.study import CLOAK, RigidUnits, StudyResults, from_dataset, middle_of_top_edge
 
 HEIGHT = 158.0
@@ -86,7 +86,7 @@ def _problem(figure: Figure, study: StudyResults, initial: RigidUnits) -> None:
     _arrow(figure, (45.5, top + SIDE / 2), (58.5, top + SIDE / 2), kind="<|-|>")
     _say(figure, 52.0, top + SIDE / 2 - 2.0, "alike in the\nregion of\ninterest", va="bottom")
     for k, (tint, text) in enumerate(
-        ((domain_panels.INTEREST_TINT, "region of interest"), (domain_panels.CLOAK_TINT, "cloak"))
+        ((domain_panels.INTEREST_TINT, "region of interest"), (CLOAK_TINT, "cloak"))
     ):
         y = top + SIDE / 2 + 4.0 + 10.5 * k
         _box(figure, (49.5, y, 5.0, 2.6), tint)
@@ -197,19 +197,11 @@ def _box(
 ) -> None:
     """Draws a rounded box: left, top, width and height in mm."""
     left, top, wide, high = place
-    figure.add_artist(
-        FancyBboxPatch(
-            (left / style.TWO_COLUMNS, 1 - (top + high) / HEIGHT),
-            wide / style.TWO_COLUMNS,
-            high / HEIGHT,
-            boxstyle="round,pad=0,rounding_size=0.006",
-            facecolor=colour,
-            edgecolor=edge,
-            linewidth=0.7,
-            zorder=-1,
-            mutation_aspect=style.TWO_COLUMNS / HEIGHT,
-        )
-    )
+    corner = (left / style.TWO_COLUMNS, 1 - (top + high) / HEIGHT)
+    look: dict[str, Any] = {"facecolor": colour, "edgecolor": edge, "linewidth": 0.7, "zorder": -1}
+    look["boxstyle"] = "round,pad=0,rounding_size=0.006"
+    look["mutation_aspect"] = style.TWO_COLUMNS / HEIGHT
+    figure.add_artist(FancyBboxPatch(corner, wide / style.TWO_COLUMNS, high / HEIGHT, **look))
 
 
 def _arrow(
@@ -221,16 +213,6 @@ def _arrow(
 ) -> None:
     """Draws an arrow between two points in mm from the page's top-left corner."""
     tail, tip = ((x / style.TWO_COLUMNS, 1 - y / HEIGHT) for x, y in (start, end))
-    figure.add_artist(
-        FancyArrowPatch(
-            tail,
-            tip,
-            arrowstyle=kind,
-            mutation_scale=8.0,
-            shrinkA=0,
-            shrinkB=0,
-            lw=1.0,
-            color="#4a4d52",
-            connectionstyle=f"arc3,rad={bend}",
-        )
-    )
+    look: dict[str, Any] = {"arrowstyle": kind, "connectionstyle": f"arc3,rad={bend}"}
+    look |= {"mutation_scale": 8.0, "shrinkA": 0, "shrinkB": 0, "lw": 1.0, "color": CLAMP_TINT}
+    figure.add_artist(FancyArrowPatch(tail, tip, **look))

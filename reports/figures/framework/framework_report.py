@@ -1,7 +1,5 @@
 """Makes the report of Figure 1, the framework, from a shaken study."""
 
-from __future__ import annotations
-
 import argparse
 
 from reports.figures.framework.figure import framework_figure

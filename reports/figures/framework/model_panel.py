@@ -1,13 +1,14 @@
 """Describes the model of one ligament between two rigid units, from the geometry of a design."""
 
-from __future__ import annotations
+from typing import Any
 
 import matplotlib.patheffects as effects
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Arc, FancyArrowPatch, Polygon
+from matplotlib.patches import Arc, Polygon
 
 from reports.base import style
+from reports.panels import arrow, point
 from reports.study import RigidUnits
 from sim.core import Floats
 
@@ -35,14 +36,10 @@ def ligament_panel(axes: Axes, structure: RigidUnits, ligament: int) -> None:
 def _freedoms(axes: Axes, centre: Floats) -> None:
     """Draws arrows of u_x, u_y and theta at a unit's centroid."""
     for way, name in (((2.3, 0.0), "$u_x$"), ((0.0, 2.3), "$u_y$")):
-        _arrow(axes, centre, centre + np.array(way))
+        arrow(axes, centre, centre + np.array(way), style.INTACT, 5.0, linewidth=0.7, zorder=6)
         x, y = centre + 1.28 * np.array(way)
         axes.text(x, y, name, fontsize=style.SMALL, ha="center", va="center", zorder=8)
-    axes.add_patch(
-        Arc(
-            (float(centre[0]), float(centre[1])), 2.6, 2.6, theta1=150, theta2=300, lw=0.7, zorder=6
-        )
-    )
+    axes.add_patch(Arc(point(centre), 2.6, 2.6, theta1=150, theta2=300, lw=0.7, zorder=6))
     axes.text(
         centre[0] - 1.9, centre[1] - 1.3, r"$\theta$",
         fontsize=style.SMALL, ha="center", va="center", zorder=8,
@@ -59,14 +56,7 @@ def _springs(axes: Axes, ends: Floats) -> None:
     line = ends[0] + part[:, None] * along + swing[:, None] * across
     axes.plot(*line.T, color=style.CLOAKED, lw=1.0, zorder=5)
     axes.plot(*ends.T, "o", color=style.CLOAKED, ms=2.4, zorder=6)
-    x, y = ends.mean(axis=0) - 2.6 * across
-    text = axes.text(
-        x,
-        y,
-        r"$k_\ell,\ k_s,\ k_\theta$", color=style.CLOAKED,
-        fontsize=style.TEXT, ha="center", va="center", zorder=8,
-    )  # fmt: skip
-    text.set_path_effects(_HALO)
+    _word(axes, ends.mean(axis=0) - 2.6 * across, r"$k_\ell,\ k_s,\ k_\theta$", style.CLOAKED)
 
 
 def _contact(axes: Axes, shapes: list[Floats], corners: Floats, ends: Floats) -> None:
@@ -78,40 +68,14 @@ def _contact(axes: Axes, shapes: list[Floats], corners: Floats, ends: Floats) ->
         sides.append(max(near, key=lambda side: float(side[1])))
     middle = ends.mean(axis=0)
     angles = sorted(float(np.degrees(np.arctan2(side[1], side[0]))) for side in sides)
-    axes.add_patch(
-        Arc(
-            (float(middle[0]), float(middle[1])),
-            7.0,
-            7.0,
-            theta1=angles[0],
-            theta2=angles[1],
-            color=style.ALTERED,
-            lw=1.0,
-            zorder=6,
-        )
-    )
+    look: dict[str, Any] = {"color": style.ALTERED, "lw": 1.0, "zorder": 6}
+    axes.add_patch(Arc(point(middle), 7.0, 7.0, theta1=angles[0], theta2=angles[1], **look))
     at = np.radians(np.mean(angles))
-    x, y = middle + 8.4 * np.array([np.cos(at), np.sin(at)])
-    text = axes.text(
-        x,
-        y,
-        r"contact: $\varphi$",
-        color=style.ALTERED, fontsize=style.TEXT, ha="center", va="center", zorder=8,
-    )  # fmt: skip
+    away = 8.4 * np.array([np.cos(at), np.sin(at)])
+    _word(axes, middle + away, r"contact: $\varphi$", style.ALTERED)
+
+
+def _word(axes: Axes, place: Floats, words: str, colour: str) -> None:
+    centred: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": style.TEXT}
+    text = axes.text(place[0], place[1], words, color=colour, zorder=8, **centred)
     text.set_path_effects(_HALO)
-
-
-def _arrow(axes: Axes, start: Floats, end: Floats) -> None:
-    axes.add_patch(
-        FancyArrowPatch(
-            (float(start[0]), float(start[1])),
-            (float(end[0]), float(end[1])),
-            arrowstyle="-|>",
-            mutation_scale=5.0,
-            shrinkA=0,
-            shrinkB=0,
-            lw=0.7,
-            color=style.INTACT,
-            zorder=6,
-        )
-    )

@@ -23,7 +23,7 @@ from .measures import scales as scales
 from .measures import squares as squares
 from .snapshot_grid import SnapshotLayout as SnapshotLayout
 from .snapshot_grid import SnapshotStructure as SnapshotStructure
-from .snapshot_grid import colour_bar as colour_bar
+from .snapshot_grid import shade_bar as shade_bar
 from .snapshot_grid import snapshot as snapshot
 from .snapshot_grid import snapshots as snapshots
 from .structure_panels import UnitColouring as UnitColouring

@@ -1,7 +1,5 @@
 """Describes the path along which a report shows its structures, and what it shows of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

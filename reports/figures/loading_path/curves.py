@@ -50,14 +50,10 @@ def structure_curves(
     """Draws values (structure, case, time) of some structures, the mean of their load cases."""
     mean = over_cases(problem, values)
     for name in names:
-        axes.plot(
-            path.values,
-            mean.sel(structure=name),
-            color=style.STRUCTURE_COLOURS[name],
-            lw=1.8 if name == "intact" else 1.2,
-            label=display_name(problem, name),
-            zorder=3 if name == "intact" else 4,
-        )
+        width, order = (1.8, 3) if name == "intact" else (1.2, 4)
+        colour, label = style.STRUCTURE_COLOURS[name], display_name(problem, name)
+        curve = mean.sel(structure=name)
+        axes.plot(path.values, curve, color=colour, lw=width, label=label, zorder=order)
 
 
 def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
@@ -125,13 +121,8 @@ def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: 
         axes.plot([spread.low, spread.high], [row, row], color=style.CLOAKED, lw=3.0, alpha=0.45)
         axes.plot(spread.middle, row, "o", ms=3.6, mfc="white", mec=style.CLOAKED, mew=1.0)
     for name, dashes in (("altered", (4.0, 2.0)), ("cloaked", (1.5, 1.5))):
-        axes.axvline(
-            float(ends.sel(structure=name)),
-            color=style.STRUCTURE_COLOURS[name],
-            lw=0.9,
-            ls=(0, dashes),
-            zorder=1,
-        )
+        colour, end = style.STRUCTURE_COLOURS[name], float(ends.sel(structure=name))
+        axes.axvline(end, color=colour, lw=0.9, ls=(0, dashes), zorder=1)
     axes.set_yticks(range(len(found)), [spread.noise.replace(" ", "\n", 1) for spread in found])
     axes.set(ylim=(len(found) - 0.5, -0.5), xlim=(0, None), xlabel=measure.symbol)
     axes.xaxis.set_major_locator(MaxNLocator(4))

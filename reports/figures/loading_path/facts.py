@@ -140,19 +140,12 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     label = f"{measure.label} reduced by"
     yield share(f"{measure.key}_reduction", label, float(gain.isel(time=-1)), note=where)
     second_half = gain.isel(time=slice(gain.sizes["time"] // 2, None))
+    key, least = f"{measure.key}_reduction_least", float(second_half.min())
     note = "the least over the second half of the path"
-    yield share(
-        f"{measure.key}_reduction_least", f"{label}, at least", float(second_half.min()), note=note
-    )
-    note = "the largest on the whole path"
-    yield number(
-        f"{measure.key}_cloaked_most",
-        f"{measure.label}, cloaked, at most",
-        float(cloaked.max()),
-        measure.unit,
-        digits=3,
-        note=note,
-    )
+    yield share(key, f"{label}, at least", least, note=note)
+    key, most = f"{measure.key}_cloaked_most", float(cloaked.max())
+    label, note = f"{measure.label}, cloaked, at most", "the largest on the whole path"
+    yield number(key, label, most, measure.unit, digits=3, note=note)
 
 
 def loss_facts(study: StudyResults) -> Iterator[Fact]:

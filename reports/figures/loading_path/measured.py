@@ -1,7 +1,5 @@
 """Describes recordings along the path: in the form of responses, as curves, and as numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measures how far structures are from what they should do; contraction and reaction."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Describes imperfect copies of the design, in the terms of the report's measure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,13 +1,10 @@
 """Describes structures along the path, true to scale, side by side and above one another."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -21,7 +18,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
-from reports.panels import draw
+from reports.panels import colour_bar, draw
 from reports.study import StudyResults, from_dataset
 
 LABEL, BAR, GAP = 6.0, 14.0, 1.2
@@ -69,7 +66,7 @@ class SnapshotLayout:
     beside: bool
 
     @classmethod
-    def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> SnapshotLayout:
+    def of(cls, study: StudyResults, path: Abscissa, tallest: float) -> "SnapshotLayout":
         """Returns the layout that shows them larger."""
         kinds, loads = rows(study), len(path.shown)
         across = style.TWO_COLUMNS - LABEL - BAR
@@ -126,7 +123,7 @@ def snapshots(
     values = [(load, style.INTACT) for load in loads]
     _labels(figure, grid, top, *((kinds, values) if grid.beside else (values, kinds)))
     end = grid.left + grid.columns * side
-    colour_bar(figure, shade, (end + 1.5, top, grid.lines * side - GAP))
+    shade_bar(figure, shade, (end + 1.5, top, grid.lines * side - GAP))
 
 
 def _labels(
@@ -141,10 +138,8 @@ def _labels(
         )  # fmt: skip
     for k, (text, colour) in enumerate(left):
         y = top + (k + 0.5) * grid.side - GAP / 2
-        style.write(
-            figure, grid.left - 1.5, y, text, rotation=90, ha="right", va="center", color=colour,
-            fontsize=style.SMALL if "\n" in text else style.TEXT, multialignment="center",
-        )  # fmt: skip
+        size = style.SMALL if "\n" in text else style.TEXT
+        style.write_upwards(figure, grid.left - 1.5, y, text, color=colour, fontsize=size)
 
 
 def snapshot(
@@ -153,23 +148,12 @@ def snapshot(
     """Draws one structure at one sample of its path, true to scale."""
     structure = from_dataset(part, problem.lattice.spacing)
     frame = part["displacement"].isel(case=case, time=sample).transpose("unit", "dof").values
-    draw(
-        axes,
-        structure,
-        frame,
-        values=shade.values(frame),
-        colour_map=shade.colours,
-        norm=shade.norm,
-    )
+    values = shade.values(frame)
+    draw(axes, structure, frame, values=values, colour_map=shade.colours, norm=shade.norm)
 
 
-def colour_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:
+def shade_bar(figure: Figure, shade: UnitColouring, place: tuple[float, float, float]) -> None:
     """Draws the bar of the snapshots, in `place`: mm from the left and the top, and height."""
-    left, top, height = place
-    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
-    figure.colorbar(ScalarMappable(shade.norm, shade.colours), cax=bar).set_label(
-        shade.label, labelpad=1.5
-    )
+    bar = colour_bar(figure, shade.norm, shade.colours, place, shade.label).ax
     bar.yaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 5, 10]))
     bar.yaxis.set_major_formatter(lambda value, _: f"{value:g}".replace("-", "−"))
-    bar.tick_params(length=1.5)

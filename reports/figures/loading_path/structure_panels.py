@@ -1,34 +1,32 @@
 """Describes panels that show structures: at rest with their regions, and along the path."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, Normalize
-from matplotlib.patches import FancyArrowPatch
-from numpy.typing import NDArray
 
 from pipeline.problem import Problem
 from pipeline.problem.sections import Region
 from reports.base import style
 from reports.panels import (
+    CLAMP_TINT,
+    CLOAK_TINT,
     ColourField,
+    arrow,
     draw,
     draw_clamps,
     scalar,
     signed_field,
     size_field,
+    tints,
     turn_field,
 )
 from reports.study import CLAMPED, CLOAK, DRIVEN, INCLUSION, RigidUnits, from_dataset
 from sim.core import Floats
 
-CLOAK_TINT, UNIT_TINT, CLAMP_TINT, DRIVE_TINT = "#c9b3e0", "#d9dce0", "#4a4d52", "#f2c48d"
-INTEREST_TINT, RIGID_TINT = "#b7dcb2", "#8d9299"
+UNIT_TINT, DRIVE_TINT, INTEREST_TINT, RIGID_TINT = "#d9dce0", "#f2c48d", "#b7dcb2", "#8d9299"
 
 
 @dataclass(frozen=True)
@@ -63,29 +61,15 @@ def shade_of(problem: Problem, response: xr.Dataset) -> UnitColouring:
 def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) -> None:
     """Draws one structure at rest: what is clamped, driven, looked at and redesigned."""
     structure = from_dataset(response.sel(structure=name), problem.lattice.spacing)
-    interest = np.zeros(structure.n_units, dtype=bool)
-    if isinstance(problem.objective.region, Region):
-        interest = response["roi"].values.astype(bool)
+    held = {CLAMPED: CLAMP_TINT, DRIVEN: DRIVE_TINT}
+    altered = {CLOAK: CLOAK_TINT} if name == "cloaked" else {}
+    altered |= {INCLUSION: RIGID_TINT} if name != "intact" else {}
+    interest = response["roi"].values * isinstance(problem.objective.region, Region)
+    others = np.where(interest, INTEREST_TINT, UNIT_TINT).tolist()
     draw_clamps(axes, structure, problem.lattice.spacing)
-    draw(axes, structure, colours=list(_tints(structure, interest, name)), margin=12.0)
+    draw(axes, structure, colours=tints(structure, held, altered, others), margin=12.0)
     if name != "intact" and not np.isnan(float(response["direction"][0])):
         _load_arrows(axes, structure, float(response["direction"][0]))
-
-
-def _tints(structure: RigidUnits, interest: NDArray[np.bool_], name: str) -> Iterator[str]:
-    for region, support, looked_at in zip(
-        structure.region, structure.support, interest, strict=True
-    ):
-        if support == CLAMPED:
-            yield CLAMP_TINT
-        elif support == DRIVEN:
-            yield DRIVE_TINT
-        elif region == CLOAK and name == "cloaked":
-            yield CLOAK_TINT
-        elif region == INCLUSION and name != "intact":
-            yield RIGID_TINT
-        else:
-            yield INTEREST_TINT if looked_at else UNIT_TINT
 
 
 def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
@@ -97,16 +81,4 @@ def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
     for x, y in ends[few[1:-1] if len(few) == 5 else few]:
         start = np.array([x, y]) - 1.3 * reach * along
         end = np.array([x, y]) - 0.3 * reach * along
-        arrow = FancyArrowPatch(
-            (float(start[0]), float(start[1])),
-            (float(end[0]), float(end[1])),
-            arrowstyle="-|>",
-            mutation_scale=6.0,
-            shrinkA=0,
-            shrinkB=0,
-            linewidth=1.3,
-            color=style.ALTERED,
-            zorder=7,
-            clip_on=False,
-        )
-        axes.add_patch(arrow)
+        arrow(axes, start, end, style.ALTERED, zorder=7, clip_on=False)

@@ -1,7 +1,5 @@
 """Reads the designs of a problem with the parameter that they differ by."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

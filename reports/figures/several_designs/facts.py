@@ -1,7 +1,5 @@
 """States numbers of several designs: how well each shields the boundary, and how that goes on."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,17 +1,14 @@
 """Composes the figure of several designs: how well each shields, and the designs."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from reports.base import style
 from reports.figures.several_designs.designs import RADIUS, DesignSeries, SeriesDesign
-from reports.panels import Panel, PanelFigure, draw, draw_clamps, outline
+from reports.panels import Panel, PanelFigure, colour_bar, draw, draw_clamps, outline
 from reports.study import from_dataset
 
 PER_ROW = 3
@@ -52,7 +49,9 @@ def _structures(figure: Figure, family: DesignSeries, side: float, rows: int) ->
         top = HEAD + (k // PER_ROW) * (side + HEAD)
         axes = style.place(figure, left, top, side, side)
         _structure(axes, family, design, name, norm)
-    _bar(figure, norm, LEFT + PER_ROW * (side + GAP), HEAD, rows * (side + HEAD) - HEAD)
+    left, height = LEFT + PER_ROW * (side + GAP) + 1.0, rows * (side + HEAD) - HEAD
+    place, label = (left, HEAD + 0.0625 * height, 0.875 * height), r"$U_\mathrm{peak}$"
+    colour_bar(figure, norm, style.MAGNITUDE, place, label, extend="max").locator = MaxNLocator(5)
 
 
 def _limit(family: DesignSeries) -> float:
@@ -71,16 +70,8 @@ def _curve(axes: Axes, family: DesignSeries) -> None:
         peaks = [float(design.boundary.sel(structure=name)) for design in family.designs]
         colour = style.STRUCTURE_COLOURS[name]
         axes.plot(sizes, peaks, line, color=colour, marker="o", ms=3.2, lw=1.1)
-        axes.annotate(
-            name.capitalize(),
-            (sizes[-1], peaks[-1]),
-            xytext=(0, 6),
-            textcoords="offset points",
-            ha="right",
-            va="bottom",
-            color=colour,
-            fontsize=style.TEXT,
-        )
+        at, words = (sizes[-1], peaks[-1]), name.capitalize()
+        style.note(axes, at, words, (0, 6), ha="right", color=colour, fontsize=style.TEXT)
     top = max(float(design.boundary.max()) for design in family.designs)
     axes.set(xlabel=label, ylim=(0.0, 1.15 * top))
     axes.set_ylabel(r"$U^\mathrm{max}_{\partial\Omega}$", labelpad=2.0)
@@ -101,12 +92,3 @@ def _structure(
     title = "Altered" if name == "altered" else f"Cloaked, {family.label(design)}"
     colour = style.STRUCTURE_COLOURS[name]
     axes.set_title(title, color=colour, fontsize=style.TEXT, pad=1.5)
-
-
-def _bar(figure: Figure, norm: Normalize, left: float, top: float, height: float) -> None:
-    bar = style.place(figure, left + 1.0, top + 0.15 * height, 2.4, 0.7 * height)
-    colours = ScalarMappable(norm, style.MAGNITUDE)
-    made = figure.colorbar(colours, cax=bar, extend="max")
-    made.set_label(r"$U_\mathrm{peak}$", labelpad=1.5)
-    made.locator = MaxNLocator(5)
-    bar.tick_params(length=1.5)

@@ -1,7 +1,5 @@
 """Makes the report of several designs of one problem: facts, tables, one animation of all."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from typing import Any

@@ -11,10 +11,10 @@ from reports.base import style
 from reports.figures.loading_path import (
     UnitColouring,
     abscissa_of,
-    colour_bar,
     curves,
     display_name,
     measures,
+    shade_bar,
     shade_of,
     snapshot,
     structures,
@@ -68,7 +68,7 @@ def _band(
     yield Panel((next(letters), "", 0.0, top))
     draws = [*([None] * (len(band) - 1)), lambda figure: _structures(figure, columns, shade, *at)]
     for study, start, draw in zip(band, starts, draws, strict=True):
-        yield Panel((next(letters), heading(study), LEFT + start * side, top), draw)
+        yield Panel((next(letters), style.literal(heading(study)), LEFT + start * side, top), draw)
 
 
 def _structures(
@@ -88,12 +88,10 @@ def _structures(
                 axes.set_title(title, color=colour, fontsize=style.TEXT, pad=1.0)
     way = abscissa_of(columns[0][0].problem, columns[0][0].response)
     for row, sample in enumerate((0, -1)):
-        style.write(
-            figure, 3.0, top + (row + 0.5) * side, f"{way.symbol} = {way.at(sample)}",
-            rotation=90, ha="right", va="center", fontsize=style.SMALL,
-        )  # fmt: skip
+        words, y = f"{way.symbol} = {way.at(sample)}", top + (row + 0.5) * side
+        style.write_upwards(figure, 3.0, y, words, fontsize=style.SMALL)
     right = LEFT + len(columns) * side
-    colour_bar(figure, shade, (right + 0.5, top, 2 * side - GAP))
+    shade_bar(figure, shade, (right + 0.5, top, 2 * side - GAP))
 
 
 def heading(study: StudyResults) -> str:
@@ -115,4 +113,6 @@ def _curves(study: StudyResults, k: int, top: float, letters: Iterator[str]) -> 
             else:
                 curves.contraction_panel(axes, study, way)
 
-        yield Panel((next(letters), f"{heading(study)}, {title.lower()}", left, y), draw)
+        yield Panel(
+            (next(letters), f"{style.literal(heading(study))}, {title.lower()}", left, y), draw
+        )

@@ -1,7 +1,5 @@
 """Makes the report of several studies: facts and tables by study, one animation of all."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace

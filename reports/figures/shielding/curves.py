@@ -1,7 +1,5 @@
 """Draws panels of Figure 2: loss (b), motion of one unit (d), robustness map (e)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,17 +28,9 @@ def _paper_line(axes: Axes, design: xr.Dataset) -> None:
     target = paper_loss(float(design["loss"].isel(method=0, evaluation=0)))
     axes.axhline(target, color=style.GREY, lw=0.7, ls=(0, (4, 2)), zorder=1)
     axes.set_ylim(0.55 * min(target, float(design["loss"].min())), None)
-    axes.annotate(
-        "paper’s −70 %",
-        (1.0, target),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 1.5),
-        textcoords="offset points",
-        ha="right",
-        va="bottom",
-        fontsize=style.SMALL,
-        color=style.GREY,
-    )
+    across = ("axes fraction", "data")
+    words, at = "paper’s −70 %", (1.0, target)
+    style.note(axes, at, words, ha="right", color=style.GREY, xycoords=across)
 
 
 def motion_panel(
@@ -59,21 +49,12 @@ def motion_panel(
         curve = series.sel(structure=name).values
         colour = style.STRUCTURE_COLOURS[name]
         axes.plot(time, curve, color=colour, lw=1.2, label=name.capitalize(), zorder=3 + k)
-        _span_arrow(
-            axes, time[-1] * (1.2 - 0.11 * k), curve, colour, float(span.sel(structure=name))
-        )
+        place = time[-1] * (1.2 - 0.11 * k)
+        _span_arrow(axes, place, curve, colour, float(span.sel(structure=name)))
     for row in rows:
         curve = np.interp(row.time, time, series.sel(structure=row.name).values)
-        axes.plot(
-            row.time,
-            curve,
-            "o",
-            ms=2.8,
-            mfc=style.STRUCTURE_COLOURS[row.name],
-            mec="white",
-            mew=0.4,
-            zorder=6,
-        )
+        colour = style.STRUCTURE_COLOURS[row.name]
+        axes.plot(row.time, curve, "o", ms=2.8, mfc=colour, mec="white", mew=0.4, zorder=6)
     end = float(time[-1])
     unit = middle_of_top_edge(from_dataset(response.isel(structure=0), scene.spacing))
     for each in recordings:
@@ -85,15 +66,8 @@ def motion_panel(
     axes.xaxis.set_label_coords(0.5 / 1.27, -0.13)
     lines = [*axes.get_legend_handles_labels()[0], *measured_overlay.handles(recordings)]
     axes.legend(handles=lines, loc="upper left", ncols=3, borderaxespad=0.0, columnspacing=1.0)
-    axes.text(
-        1.0,
-        0.01,
-        f"peak-to-peak −{percent(measures.reduction(span))}",
-        transform=axes.transAxes,
-        ha="right",
-        va="bottom",
-        fontsize=style.TEXT,
-    )
+    words, right = f"peak-to-peak −{percent(measures.reduction(span))}", axes.transAxes
+    axes.text(1.0, 0.01, words, transform=right, ha="right", va="bottom", fontsize=style.TEXT)
 
 
 def _measured(axes: Axes, recording: RecordedMotion, unit: int) -> None:
@@ -112,16 +86,7 @@ def _span_arrow(axes: Axes, at: float, curve: Floats, colour: str, span: float) 
     low, high = float(curve.min()), float(curve.max())
     caps = {"arrowstyle": "|-|,widthA=0.15,widthB=0.15", "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (at, high), (at, low), arrowprops=caps | {"color": colour, "lw": 0.8})
-    axes.annotate(
-        f"{span:.2f} mm",
-        (at, high),
-        xytext=(0, 1.5),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=style.SMALL,
-        color=colour,
-    )
+    style.note(axes, (at, high), f"{span:.2f} mm", color=colour)
 
 
 def map_panel(figure: Figure, axes: Axes, bar: Axes, scene: ReportScene, sweep: xr.Dataset) -> None:

@@ -4,8 +4,6 @@ Paper: Bordiga et al., "Nonlinear mechanical metamaterial cloaks", section "Shie
 excitations" and the caption of its Figure 2.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -157,15 +155,8 @@ def shape_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
         f"largest {worded(float(distances.max()), 'mm', 2)}; "
         + ("imposed here, not in the paper" if scene.symmetry == "C4" else "not imposed")
     )
-    yield number(
-        "asymmetry",
-        "Departure from four-fold symmetry",
-        rms,
-        "mm",
-        digits=2,
-        paper="symmetric",
-        note=note,
-    )
+    label, told = "Departure from four-fold symmetry", "symmetric"
+    yield number("asymmetry", label, rms, "mm", digits=2, paper=told, note=note)
     inner, outer = (scene.radii[-1] + side * 0.5 * scene.spacing for side in (-1.0, 1.0))
     for key, where, low, high, paper in (
         ("centre", "centre of the cloak", 0.0, inner, "high"),
@@ -270,13 +261,7 @@ def check_facts(design: xr.Dataset, response: xr.Dataset) -> Iterator[Fact]:
     crossed = int(cloaked["overlaps"].sum())
     yield number("overlaps_motion", "Overlaps in motion", crossed, note=motion)
     void = float(np.degrees(cloaked["min_void_angle"].min()))
-    yield number(
-        "void_angle_motion",
-        "Smallest void angle in motion",
-        void,
-        "deg",
-        digits=3,
-        note="cloaked, all load cases and times",
-    )
+    label, note = "Smallest void angle in motion", "cloaked, all load cases and times"
+    yield number("void_angle_motion", label, void, "deg", digits=3, note=note)
     note = "relative, by step halving; the largest of all load cases"
     yield from checks.error_facts(response, note)

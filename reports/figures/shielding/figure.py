@@ -1,7 +1,5 @@
 """Composes Figure 2 of the paper: panels with their tables, text of the page, animation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -73,19 +71,15 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
         axes = style.place(figure, 118.5, low + 6.0, 43.0, 36.0)
         map_panel(figure, axes, style.place(figure, 163.5, low + 6.0, 2.4, 36.0), scene, sweep)
 
+    shapes, over = vertices(design), "loss over loading angle and frequency (panel e)"
+    middle = "motion of the middle unit of the top edge, every load case (panel d)"
     panels = [
         Panel(
             ("a", "", 0.0, 0.8),
             lambda figure: _problem(figure, scene, design, direction),
             "Reference, altered and cloaked structures; hatched pads clamp the corners, the arrow "
             "is the drive, the dashed circle bounds the cloak.",
-            [
-                Table(
-                    "design.csv",
-                    "vertices of the cloaked and of the initial design",
-                    vertices(design),
-                )
-            ],
+            [Table("design.csv", "vertices of the cloaked and of the initial design", shapes)],
         ),
         Panel(
             ("b", "Optimisation", 123.0, 0.8),
@@ -104,23 +98,13 @@ def shielding_figure(study: StudyResults) -> PanelFigure:
             ("d", f"Middle unit of the top edge, {load}", 0.0, low),
             motion,
             "Vertical displacement of the middle unit of the top edge; dots mark the snapshots.",
-            [
-                Table(
-                    "top_edge.csv",
-                    "motion of the middle unit of the top edge, every load case (panel d)",
-                    _top_edge(scene, response),
-                )
-            ],
+            [Table("top_edge.csv", middle, _top_edge(scene, response))],
         ),
         Panel(
             ("e", most, 109.0, low),
             losses,
             "Loss over loading angle and frequency; stars mark the loads designed for.",
-            [
-                Table(
-                    "robustness.csv", "loss over loading angle and frequency (panel e)", _map(sweep)
-                )
-            ],
+            [Table("robustness.csv", over, _map(sweep))],
         ),
     ]
     remark = measured_overlay.caption(study.recordings)

@@ -1,15 +1,12 @@
 """Describes panels of Figure 2 that show structures: the problem (a) and the snapshots (c)."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import matplotlib.patheffects as effects
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
@@ -17,7 +14,16 @@ from matplotlib.patches import Arc
 from reports.base import style
 from reports.facts import measures
 from reports.figures.shielding.facts import MONITORED
-from reports.panels import draw, draw_clamps, drive_arrows, outline
+from reports.panels import (
+    CLAMP_TINT,
+    CLOAK_TINT,
+    colour_bar,
+    draw,
+    draw_clamps,
+    drive_arrows,
+    outline,
+    tints,
+)
 from reports.study import (
     CLAMPED,
     CLOAK,
@@ -34,7 +40,8 @@ from sim.core import Floats
 PHASES = (0.05, 0.3, 0.55, 0.8)
 """Parts of the last drive cycle that the snapshots show: near both peaks, and after both zeros."""
 
-CLOAK_TINT, UNIT_TINT, CLAMP_TINT = "#c9b3e0", "#c3c7cc", "#4a4d52"
+UNIT_TINT = "#c3c7cc"
+_MOTION = ("time", "unit", "dof")
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,9 @@ def problem_panel(
 ) -> None:
     """Draws a structure of panel (a), "reference", "altered" or "cloaked", and the drive."""
     draw_clamps(axes, structure, scene.spacing)
-    draw(axes, structure, colours=list(_colours(structure, name)))
+    held = {CLAMPED: CLAMP_TINT} | ({DRIVEN: style.ALTERED} if name != "reference" else {})
+    altered = {CLOAK: CLOAK_TINT} if name == "cloaked" else {}
+    draw(axes, structure, colours=tints(structure, held, altered, UNIT_TINT))
     middle = np.array(scene.middle)
     if name == "reference":
         return
@@ -85,18 +94,6 @@ def _direction(axes: Axes, scene: ReportScene, direction: float) -> None:
         artist.set_path_effects(halo)
 
 
-def _colours(structure: RigidUnits, name: str) -> Iterator[str]:
-    for region, support in zip(structure.region, structure.support, strict=True):
-        if support == CLAMPED:
-            yield CLAMP_TINT
-        elif support == DRIVEN and name != "reference":
-            yield style.ALTERED
-        elif region == CLOAK and name == "cloaked":
-            yield CLOAK_TINT
-        else:
-            yield UNIT_TINT
-
-
 def snapshot_times(scene: ReportScene, response: xr.Dataset) -> Floats:
     """Tells when the snapshots are, over the last whole drive cycle, s."""
     end = response["time"].values[-1]
@@ -112,15 +109,8 @@ def simulated_rows(scene: ReportScene, response: xr.Dataset) -> list[SnapshotRow
     for name in ("altered", "cloaked"):
         part = response.sel(structure=name).isel(case=case)
         frames = part["displacement"].sel(time=wanted, method="nearest")
-        rows.append(
-            SnapshotRow(
-                name,
-                "simulation",
-                from_dataset(part, scene.spacing),
-                frames["time"].values,
-                frames.transpose("time", "unit", "dof").values,
-            )
-        )
+        structure, motion = from_dataset(part, scene.spacing), frames.transpose(*_MOTION).values
+        rows.append(SnapshotRow(name, "simulation", structure, frames["time"].values, motion))
     return rows
 
 
@@ -152,25 +142,16 @@ def snapshots_panel(
     norm = Normalize(0.0, _colour_limit(scene, rows))
     for k, row in enumerate(rows):
         y = top + k * side
-        style.write(
-            figure,
-            left - 1.5,
-            y + side / 2,
-            f"{row.name.capitalize()}\n{row.source}",
-            rotation=90,
-            ha="right",
-            va="center",
-            multialignment="center",
-            color=style.STRUCTURE_COLOURS[row.name],
-            fontsize=style.TEXT,
-        )
+        words, colour = f"{row.name.capitalize()}\n{row.source}", style.STRUCTURE_COLOURS[row.name]
+        style.write_upwards(figure, left - 1.5, y + side / 2, words, color=colour)
         for m, frame in enumerate(row.displacement):
             axes = style.place(figure, left + m * side, y, side - gap, side - gap)
             _snapshot(axes, scene, row, frame, norm)
             if k == 0:
                 text = f"$t$ = {row.time[m]:.3f} s"
                 axes.set_title(text, fontsize=style.TEXT, pad=1.0)
-    _magnitude_bar(figure, norm, left + count * side + 1.5, top, len(rows) * side - gap)
+    place = (left + count * side + 1.5, top, len(rows) * side - gap)
+    colour_bar(figure, norm, style.MAGNITUDE, place, r"$\|\mathbf{U}\|$", extend="max")
 
 
 def _colour_limit(scene: ReportScene, rows: Sequence[SnapshotRow]) -> float:
@@ -194,10 +175,3 @@ def _snapshot(
     x, y = np.nanmean(deformed(structure, frame)[unit], axis=0)  # at rest where it was lost
     colour = style.STRUCTURE_COLOURS[row.name]
     axes.plot(x, y, "o", ms=3.6, mfc=colour, mec="white", mew=0.6, zorder=8)
-
-
-def _magnitude_bar(figure: Figure, norm: Normalize, left: float, top: float, height: float) -> None:
-    bar = style.place(figure, left, top + 0.1 * height, 2.4, 0.8 * height)
-    colours = ScalarMappable(norm, style.MAGNITUDE)
-    figure.colorbar(colours, cax=bar, extend="max").set_label(r"$\|\mathbf{U}\|$", labelpad=1.5)
-    bar.tick_params(length=1.5)

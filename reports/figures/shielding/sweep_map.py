@@ -1,7 +1,5 @@
 """Describes a sweep over direction and frequency of the drive as a map."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

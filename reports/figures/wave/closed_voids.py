@@ -1,7 +1,5 @@
 """Tells which voids of a structure are closed to contact, and when."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

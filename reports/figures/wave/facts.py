@@ -1,7 +1,5 @@
 """Describes the numbers of a report on waves, each computed from the datasets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

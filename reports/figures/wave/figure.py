@@ -1,7 +1,5 @@
 """Composes the figure of structures that waves run through: its panels and their tables."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tells how a wave goes on in each structure: at some places, and against the intact one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

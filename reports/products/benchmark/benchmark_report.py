@@ -1,7 +1,5 @@
 """Makes the page on benchmarks: a section for each picture, with what lies behind it."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,43 +11,12 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from pipeline import datasets
-from reports.base import Table
+from reports.base import Table, prose
 from reports.page import Report, publish
 from reports.products.benchmark import charts, optimisers, tables, work_precision
 
 PRECISION, OPTIMISERS, TRACKING = "precision_", "optimisers_", "tracking"
-_PRECISION = (
-    "Processor time of one run against the error of (a) the motion of the region of interest, (b)"
-    " the loss, (c) its gradient by all design variables, each method at ever tighter settings."
-    " Points are medians, bars the range of the runs. Compile time is not in it: see the table."
-)
-_GRADIENTS = (
-    "What a gradient costs beside its loss, by the adjoints of the solvers and by central"
-    " differences, against its error. Differences take two losses for every design variable."
-)
-_GROWTH = (
-    "(a) Time of one equilibrium, from rest to 10 % compression; the exponents are fitted to"
-    " lattices of 900 units and more. (b) Peak memory of the process, of which Python, JAX and the"
-    " compiler take most."
-)
-_CASES = (
-    "(a) Time of a sweep, of which each case is a problem of its own, read, checked and simulated;"
-    " (b) peak memory of its process. The exponents are fitted to 10 cases and more."
-)
-_ABLATION = (
-    "What a plan can skip, done (grey) and skipped (purple); how many times longer it takes to do"
-    " it, and the largest change of the result that it makes."
-)
-_OPTIMISERS = (
-    "Loss of the best design so far that keeps all limits (to 1 µm), against evaluations and"
-    " processor time, and its KKT residual. Below: the share of problems (each scene, with 30, 10"
-    " and 3 % of the possible decrease left) that an optimiser solves within so many times the"
-    " evaluations of the fastest."
-)
-_TRACKING = (
-    "Root mean square error of the displacement (left) and the rotation (right) of the units"
-    " against the rate of the frames that are kept; the videos are rendered (SYNTHETIC)."
-)
+_PROSE = prose(__file__)
 
 
 class BenchmarkSection(NamedTuple):
@@ -126,33 +93,30 @@ def _machines(given: Iterable[xr.Dataset]) -> list[str]:
 
 def sections(given: Mapping[str, xr.Dataset]) -> Iterator[BenchmarkSection]:
     """Yields the pictures of the datasets given, in the order of the page."""
-    scenes = _of(given, PRECISION)
+    scenes, contests = _of(given, PRECISION), _of(given, OPTIMISERS)
     for name, data in scenes.items():
+        shown = {f"{PRECISION}{name}": data}
         draw = partial(work_precision.draw_work_precision, data)
         told = data.attrs["subject"]
-        yield BenchmarkSection(
-            f"{PRECISION}{name}", told, _PRECISION, draw, {f"{PRECISION}{name}": data}
-        )
-    if scenes:
-        draw = partial(work_precision.draw_gradients, scenes)
-        shown = {f"{PRECISION}{name}": data for name, data in scenes.items()}
-        yield BenchmarkSection("gradients", "Cost of a gradient", _GRADIENTS, draw, shown)
-    contests = _of(given, OPTIMISERS)
-    if contests:
-        draw = partial(optimisers.draw_optimisers, contests)
-        shown = {f"{OPTIMISERS}{name}": data for name, data in contests.items()}
-        yield BenchmarkSection("optimisers", "Optimisers", _OPTIMISERS, draw, shown)
-    for name, caption, build in (
-        ("growth", _GROWTH, charts.draw_growth),
-        ("cases", _CASES, charts.draw_growth),
-        ("ablation", _ABLATION, charts.draw_ablation),
-        (TRACKING, _TRACKING, charts.draw_tracking_accuracy),
+        yield BenchmarkSection(f"{PRECISION}{name}", told, _PROSE["precision"], draw, shown)
+    for name, title, start, found, several in (
+        ("gradients", "Cost of a gradient", PRECISION, scenes, work_precision.draw_gradients),
+        ("optimisers", "Optimisers", OPTIMISERS, contests, optimisers.draw_optimisers),
+    ):
+        if found:
+            shown = {f"{start}{scene}": data for scene, data in found.items()}
+            yield BenchmarkSection(name, title, _PROSE[name], partial(several, found), shown)
+    for name, single in (
+        ("growth", charts.draw_growth),
+        ("cases", charts.draw_growth),
+        ("ablation", charts.draw_ablation),
+        (TRACKING, charts.draw_tracking_accuracy),
     ):
         for stem in (name, f"small_{name}"):
             if stem in given:
                 data = given[stem]
-                draw = partial(build, data)
-                yield BenchmarkSection(stem, data.attrs["subject"], caption, draw, {stem: data})
+                draw, told = partial(single, data), data.attrs["subject"]
+                yield BenchmarkSection(stem, told, _PROSE[name], draw, {stem: data})
 
 
 def _of(given: Mapping[str, xr.Dataset], start: str) -> dict[str, xr.Dataset]:

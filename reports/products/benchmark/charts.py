@@ -1,42 +1,36 @@
 """Draws what skipping saves, how time and memory grow, and how well tracking does."""
 
-from __future__ import annotations
-
 import numpy as np
+import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from reports.base import style
-from reports.products.benchmark import marks
+from reports.products.benchmark import marks, tables
 
 DONE, SKIPPED = "done", "skipped"
 _ROW, _LEFT, _WIDE = 8.0, 44.0, 84.0
 _BARS = {DONE: style.GREY, SKIPPED: style.CLOAKED}
 FITTED = {"units": 900, "cases": 10}
 """Fewest that the exponents are fitted to: below, fixed costs count."""
-_MIB = 2.0**20
 _VIDEOS = (style.CLOAKED, style.METHOD_COLOURS["mma"], "#2f86b4", "#8a5a2b", "#a3304a", style.GREY)
 _DASHES = {"own tracker": "-", "plain OpenCV": ":"}
 
 
 def draw_ablation(data: xr.Dataset) -> Figure:
     """Draws bars of time, how many times less it takes, and what the result changes by."""
-    names = list(dict.fromkeys(data["method"].values))
+    found = tables.points(data)
+    names = list(dict.fromkeys(found["method"]))
     high = len(names) * _ROW
     figure = style.page(high + 24.0)
     axes = style.place(figure, _LEFT, 10.0, _WIDE, high)
     for row, name in enumerate(names):
-        chosen = data.isel(point=np.flatnonzero(data["method"].values == name))
-        times = {
-            str(setting): float(np.nanmedian(runs)) if np.isfinite(runs).any() else np.nan
-            for setting, runs in zip(
-                chosen["setting"].values, chosen["cpu_time"].values, strict=True
-            )
-        }
+        chosen = found[found["method"] == name]
+        times = chosen.set_index("setting")["time, s"]
         for offset, setting in ((-0.18, DONE), (0.18, SKIPPED)):
             axes.barh(row + offset, times[setting], height=0.34, color=_BARS[setting])
-        change = np.nanmax(chosen["error"].values, initial=0.0)
+        change = np.nanmax(chosen.filter(like="error of "), initial=0.0)
         told = f"{times[DONE] / times[SKIPPED]:.2f} ×,  change {change:.1e}"
         axes.text(1.03, row, told, transform=axes.get_yaxis_transform(), va="center")
     axes.set_yticks(range(len(names)), names)
@@ -50,15 +44,11 @@ def draw_ablation(data: xr.Dataset) -> Figure:
 def draw_growth(data: xr.Dataset) -> Figure:
     """Draws time and peak memory against the number of units or of cases, with fitted exponents."""
     figure, left, right = _pair(66.0, ("Time", "Memory"))
-    measured = data.isel(point=np.flatnonzero(data["outcome"].values == "measured"))
-    times = np.nanmedian(measured["cpu_time"].values, axis=1)
-    of = "cases" if "cases" in data["work"].values else "units"
-    sizes = measured["units"] if of == "units" else measured["count"].sel(work="cases")
-    memory = measured["memory"].values / _MIB
-    for axes, values in ((left, times), (right, memory)):
-        _lines(axes, measured["method"].values, sizes.values, values, FITTED[of])
+    measured, of = tables.measured(data), "cases" if "cases" in data["work"].to_numpy() else "units"
+    for axes, column in ((left, "time, s"), (right, "peak, MiB")):
+        _lines(axes, measured, of, column)
     left.set(ylabel="processor time, s", yscale="log")
-    right.set(ylabel="peak memory, MiB", ylim=(0, 1.1 * memory.max()))
+    right.set(ylabel="peak memory, MiB", ylim=(0, 1.1 * measured["peak, MiB"].max()))
     left.legend(loc="upper left")
     right.legend(loc="lower right")
     for axes in (left, right):
@@ -75,17 +65,13 @@ def exponent(sizes: np.ndarray, values: np.ndarray, least: int) -> float:
     return float(np.polyfit(np.log(sizes[large]), np.log(values[large]), 1)[0])
 
 
-def _lines(
-    axes: Axes, methods: np.ndarray, sizes: np.ndarray, values: np.ndarray, least: int
-) -> None:
-    for method in dict.fromkeys(methods):
-        at = np.flatnonzero(methods == method)
-        power = exponent(sizes[at], values[at], least)
+def _lines(axes: Axes, measured: pd.DataFrame, of: str, column: str) -> None:
+    for method, found in measured.groupby("method", sort=False):
+        sizes, values = found[of].to_numpy(), found[column].to_numpy()
+        power = exponent(sizes, values, FITTED[of])
         told = "" if np.isnan(power) else rf", $n^{{{power:.2f}}}$"
-        axes.plot(
-            sizes[at], values[at], linewidth=0.8, markersize=3.5, label=f"{method}{told}",
-            **marks.drawn(str(method)),
-        )  # fmt: skip
+        look = {"linewidth": 0.8, "markersize": 3.5, **marks.drawn(str(method))}
+        axes.plot(sizes, values, label=f"{method}{told}", **look)
 
 
 def _pair(height: float, titles: tuple[str, str]) -> tuple[Figure, Axes, Axes]:
@@ -112,8 +98,8 @@ def draw_tracking_accuracy(data: xr.Dataset) -> Figure:
 
 
 def _accuracies(axes: Axes, data: xr.Dataset, error: xr.DataArray) -> None:
-    for colour, video in zip(_VIDEOS * 2, data["video"].values, strict=False):
-        for method in data["tracker"].values:
+    for colour, video in zip(_VIDEOS * 2, data["video"].to_numpy(), strict=False):
+        for method in data["tracker"].to_numpy():
             axes.plot(
                 data["frame_rate"].sel(video=video), error.sel(video=video, tracker=method),
                 color=colour, linestyle=_DASHES[str(method)], marker="o", markersize=3.0,

@@ -1,7 +1,5 @@
 """Tells how a method is drawn, the same on every picture."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 

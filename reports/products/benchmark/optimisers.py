@@ -1,7 +1,5 @@
 """Optimisers: the best feasible loss against evaluations and time, and their profile."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,23 +1,12 @@
 """Describes points of a benchmark in rows: for the page and as CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from reports.base import Table
-
-
-class Failure(NamedTuple):
-    """Describes a point without figures."""
-
-    method: str
-    setting: str
-    task: str
-    reason: str
 
 
 def table(name: str, data: xr.Dataset) -> Table:
@@ -26,7 +15,8 @@ def table(name: str, data: xr.Dataset) -> Table:
         return _contest(name, data)
     if "video" in data.dims:
         return _tracking(name, data)
-    return _points(name, data)
+    columns = {column: values.to_numpy() for column, values in points(data).items()}
+    return Table(f"{name}.csv", "every point: times, errors, work", columns)
 
 
 def _tracking(name: str, data: xr.Dataset) -> Table:
@@ -48,46 +38,46 @@ def _tracking(name: str, data: xr.Dataset) -> Table:
 
 
 def _contest(name: str, data: xr.Dataset) -> Table:
-    evaluated = np.isfinite(data["cpu_time"].values)
+    evaluated = np.isfinite(data["cpu_time"].to_numpy())
     last = np.maximum(evaluated.sum(axis=1) - 1, 0)
     rows = np.arange(len(last))
     columns = {
-        "optimiser": data["optimiser"].values,
+        "optimiser": data["optimiser"].to_numpy(),
         "evaluations": evaluated.sum(axis=1),
-        "time, s": data["cpu_time"].values[rows, last],
-        "loss of the best feasible design, afresh": data["final_loss"].values,
-        "KKT residual, mm": data["kkt_residual"].values[rows, last],
-        "violation of the last design, mm": data["violation"].values[rows, last],
-        "outcome": data["outcome"].values,
+        "time, s": data["cpu_time"].to_numpy()[rows, last],
+        "loss of the best feasible design, afresh": data["final_loss"].to_numpy(),
+        "KKT residual, mm": data["kkt_residual"].to_numpy()[rows, last],
+        "violation of the last design, mm": data["violation"].to_numpy()[rows, last],
+        "outcome": data["outcome"].to_numpy(),
     }
     return Table(f"{name}.csv", "every optimiser", columns)
 
 
-def _points(name: str, data: xr.Dataset) -> Table:
-    """Returns times, spread, errors and work."""
-    times = data["cpu_time"].values
+def points(data: xr.Dataset) -> pd.DataFrame:
+    """Tabulates every point of a benchmark: times, spread, errors and work."""
+    times = data["cpu_time"].to_numpy()
     known = np.isfinite(times).any(axis=1)
     figures = np.full((4, len(times)), np.nan)
     figures[:, known] = [
         reduce(times[known], axis=1) for reduce in (np.nanmedian, np.nanmin, np.nanmax)
     ] + [np.isfinite(times[known]).sum(axis=1)]
-    median, least, most, runs = figures
+    errors, work = data["error"], data["count"]
     columns = {
-        **{name: data[name].values for name in ("method", "setting", "task", "units")},
-        "time, s": median,
-        "least, s": least,
-        "most, s": most,
-        "runs": runs,
-        "compile, s": data["compile_time"].values,
-        "peak, MiB": data["memory"].values / 2**20,
-        **{
-            f"error of {quantity}": data["error"].sel(quantity=quantity).values
-            for quantity in data["quantity"].values
-        },
-        **{str(work): data["count"].sel(work=work).values for work in data["work"].values},
-        "outcome": data["outcome"].values,
+        **{name: data[name].to_numpy() for name in ("method", "setting", "task", "units")},
+        **dict(zip(("time, s", "least, s", "most, s", "runs"), figures, strict=True)),
+        "compile, s": data["compile_time"].to_numpy(),
+        "peak, MiB": data["memory"].to_numpy() / 2**20,
+        **{f"error of {name}": errors.sel(quantity=name) for name in data["quantity"].to_numpy()},
+        **{str(name): work.sel(work=name) for name in data["work"].to_numpy()},
+        "outcome": data["outcome"].to_numpy(),
     }
-    return Table(f"{name}.csv", "every point: times, errors, work", columns)
+    return pd.DataFrame({name: np.asarray(column) for name, column in columns.items()})
+
+
+def measured(data: xr.Dataset, task: str | None = None) -> pd.DataFrame:
+    """Selects the points that have figures: all, or those of a task."""
+    found = points(data)
+    return found[(found["outcome"] == "measured") & (found["task"] == (task or found["task"]))]
 
 
 def rows(of: Table) -> Iterator[list[str]]:
@@ -102,14 +92,16 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def failures(data: xr.Dataset) -> list[Failure]:
-    """Returns the points (or optimisers) that have no figures, with the reason."""
+def failures(data: xr.Dataset) -> list[tuple[str, ...]]:
+    """Tells method, setting, task and reason of the points (or optimisers) without figures."""
     if "outcome" not in data:
         return []
     (dim,) = data["outcome"].dims
-    failed = data.isel({dim: np.flatnonzero(data["outcome"].values != "measured")})
+    failed = data.isel({dim: np.flatnonzero(data["outcome"] != "measured")})
     if "optimiser" in data.dims:
-        pairs = zip(failed["optimiser"].values, failed["outcome"].values, strict=True)
-        return [Failure(str(name), "", "design", str(reason)) for name, reason in pairs]
-    names = ("method", "setting", "task", "outcome")
-    return [Failure(*map(str, row)) for row in zip(*(failed[k].values for k in names), strict=True)]
+        failed = failed.rename(optimiser="method").assign(setting="", task="design")
+    told = (np.broadcast_to(failed[k], failed.sizes[failed["outcome"].dims[0]]) for k in _TOLD)
+    return [tuple(map(str, row)) for row in zip(*told, strict=True)]
+
+
+_TOLD = ("method", "setting", "task", "outcome")

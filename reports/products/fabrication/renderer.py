@@ -1,7 +1,5 @@
 """Renders triangles in parallel projection with a depth buffer: what a mesh file looks like."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeAlias

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import base64
 import json
+import logging
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -13,10 +14,13 @@ from typing import Any, NamedTuple
 import cv2
 
 from pipeline.datasets import git_commit, package_versions
+from pipeline.runtime import UserError
 from reports.facts import JudgedClaim, claims
 from reports.page import citation, write_page
 from reports.products.index import inventory
 from reports.products.index.inventory import BuiltReport, Link
+
+LOG = logging.getLogger(__name__)
 
 WIDTH = 560
 """Of a thumbnail in pixels."""
@@ -54,8 +58,12 @@ def report(args: argparse.Namespace) -> None:
 
 def shown(results: Path) -> dict[str, Any]:
     """Returns what the index of a folder of results shows."""
-    built = inventory.reports(results)
+    faults: list[UserError] = []
+    built = inventory.reports(results, faults)
+    for fault in faults:
+        LOG.error("left out: %s", fault)
     return {
+        "faults": [f"{_below(results, fault)}: {fault.what}" for fault in faults],
         "title": "Nonlinear mechanical metamaterial cloaks",
         "figures": [(each, thumbnail(each.picture)) for each in built if each.figure],
         "others": [(each, thumbnail(each.picture)) for each in built if not each.figure],
@@ -67,6 +75,11 @@ def shown(results: Path) -> dict[str, Any]:
         "made": _made(),
         "citations": citation.citations(),
     }
+
+
+def _below(results: Path, fault: UserError) -> str:
+    file = Path(fault.file or "")
+    return file.relative_to(results).as_posix() if file.is_relative_to(results) else file.name
 
 
 def tables(built: Sequence[BuiltReport]) -> list[IndexTable]:

@@ -8,17 +8,23 @@ from __future__ import annotations
 import html
 import os
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
-import xarray as xr
-
-from pipeline.datasets import file_hash
+from pipeline.datasets import file_hash, read_attributes
+from pipeline.runtime import UserError
 from reports.facts import Fact
 from reports.facts import fact_records as facts
 
 FIGURE = re.compile(r"fig\d+")
 """Names of the studies that are figures of the paper."""
+
+
+SEAL = re.compile(r'<meta name="facts-sha256" content="(\w+)">')
+_DAMAGED = (OSError, ValueError, TypeError, LookupError, AttributeError)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -59,10 +65,15 @@ class BuiltReport:
         return FIGURE.fullmatch(self.name) is not None
 
 
-def reports(results: Path) -> list[BuiltReport]:
-    """Returns all reports in `results`: the paper's figures first, then others, by name."""
-    pages = sorted(results.glob("*/report/index.html"))
-    found = [_built(page, results) for page in pages]
+def reports(results: Path, faults: list[UserError] | None = None) -> list[BuiltReport]:
+    """Returns all reports in `results`: the paper's figures first, then others, by name.
+
+    What is damaged or another study's is left out, and appended to ``faults``.
+    """
+    told = [] if faults is None else faults
+    found: list[BuiltReport] = []
+    for page in sorted(results.glob("*/report/index.html")):
+        found += _sound([page], lambda page: _built(page, results, told), told)
     return sorted(found, key=lambda built: (not built.figure, built.draft, built.name))
 
 
@@ -72,9 +83,24 @@ def others(results: Path, folder: str, pattern: str) -> list[Link]:
     return [Link(_seen(path, results), path.name) for path in paths]
 
 
-def _built(page: Path, results: Path) -> BuiltReport:
+def _sound(files: Iterable[Path], read: Callable[[Path], T], faults: list[UserError]) -> list[T]:
+    """Reads files, and appends to ``faults`` why some cannot be."""
+    found = []
+    for file in files:
+        try:
+            found.append(read(file))
+        except UserError as error:
+            faults.append(error)
+        except _DAMAGED as error:
+            remedy = "build it again"
+            faults.append(UserError(f"damaged: {type(error).__name__}", file=file, remedy=remedy))
+    return found
+
+
+def _built(page: Path, results: Path, faults: list[UserError]) -> BuiltReport:
     name = page.parent.parent.name
     text = page.read_text(encoding="utf-8")
+    sealed = SEAL.search(text)
     title = re.search(r"<title>(.*?)</title>", text)
     known = page.parent / "facts.json"
     shown = _datasets(page, text)
@@ -85,13 +111,27 @@ def _built(page: Path, results: Path) -> BuiltReport:
         draft='class="draft"' in text,
         page=Link(_seen(page, results), "page"),
         picture=page.parent / f"{name.partition('@')[0]}.png",
-        facts=facts.read_json(known) if known.is_file() else [],
+        facts=[
+            fact
+            for each in _sound([known] if known.is_file() else [], _facts(sealed), faults)
+            for fact in each
+        ],
         files=[
             *(Link(_seen(file, results), file.name) for file in sorted(page.parent.glob("*.pdf"))),
-            *(link for folder in folders for link in _around(folder, results)),
+            *(link for folder in folders for link in _around(folder, results, faults)),
         ],
-        datasets=[_dataset(file, results) for file in shown],
+        datasets=_sound(shown, lambda file: _dataset(file, results), faults),
     )
+
+
+def _facts(sealed: re.Match[str] | None) -> Callable[[Path], list[Fact]]:
+    def read(file: Path) -> list[Fact]:
+        if sealed is None or sealed[1] != file_hash(file):
+            what = "not what was written, or not of the page beside it"
+            raise UserError(what, file=file, remedy="build the report again")
+        return facts.read_json(file)
+
+    return read
 
 
 def _datasets(page: Path, text: str) -> list[Path]:
@@ -101,20 +141,23 @@ def _datasets(page: Path, text: str) -> list[Path]:
     return [file for file in files if file.is_file()]
 
 
-def _around(folder: Path, results: Path) -> list[Link]:
+def _around(folder: Path, results: Path, faults: list[UserError]) -> list[Link]:
     """Lists what is built of a study, and its recordings, with whether they were filmed."""
     package = folder / "fabrication/index.html"
     found = [Link(_seen(package, results), "fabrication files")] if package.is_file() else []
-    for page in sorted(folder.glob("recordings/*/index.html")):
-        with xr.open_dataset(page.parent / "track.nc") as track:
-            note = "SYNTHETIC" if track.attrs["synthetic"] == "yes" else ""
-        found.append(Link(_seen(page, results), f"recording “{page.parent.name}”", note))
-    return found
+    pages = sorted(folder.glob("recordings/*/index.html"))
+    return found + _sound(pages, lambda page: _recording(page, results), faults)
+
+
+def _recording(page: Path, results: Path) -> Link:
+    track = read_attributes(page.parent / "track.nc")
+    note = "SYNTHETIC" if track["synthetic"] == "yes" else ""
+    return Link(_seen(page, results), f"recording “{page.parent.name}”", note)
 
 
 def _dataset(file: Path, results: Path) -> BuiltDataset:
-    with xr.open_dataset(file) as data:
-        about = {key: str(data.attrs.get(key, "")) for key in ("git_commit", "problem_hash")}
+    found = read_attributes(file)
+    about = {key: str(found.get(key, "")) for key in ("git_commit", "problem_hash")}
     return BuiltDataset(
         _seen(file, results), file_hash(file), about["git_commit"], about["problem_hash"]
     )

@@ -1,7 +1,5 @@
 """Draws the frames of a movie: every structure true to scale, coloured by what its figure shows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import cv2

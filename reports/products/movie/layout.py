@@ -98,7 +98,9 @@ def background(reel: Animation, placed: MovieLayout, title: str, note: str) -> I
     """
     with style.styled():
         figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI)
-        _write(figure, 14, 12, title, fontsize=style.PANEL, fontweight="bold", va="top")
+        _write(
+            figure, 14, 12, style.literal(title), fontsize=style.PANEL, fontweight="bold", va="top"
+        )
         _write(figure, 14, HEIGHT - 8, note, fontsize=style.SMALL, va="bottom", color=style.GREY)
         _names(figure, reel, placed)
         _bar(figure, reel.fields[0])

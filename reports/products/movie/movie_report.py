@@ -1,7 +1,5 @@
 """Makes a movie of one or several studies, one after another, with their recordings."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """Describes the cases of a sweep as a picture shows them: along axes of numbers or of words."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

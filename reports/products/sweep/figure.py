@@ -3,10 +3,8 @@
 Points are drawn where the cases are not all combinations of two parameters, however many there are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -42,14 +40,10 @@ def measures(data: xr.Dataset) -> list[SweepMeasure]:
     loss = "Loss $J$" if units == "1" else f"Loss $J$ ({units})"
     both = {style.ALTERED: data["loss_altered"].values, style.CLOAKED: data["loss"].values}
     void = np.degrees(data["min_void_angle"].values)
+    ratio, over = {style.CLOAKED: cases.ratio(data)}, "$J$ / $J$ altered"
     return [
         SweepMeasure("Loss", loss, both),
-        SweepMeasure(
-            "Loss, cloaked over altered",
-            "$J$ / $J$ altered",
-            {style.CLOAKED: cases.ratio(data)},
-            1.0,
-        ),
+        SweepMeasure("Loss, cloaked over altered", over, ratio, 1.0),
         SweepMeasure("Smallest void angle, cloaked", "Void angle (°)", {style.CLOAKED: void}),
     ]
 
@@ -84,17 +78,11 @@ def _titles(figure: Figure, shown: Sequence[SweepMeasure]) -> None:
 
 def _against(axes: Axes, axis: SweepAxis, measure: SweepMeasure, *, joined: bool) -> None:
     order = np.argsort(axis.places, kind="stable")
+    look: dict[str, Any] = {"markersize": 1.5, "alpha": 0.5, "ls": ""}
+    look = {"markersize": 2.5, "alpha": 1.0, "ls": "-"} if joined else look
+    look |= {"marker": "o", "markeredgewidth": 0.0, "rasterized": len(order) > _MANY}
     for colour, values in measure.values.items():
-        axes.plot(
-            axis.places[order],
-            values[order],
-            "-o" if joined else "o",
-            color=colour,
-            markersize=2.5 if joined else 1.5,
-            markeredgewidth=0.0,
-            alpha=1.0 if joined else 0.5,
-            rasterized=len(order) > _MANY,
-        )
+        axes.plot(axis.places[order], values[order], color=colour, **look)
         if not joined and not axis.words:
             _median(axes, axis.places, values, colour)
     if measure.level is not None:

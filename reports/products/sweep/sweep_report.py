@@ -1,7 +1,5 @@
 """Makes the report of a sweep over any parameters: figure, numbers, tables, one page."""
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np
@@ -10,27 +8,14 @@ import xarray as xr
 from pipeline import datasets, problem
 from pipeline.problem.sections import DIRECTIONS
 from pipeline.runtime import UserError
-from reports.base import Table
+from reports.base import Table, prose
 from reports.facts import Fact, grouped, number, share, table
 from reports.page import FigureText, PageTable, figure_page, publish, titled
 from reports.products.sweep import cases, figure
 from reports.study import draft, study_results
 
 _RANKED = 30  # cases, below which a rank correlation says nothing
-_LEAD = (
-    "One design at many settings of the problem's parameters, simulated; the design itself stays as"
-    " it is."
-)
-_MAPS = (
-    "(a) Loss of the cloaked structure, (b) over that of the altered one, (c) smallest void angle"
-    " of the cloaked structure; one cell for each case. Crosses mark cases that failed."
-)
-_POINTS = (
-    "(a) Loss of the altered and of the cloaked structure, (b) the second over the first, (c)"
-    " smallest void angle of the cloaked structure. Each row is over one parameter, whatever the"
-    " others are. Thick lines, where there are enough cases, are medians of a tenth of them each."
-    " Crosses mark cases that failed."
-)
+_PROSE = prose(__file__)
 
 
 def report(args: argparse.Namespace) -> None:
@@ -48,10 +33,10 @@ def report(args: argparse.Namespace) -> None:
         raise UserError(what, file=args.problem, key="sweep", remedy=remedy)
     data = datasets.read(args.sweep, "sweep")
     study_results.check_problem(asked, "sweep", data, args.sweep)
-    caption = _MAPS if cases.mapped(sweep) else _POINTS
+    caption = _PROSE["maps" if cases.mapped(sweep) else "points"]
     made = figure_page(
         "sweep",
-        FigureText(titled(asked, args.problem), "sweep", _LEAD, caption),
+        FigureText(titled(asked, args.problem), "sweep", _PROSE["lead"], caption),
         lambda: figure.draw_sweep(data, sweep),
         tables(data),
         data,

@@ -1,7 +1,5 @@
 """Tells what to change before the next recording: one line a finding."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from reports.products.tracking.track_quality import TrackQuality

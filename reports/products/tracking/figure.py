@@ -1,6 +1,6 @@
 """Draws the figure of a quality report: residuals and uncertainty, in space and time."""
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -72,17 +72,9 @@ def _arrows(axes: Axes, specimen: SpecimenOutlines, residual: np.ndarray) -> Non
     x, y = specimen.centre.T
     longest = max(float(np.nanpercentile(np.hypot(*residual.T), 98)), 1e-9)
     reach = longest / np.sqrt(np.median(specimen.area))
-    axes.quiver(
-        x,
-        y,
-        residual[:, 0],
-        -residual[:, 1],
-        angles="xy",
-        scale_units="xy",
-        scale=reach,
-        width=0.005,
-        color=style.ALTERED,
-    )
+    right, up = residual[:, 0], -residual[:, 1]
+    look: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "color": style.ALTERED}
+    axes.quiver(x, y, right, up, scale=reach, width=0.005, **look)
 
 
 def _axis(track: xr.Dataset, load_axis: str) -> tuple[np.ndarray, str]:

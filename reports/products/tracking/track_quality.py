@@ -1,7 +1,5 @@
 """Tells what a track and its video say about the quality of a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Makes the report of a track: an overlay on its video, and one page on the recording's quality."""
 
-from __future__ import annotations
-
 import argparse
 import io
 from collections.abc import Iterator

@@ -1,13 +1,11 @@
 """Draws samples with their fits and the prediction with its band; and load cycles with snaps."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.datasets.tables import ROLES
+from pipeline.datasets.tables import TABLES
 from reports.base import style
 
 SYMBOLS = (r"$k_\ell$", r"$k_s$", r"$k_\theta$")
@@ -126,7 +124,7 @@ def draw_cycles(made: xr.Dataset) -> Figure:
         axes = style.place(drawn, left, top + 8.0, 72.0, 40.0)
         mine = made["record_of_point"].values == k
         seen = made["force"].values[mine & (made["role"].values < 2)]
-        for role, number in ROLES.items():
+        for role, number in TABLES["load_cycles"]["role"].flags.items():
             chosen = mine & (made["role"].values == number)
             if chosen.any():
                 line, colour, label = _STYLES[role]

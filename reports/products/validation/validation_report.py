@@ -1,7 +1,5 @@
 """Makes the page of the measured specimens beside their prediction."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from collections.abc import Iterator, Mapping

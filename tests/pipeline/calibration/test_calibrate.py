@@ -57,6 +57,8 @@ def test_errors_are_those_of_the_bound_where_drives_have_no_noise(found: xr.Data
     np.testing.assert_allclose(found["standard_error"], found["bound"], rtol=1e-8)
     width = np.log(found["upper"].values / found["lower"].values)
     assert width / found["standard_error"].values == pytest.approx(2 * 1.96, rel=0.02)
+    below, above = (found[end].values / found["value"].values for end in ("lower", "upper"))
+    np.testing.assert_allclose(np.log(above), -np.log(below), rtol=1e-9)
     covariance, error = found["covariance"].values, found["standard_error"].values
     np.testing.assert_allclose(np.diag(covariance), error**2)
     np.testing.assert_allclose(found["correlation"], covariance / np.outer(error, error))

@@ -1,7 +1,5 @@
 """Records of a testing machine are split into branches; snaps, loops and equilibria are found."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

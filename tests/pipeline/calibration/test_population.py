@@ -1,7 +1,5 @@
 """Several samples are fitted as a population, and the band of a new one is honest."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import jax

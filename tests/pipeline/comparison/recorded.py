@@ -1,7 +1,5 @@
 """Tracks in closed form: what a response does, there and back, with noise, turns and delays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

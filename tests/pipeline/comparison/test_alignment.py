@@ -1,7 +1,5 @@
 """Lags and loads that are known, found again to the precision that is stated."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """The interval of a reduction against that of drawn quantities."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.comparison import compute_reduction

@@ -1,7 +1,5 @@
 """What is followed along a recording, by hand, and how often its intervals hold the truth."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.comparison import metrics
 from pipeline.comparison.metrics import (
     METRICS,
     Pair,
@@ -88,6 +89,13 @@ def test_intervals_hold_the_truth_about_as_often_as_they_say() -> None:
         truth = np.sqrt(0.1**2 + 0.02**2)
         held += int(((low[RMSE] <= truth) & (truth <= high[RMSE])).sum())
     assert held >= 0.85 * 120
+
+
+def test_an_interval_leaves_as_much_out_on_either_side() -> None:
+    copies = np.stack([np.arange(1001.0), np.full(1001, np.nan)], axis=1)
+    ends = metrics.interval_ends(copies[::-1])
+    np.testing.assert_allclose(ends[:, 0], [25.0, 975.0])
+    assert np.isnan(ends[:, 1]).all()
 
 
 def test_equal_seeds_give_equal_intervals() -> None:

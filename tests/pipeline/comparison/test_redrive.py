@@ -1,7 +1,5 @@
 """A simulation that is driven by a track does what the specimen did."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Similarities that are known, found again within the uncertainty that is stated."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

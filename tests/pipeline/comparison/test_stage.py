@@ -1,7 +1,5 @@
 """The stage on small studies whose tracks are known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

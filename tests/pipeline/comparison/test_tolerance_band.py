@@ -1,7 +1,5 @@
 """The band of predictions holds the specimens that it is drawn for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -61,3 +61,15 @@ def test_a_version_that_is_no_number_is_refused(sweep: Path, version: object) ->
         raw.setncattr("schema_version", version)
     with pytest.raises(UserError, match="none of this workflow's"):
         read(sweep, "sweep")
+
+
+@pytest.mark.parametrize("place", [0, (1 << 20) - 1, 1 << 20, (3 << 20) + 4])
+def test_every_byte_of_a_large_file_is_sealed(place: int, tmp_path: Path) -> None:
+    path = tmp_path / "large.bin"
+    path.write_bytes(bytes((3 << 20) + 5))
+    seal.write_seal(path)
+    assert seal.check_seal(path) == "whole"
+    with path.open("r+b") as file:
+        file.seek(place)
+        file.write(b"\1")
+    assert seal.check_seal(path) == "broken"

@@ -17,6 +17,13 @@ ROWS = "  rows: 15\n"
     ("old", "new", "what", "key", "remedy"),
     [
         ("spacing:", "spacng:", "unknown key", "lattice.spacng", "did you mean 'spacing'?"),
+        (
+            "directions: [0 deg, 45 deg, 90 deg, 135 deg]",
+            "directions: [0 deg]\n  rotation: 10 deg",
+            "unknown key",
+            "drive.rotation",
+            "known here: units, amplitude",
+        ),
         ("objective:", "goal:", "unknown key", "goal", "known here: title, doc, lattice"),
         (ROWS, "", "missing key", "lattice.rows", "add it"),
         ("spacing: 15 mm", "spacing: 15", "the unit is missing", "lattice.spacing", '"15 mm"'),

@@ -4,6 +4,7 @@ import hashlib
 import math
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.posing import scene_of
+from pipeline.posing import limits_of, scene_of
 from pipeline.problem import (
     Problem,
     canonical_json,
@@ -23,7 +24,7 @@ from pipeline.problem import (
 )
 from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Quads
-from pipeline.runtime import UserError
+from pipeline.runtime import ROOT, STAGES, Stage, UserError
 
 ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
 NAMES = ("edge3", "free", "text", *ROBUST, "quick")
@@ -195,3 +196,60 @@ def test_loading_leaves_the_heavy_libraries_alone(fig2: Path) -> None:
         [sys.executable, "-c", code, str(fig2)], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+OWN = {"sweep": "sweep", "monte_carlo": "robustness", "spectrum": "spectrum",
+       "fabricate": "fabrication", "compare": "prediction"}  # fmt: skip
+"""The section that is for one stage."""
+HASHED = [stage for stage in STAGES.values() if stage.unused is not None]
+
+
+@pytest.fixture(scope="module")
+def read_to_pose() -> set[str]:
+    """Sections that are read to pose what any study simulates, as its loss takes it."""
+    read: set[str] = set()
+    usual = Problem.__getattribute__
+
+    def spy(problem: Problem, name: str) -> object:
+        if name in Problem.model_fields:
+            read.add(name)
+        return usual(problem, name)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("fig2", "fig4", "fig5", "rigid_inclusion"):
+            path = ROOT / f"experiments/{name}/problem.yaml"
+            problem = load(path)
+            patch.setattr(Problem, "__getattribute__", spy)
+            scene_of(problem, path.parent)
+            limits_of(problem)
+            patch.undo()
+    return read
+
+
+def changes(problem: Problem, stage: str, key: str) -> bool:
+    """Tells whether a stage runs again when a section is another, whatever is in it."""
+    other: object = "another"
+    if key == "optimiser":
+        other = problem.optimiser.model_copy(update={"seed": 12345})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a section that is a text
+        after = section_hash(problem.model_copy(update={key: other}), stage)
+    return after != section_hash(problem, stage)
+
+
+@pytest.mark.parametrize("stage", HASHED, ids=lambda stage: stage.name)
+def test_a_stage_depends_on_every_section_that_it_may_read(
+    stage: Stage, fig2: Path, read_to_pose: set[str]
+) -> None:
+    """All keys of a problem: those that pose a scene, the optimiser, and the stage's own."""
+    assert read_to_pose > {"lattice", "material", "contact", "supports", "drive", "solver", "void"}
+    problem = load(fig2)
+    found = {key for key in Problem.model_fields if changes(problem, stage.name, key)}
+    needed = read_to_pose - ({"solver"} if stage.name == "fabricate" else set())
+    assert found >= needed | {"optimiser", "designs"} | {OWN.get(stage.name, "optimiser")}
+    assert not found & {"doc", "report"}
+
+
+def test_a_page_depends_on_every_section(fig2: Path) -> None:
+    problem = load(fig2)
+    assert all(changes(problem, "report", key) for key in Problem.model_fields)

@@ -198,6 +198,7 @@ def test_a_bad_image_is_told(
         ("9 ^ 9 ^ 9 ^ 9", "no value"),
         ("3", "no extent"),
         ("u", "'u' is not understood"),
+        ("t" + " + 0" * 150 + " + 5 * sin(t)", "longer than 500 letters"),
     ],
 )
 def test_a_bad_formula_is_told(tmp_path: Path, x: str, what: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,9 @@ import numpy as np
 import pytest
 
 from pipeline.problem.fields import csv_columns
-from pipeline.problem.outlines import images
+from pipeline.problem.outlines import find_inside, images
 from pipeline.problem.reading import yaml_file
-from pipeline.runtime import UserError
+from pipeline.runtime import UserError, read_bounded
 from pipeline.tracking.frames import video
 
 UNSAFE = {
@@ -36,6 +37,32 @@ def test_only_plain_data_are_read_of_yaml(text: str, tmp_path: Path) -> None:
         yaml_file.read_yaml(path)
     assert caught.value.file == str(path)
     assert not Path("pwned").exists()
+
+
+TWO_WAYS = ["3:0", "0036", "-012", "1_000", "190:20:30", "0b11", "0o17", "2024-01-02", "1:30.5"]
+
+
+@pytest.mark.parametrize("word", TWO_WAYS)
+def test_what_reads_in_two_ways_is_refused(word: str, tmp_path: Path) -> None:
+    """YAML 1.1 and 1.2 differ: 3:0 is 180 or a text, 0036 is 30 or 36."""
+    path = tmp_path / "problem.yaml"
+    for text in (f"a: {word}", f"a: [{word}]", f"{word}: a"):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(UserError, match="reads in two ways") as caught:
+            yaml_file.read_yaml(path)
+        assert caught.value.line == 1
+    path.write_text(f"a: '{word}'", encoding="utf-8")
+    assert yaml_file.read_yaml(path).data == {"a": word}
+
+
+def test_words_are_those_of_yaml_1_2(tmp_path: Path) -> None:
+    path = tmp_path / "problem.yaml"
+    path.write_text("a: [yes, no, on, off, true, False, 36, 0, 0.5, -3, 0x1F, 1e3, ~]")
+    wanted = ["yes", "no", "on", "off", True, False, 36, 0, 0.5, -3, 31, "1e3", None]
+    assert yaml_file.read_yaml(path).data == {"a": wanted}
+    path.write_text("a: {<<: {b: 1}}")
+    with pytest.raises(UserError, match="merging"):
+        yaml_file.read_yaml(path)
 
 
 SKIM = """
@@ -111,3 +138,64 @@ def test_a_playlist_opens_no_other_files(tmp_path: Path) -> None:
     path.write_text(f"#EXTM3U\n#EXT-X-TARGETDURATION:9\n#EXTINF:9,\nhttp://localhost/{clip.name}\n")
     with pytest.raises(UserError, match="not a readable video"):
         list(video.read_frames(path))
+
+
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">{}</svg>'
+TRIANGLE = '<path d="M0 0 L9 0 L9 9 Z"/>'
+HOSTILE = {
+    "an arc of no radius": '<path d="M1,1 A1e-300,1e-300 0 0 1 5,5 Z"/>',
+    "groups in groups": "<g>" * 100_000 + TRIANGLE + "</g>" * 100_000,
+    "many curves": f'<path d="M0,0{"C1,2 3,4 5,6" * 30_000}Z"/>',
+    "many paths": TRIANGLE * 30_000,
+    "no size": f'<g transform="scale(1e-300)">{TRIANGLE}</g>',
+    "no end": '<path d="M0 0 L1e400 1 L1 0 Z"/>',
+}
+
+
+@pytest.mark.parametrize("content", HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_drawing_is_one_message(content: str, tmp_path: Path) -> None:
+    path = tmp_path / "void.svg"
+    path.write_text(SVG.format(content))
+    with pytest.raises(UserError, match=r"not a readable SVG|no width"):
+        images.read_outlines(path)
+
+
+def test_a_drawing_of_many_curves_has_fewer_chords_in_each(tmp_path: Path) -> None:
+    """3000 of them on a circle; a drawing of usual size keeps all of its chords."""
+    path = tmp_path / "void.svg"
+    found = {}
+    for count in (12, 3000):
+        angle = np.linspace(0.0, 2 * np.pi, count + 1)
+        ends = np.stack([50 + 40 * np.cos(angle), 50 + 40 * np.sin(angle)], axis=1)
+        curves = " ".join(f"Q{x:.6f},{y:.6f} {x:.6f},{y:.6f}" for x, y in ends[1:])
+        path.write_text(SVG.format(f'<path d="M90,50 {curves} Z"/>'))
+        (outline,) = images.read_outlines(path)
+        found[count] = len(outline)
+        assert np.allclose(np.ptp(np.array(outline), axis=0), 80.0, atol=0.1)
+    assert found[12] == 12 * images.SEGMENTS
+    assert 3000 < found[3000] <= images.MOST_POINTS
+
+
+def test_outlines_of_many_edges_need_little_memory() -> None:
+    angle = np.linspace(0.0, 2 * np.pi, 20_000, endpoint=False)
+    circle = tuple(zip(np.cos(angle).tolist(), np.sin(angle).tolist(), strict=True))
+    points = [(x, 0.0) for x in np.linspace(0.0, 2.0, 301)]
+    tracemalloc.start()
+    try:
+        inside = find_inside(points, (circle,), 1e-9)
+        assert tracemalloc.get_traced_memory()[1] < 50e6
+    finally:
+        tracemalloc.stop()
+    assert sum(inside) == 151
+
+
+def test_a_file_is_read_up_to_its_bound_and_no_further(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(bytes(1000))
+    assert read_bounded(path, 1000) == bytes(1000)
+    with pytest.raises(OSError, match="1000 bytes, which is more than 999"):
+        read_bounded(path, 999)
+    problem = tmp_path / "problem.yaml"
+    problem.write_text("# " + "a" * (256 << 10) + "\ntitle: a\n")
+    with pytest.raises(UserError, match="bytes, which is more than 262144"):
+        yaml_file.read_yaml(problem)

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 CLOSED = """
 import os, sys
 for number in (0, 1, 2):
@@ -33,3 +35,19 @@ def test_messages_of_a_process_without_streams_go_nowhere(tmp_path: Path) -> Non
     command = [sys.executable, "-c", CLOSED, sys.executable, STAGE, str(out)]
     subprocess.run(command, check=True)
     assert out.read_text(encoding="utf-8") == "whole True"
+
+
+@pytest.mark.parametrize("module", ["pipeline", "reports"])
+@pytest.mark.parametrize("words", [["--help"], ["design", "--help"]])
+def test_a_reader_that_stops_gets_no_traceback(module: str, words: list[str]) -> None:
+    """As `metacloak --help | head` does."""
+    running = subprocess.Popen(
+        [sys.executable, "-m", module, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert running.stdout is not None
+    running.stdout.close()
+    assert running.stderr is not None
+    told = running.stderr.read().decode()
+    running.wait()
+    assert "Traceback" not in told
+    assert "BrokenPipe" not in told

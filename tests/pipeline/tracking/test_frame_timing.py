@@ -102,3 +102,12 @@ def test_a_varying_rate_is_told_from_rounded_stamps() -> None:
     steady = np.arange(FRAMES) / 30
     assert not video.has_uneven_intervals(np.round(steady, 3))
     assert video.has_uneven_intervals(np.delete(steady, [7, 30]))
+
+
+@pytest.mark.parametrize(("share", "repeated"), [(0.15, True), (0.35, False), (0.6, False)])
+def test_a_short_step_is_no_frame_shown_again(share: float, repeated: bool) -> None:
+    """It must be less than a quarter of the steps about it."""
+    clock = np.arange(FRAMES, dtype=float)
+    clock[25:] -= 1 - share
+    told = faults(motion(clock)).get(25)
+    assert (told == frame_timing.DUPLICATE) is repeated

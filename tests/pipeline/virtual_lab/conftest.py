@@ -1,7 +1,5 @@
 """A lattice of 7 x 7 squares that turn against each other while they close up."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is rendered is where the truth says, and noise aside nothing else is seen."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 

@@ -1,7 +1,5 @@
 """Specimens of the virtual lab: off their design by what is asked for, and by nothing else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

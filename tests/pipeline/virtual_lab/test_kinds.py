@@ -1,7 +1,5 @@
 """Kinds of specimens and of files, on small clips from the virtual lab."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction

@@ -116,3 +116,21 @@ def test_a_plan_without_sense_is_refused(
     assert "no such codec" in told
     assert "greater than zero" in told
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("codec", ["h264", "ffv1"])
+def test_a_rendered_video_that_was_damaged_is_not_tracked(
+    files: Path, tmp_path: Path, codec: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One bit, in whatever format; a frame that decodes to other numbers would tell nothing."""
+    out = tmp_path / "run.mp4"
+    assert render(files, recording(tmp_path, end="0.1 s", codec={"name": codec}), out) == 0
+    content = bytearray(out.read_bytes())
+    content[len(content) // 2] ^= 1
+    out.write_bytes(content)
+    described, track = out.with_suffix(".yaml"), tmp_path / "track.nc"
+    assert run_stage("track", [str(described), "--out", str(track)]) == 2
+    told = capsys.readouterr().err
+    assert "damaged: run.mp4 is not the video that was described" in told
+    assert "key:    sha256" in told
+    assert not track.exists()

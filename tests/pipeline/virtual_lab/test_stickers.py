@@ -1,7 +1,5 @@
 """Sheets of marks are true to scale: read back from the PDF."""
 
-from __future__ import annotations
-
 import base64
 import re
 import zlib

@@ -1,7 +1,5 @@
 """New studies from the templates: valid as they are, and nothing half made."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

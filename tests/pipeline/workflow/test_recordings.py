@@ -1,7 +1,5 @@
 """Which recordings the report of a study shows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

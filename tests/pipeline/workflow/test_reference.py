@@ -1,7 +1,5 @@
 """The pages that follow from the code do follow from it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What counts as the same results, and how a build that fails is told."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The list of the paper's claims, and how they are judged."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

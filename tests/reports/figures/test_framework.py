@@ -1,7 +1,5 @@
 """Figure 1: the framework, drawn from the geometry of a study."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -30,6 +30,12 @@ def test_report_is_complete(report: Path) -> None:
     ]  # fmt: skip
 
 
+def test_what_may_not_be_meant_stands_at_the_top(report: Path) -> None:
+    page = (report / "index.html").read_text(encoding="utf-8")
+    note = f'<p class="warning" role="note">{shaken_study.WARNED}.</p>'
+    assert page.index(note) < page.index('id="figure"')
+
+
 def test_rebuilding_gives_the_same_bytes(study: StudyResults, report: Path, tmp_path: Path) -> None:
     publish(study_report(study), tmp_path / "again")
     assert contents(tmp_path / "again") == contents(report)

@@ -1,7 +1,5 @@
 """The page on benchmarks, of points that were made up."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

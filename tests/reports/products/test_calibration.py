@@ -1,7 +1,5 @@
 """The figure of a calibration: sets, fits and constants, and whether they were measured."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from pipeline.datasets import seal
 from reports.__main__ import main
 from reports.page import templating
 from reports.products.index import index_report, inventory
@@ -94,3 +96,65 @@ def test_movies_are_held_by_the_page_as_far_as_there_is_room(
     assert 'src="movies/S1.mp4"' in shown
     assert shown.count("Too large for this page") == 1
     assert page(tmp_path) == shown
+
+
+def copied(results: Path, folder: Path) -> Path:
+    made = folder / "results"
+    shutil.copytree(results, made)
+    return made
+
+
+def edited(results: Path) -> None:
+    facts = results / "fig2/report/facts.json"
+    facts.write_text(facts.read_text(encoding="utf-8").replace('"value": ', '"value": 1', 1))
+
+
+def cut(results: Path) -> None:
+    facts = results / "fig2/report/facts.json"
+    facts.write_bytes(facts.read_bytes()[:100])
+
+
+def flipped(results: Path) -> None:
+    sealed = results / "fig2/response.nc"
+    content = bytearray(sealed.read_bytes())
+    content[len(content) // 2] ^= 1
+    sealed.write_bytes(content)
+
+
+def foreign(results: Path) -> None:
+    page = results / "fig2/report/index.html"
+    page.write_text("<title>Another study</title>")
+
+
+def no_text(results: Path) -> None:
+    (results / "fig2/report/index.html").write_bytes(b"\xff\xfe\x00")
+
+
+@pytest.mark.parametrize(
+    ("damage", "file"),
+    [
+        (edited, "fig2/report/facts.json"),
+        (cut, "fig2/report/facts.json"),
+        (flipped, "fig2/response.nc"),
+        (foreign, "fig2/report/facts.json"),
+        (no_text, "fig2/report/index.html"),
+    ],
+)
+def test_damage_is_one_message_and_the_rest_is_built(
+    damage: Callable[[Path], None],
+    file: str,
+    results: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    made = copied(results, tmp_path)
+    seal.write_seal(made / "fig2/response.nc")
+    damage(made)
+    assert main(["index", "--results", str(made)]) == 0
+    told = capfd.readouterr().err
+    assert told.count("left out: ") == 1
+    assert f"file:   {made / file}" in told
+    assert "Traceback" not in told
+    page = (made / "index.html").read_text(encoding="utf-8")
+    assert f"Left out: {file}: " in page
+    assert "A draft" in page

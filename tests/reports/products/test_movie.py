@@ -15,6 +15,7 @@ from reports.__main__ import main
 from reports.base import style
 from reports.panels import Animation, AnimationAxis, AnimationClip, ColourField
 from reports.paper_figures import movies_of, paper_movies
+from reports.products.movie import layout as layout_module
 from reports.products.movie.frames import RATE, images, instants
 from reports.products.movie.layout import HEIGHT, WIDTH, layout
 from reports.study import RigidUnits
@@ -98,3 +99,9 @@ def test_every_movie_of_the_paper_has_its_studies() -> None:
     assert list(paper_movies()) == ["S1", "S2", "S3", "S4"]
     assert movies_of(["fig6_heart", "fig6_shamrock"]) == ["S3"]
     assert movies_of(["fig2@quick"]) == []
+
+
+@pytest.mark.parametrize("title", ["costs $5", "$\\frac{1$ of it", "a $ b $ c $", "$x^{$"])
+def test_dollars_in_a_title_stay_dollars(title: str) -> None:
+    drawn = layout_module.background(reel(1), layout(reel(1)), title, "")
+    assert not np.array_equal(drawn, layout_module.background(reel(1), layout(reel(1)), "", ""))

@@ -1,7 +1,5 @@
 """The page of the stress suite, from counts made by hand."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

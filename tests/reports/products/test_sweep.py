@@ -1,7 +1,5 @@
 """The page of a sweep over any parameters, of losses in closed form."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The overlay and the quality page of a track that is known."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The page of the measured specimens tells who measured, and judges in numbers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

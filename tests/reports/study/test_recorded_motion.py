@@ -1,7 +1,5 @@
 """Recordings beside their simulation: figures, pages, numbers and the player's data."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

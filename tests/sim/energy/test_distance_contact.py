@@ -16,12 +16,14 @@ from jax import Array
 
 from benchmarks.scenes import MATERIAL
 from sim.collision import ContactArrays, collision_free_step
+from sim.collision.neighbour_list import find
 from sim.collision.step_limit import FAR
 from sim.core import Floats, Numbers
 from sim.energy import (
     DistanceLaw,
     Sensitivity,
     System,
+    Topology,
     UnitOutline,
     distance_contact_kernels,
     pair_energy,
@@ -76,13 +78,19 @@ def crowd(seed: int) -> Crowd:
     lattice = hand_made([r + s for r, s in zip(rings, sites, strict=True)], np.array([[0, 7]]))
     motion = np.zeros((4, 3))
     motion[:, 2] = rng.normal(size=4)
-    made = shape(lattice, lattice.vertices)
-    values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
-    nothing = np.array([], dtype=np.int64)
-    top = topology(lattice, nothing, DistanceContact(REACH))
     for unit in (1, 2, 3):
         motion[unit, :2] = -approach(lattice, motion, unit, sites[unit] / 15.0, rng)
-    return Crowd(lattice, system_of(top, values), motion.ravel(), rng.normal(size=12))
+    system = system_of(_topology(lattice), _values(lattice))
+    return Crowd(lattice, system, motion.ravel(), rng.normal(size=12))
+
+
+def _topology(lattice: Lattice) -> Topology:
+    return topology(lattice, np.array([], dtype=np.int64), DistanceContact(REACH))
+
+
+def _values(lattice: Lattice) -> ConcreteParameters:
+    made = shape(lattice, lattice.vertices)
+    return ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
 
 
 def approach(
@@ -193,6 +201,25 @@ def test_mixed_derivatives(case: Crowd) -> None:
     assert_equal(out.corner, wanted.corner)
     assert_equal(out.centroid, wanted.centroid)
     assert_equal(out.contact, wanted.stiffness)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_units_in_contact_are_found_whatever_state_came_before(seed: int) -> None:
+    """Pairs that cannot have met since the last search are skipped: by small steps and leaps."""
+    case, rng = crowd(seed), np.random.default_rng(seed)
+    state, found = case.motion, 0
+    for step in (*np.full(20, 0.02), 3.0, *np.full(20, 0.05), 0.5, 0.5):
+        state = state + step * rng.normal(size=12) * np.tile([1.0, 1.0, 0.2], 4)
+        fresh = system_of(_topology(case.lattice), _values(case.lattice)).contacts
+        count, alone = find(state, case.contacts), find(state, fresh)
+        assert count == alone
+        np.testing.assert_array_equal(
+            case.contacts.cache.terms[: max(count, 0)], fresh.cache.terms[: max(alone, 0)]
+        )
+        found += count > 0
+        if count < 0:
+            state = case.motion
+    assert found > 0
 
 
 pair = jax.jit(lambda a, b, one, other: pair_energy(a, b, one, other, LAW))

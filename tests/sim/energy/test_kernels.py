@@ -24,8 +24,9 @@ from sim.energy import (
 )
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import clear, matrix, number_free_dofs
+from sim.solvers import LinearRamp
 from sim.structure import Lattice, quads, shape
-from tests.sim.structures import dense, mixed_polygons
+from tests.sim.structures import Rig, dense, mixed_polygons
 
 EXACT = 1e-12
 """Relative to the largest entry."""
@@ -225,3 +226,24 @@ def test_contact_beyond_the_barrier_is_infinite(random_case: Case) -> None:
     net, motion, direction = random_case.net, random_case.motion, random_case.direction
     beyond = motion + 1.01 * void_contact_kernels.barrier_step(motion, net, direction) * direction
     assert gradient(beyond, net)[1] == np.inf
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_contact_begins_at_the_cutoff(random_case: Case, side: int) -> None:
+    """A hair above it there is none, a hair below there is what the definition has."""
+    net, sign = random_case.net, 1.0 - 2.0 * side
+    law = ContactLaw(net.contact[0, 0], BARRIER, CUTOFF)
+    for off in (1e-2, 1e-4, 1e-6, 0.0, -1e-6, -1e-4, -1e-2):
+        turn = sign * (CUTOFF + off - net.void[0, side])
+        energy, slope, curvature = void_contact_kernels.void_slopes(net, 0, side, turn)
+        if off > 0:
+            assert energy == slope == curvature == 0.0
+        wanted = float(contact_energy(CUTOFF + off, law))
+        assert energy == pytest.approx(wanted, rel=1e-6, abs=1e-18)
+
+
+def test_the_network_has_the_cutoff_of_its_law() -> None:
+    lattice = quads(3, 3, 15.0, 2.25, np.deg2rad(20.0))
+    rig = Rig(lattice, np.array([0]), np.array([8]), LinearRamp(1.0, 1.0))
+    net = rig.topology.network(rig.values)
+    np.testing.assert_array_equal(net.contact[:, 1:], [[BARRIER, CUTOFF]] * lattice.n_ligaments)

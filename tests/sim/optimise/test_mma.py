@@ -10,7 +10,14 @@ import scipy.sparse as sp
 from sim.core import SimulationError
 from sim.optimise import MmaOptions, Result, minimise
 from sim.optimise.mma_subproblem import Separable, UnsolvedError, minimise_separable
-from tests.sim.optimise.known_problems import Known, cantilever, corner, many, shifted_bowl
+from tests.sim.optimise.known_problems import (
+    Known,
+    cantilever,
+    corner,
+    many,
+    rosenbrock_in_disc,
+    shifted_bowl,
+)
 
 
 def solve(known: Known, **changes: float) -> Result:
@@ -69,6 +76,17 @@ def test_hundreds_of_constraints() -> None:
 def test_every_simulated_design_is_feasible_and_the_accepted_ones_improve() -> None:
     found = solve(corner())
     assert all(e.violation == 0.0 for e in found.evaluations)
+    assert (np.diff([e.loss for e in found.evaluations if e.accepted]) < 0).all()
+
+
+def test_steps_that_raise_the_loss_are_not_taken() -> None:
+    """A narrow bent valley: replacements promise there what the loss does not keep."""
+    known = rosenbrock_in_disc()
+    found = minimise("mma", known.loss, known.constraints, known.start,
+                     options=MmaOptions(evaluations=60))  # fmt: skip
+    refused = [e for e in found.evaluations if not e.accepted]
+    assert refused
+    assert all(e.failure is None for e in refused)
     assert (np.diff([e.loss for e in found.evaluations if e.accepted]) < 0).all()
 
 

@@ -20,6 +20,7 @@ from sim.optimise import (
     stationarity,
 )
 from sim.optimise.minimisation import Method
+from sim.optimise.quasi_newton import DAMPING, QuasiNewton
 from tests.sim.optimise.known_problems import (
     Known,
     cantilever,
@@ -122,6 +123,25 @@ def test_failed_evaluations_are_rejected_and_teach_nothing() -> None:
     assert len(failed) == 3
     assert all(np.isnan(e.loss) and not e.accepted for e in failed)
     assert "unit 12" in str(failed[0].failure)
+    after = {e.number + 1: e.radius / 4 for e in failed}
+    radii = {e.number: e.radius for e in found.evaluations}
+    assert all(radii[number] <= radius * (1 + 1e-12) for number, radius in after.items())
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10**6))
+def test_the_model_stays_positive_definite(seed: int) -> None:
+    """Powell's damping: an update never leaves less than a fifth of the model's own curvature."""
+    random = np.random.default_rng(seed)
+    model = QuasiNewton(4, 1.0)
+    model.update(first := random.normal(size=4), first)  # learns the scale
+    for _ in range(5):
+        step, change = random.normal(size=4), random.normal(size=4)
+        before = float(step @ model.matrix @ step)
+        model.update(step, change)
+        assert np.linalg.eigvalsh(model.matrix)[0] > 0
+        left = float(step @ model.matrix @ step)
+        assert left == pytest.approx(max(float(step @ change), DAMPING * before), rel=1e-6)
 
 
 @pytest.mark.parametrize("method", ["sqp", "mma"])

@@ -44,6 +44,14 @@ def test_a_missed_target_is_relative_to_its_size() -> None:
     np.testing.assert_allclose(losses, np.sqrt(every) / size, rtol=1e-13)
 
 
+def test_a_target_of_other_load_cases_is_refused() -> None:
+    """One case would otherwise be repeated for all."""
+    units = np.array([3, 7, 20])
+    measure = RelativeMimicking(units, 15.0, WEIGHTS, MOTION[:1, :, units], np.ones(1))
+    with pytest.raises(ValueError, match=r"\(1, 5, 3\) load cases.* give the reference"):
+        measure(jnp.asarray(MOTION), RIG.values)
+
+
 def test_strain_energies_are_the_kernels() -> None:
     ligaments = np.array([0, 7, 31])
     units, values = RIG.lattice.ligament_units[ligaments], RIG.values

@@ -33,6 +33,7 @@ from sim.solvers import (
     MotionLaw,
     PrescribedMotion,
     TimeSeries,
+    differentiable_motion,
     solve_case,
 )
 from sim.structure import quads
@@ -155,6 +156,29 @@ def test_skipped_derivatives_change_nothing(integrator: str) -> None:
     _, gradient, _ = Evaluator(posed, plan)(design)
     _, full, _ = Evaluator(posed, replace(plan, solver=replace(solver, topology=complete)))(design)
     assert relative(gradient, full) < NEGLIGIBLE
+
+
+@pytest.mark.parametrize("static", [True, False])
+def test_a_gradient_by_stiffness_skips_no_ligament(static: bool) -> None:
+    """A plan for designs leaves out the ligaments that they cannot change: not so by constants."""
+    motion = LinearRamp(3.0, 1.0, 0.6) if static else Harmonic(3.0, 5.0, 0.6)
+    posed = scene(motions=(motion,), static=static, duration=1.0 if static else 0.05,
+                  **({"frequency": None, "samples": 5} if static else {}))  # fmt: skip
+    solver = make_plan(posed).solver
+    assert len(solver.topology.designed) < posed.lattice.n_ligaments
+    values = concrete_parameters(posed, posed.lattice.vertices)
+    outside = np.ones((posed.lattice.n_ligaments, 1))
+    outside[solver.topology.designed] = 0.0
+
+    def loss(factor: Any) -> Any:  # noqa: ANN401
+        law = values.law * (1.0 + (factor - 1.0) * outside)
+        moved = differentiable_motion(solver, values._replace(law=law), posed.loads.cases)
+        return jnp.sum(moved.displacement[0, -1, posed.objective.region] ** 2)
+
+    step = 1e-4
+    difference = (loss(1.0 + step) - loss(1.0 - step)) / (2 * step)
+    assert abs(difference) > 1e-6
+    assert float(jax.grad(loss)(1.0)) == pytest.approx(float(difference), rel=1e-3)
 
 
 def test_skipped_derivatives_of_equilibria_change_nothing() -> None:

@@ -1,0 +1,237 @@
+"""Runs the stages of a workflow as forks of one process, which imports their libraries once.
+
+A workflow starts a server beside it. `python -m pipeline STAGE` then is a client: it hands its
+command line, folder, environment and streams to the server, waits, and ends as the stage ends. The
+server imports the stage's module, forks, and the fork does the work as a process of its own. It
+forks while it has one thread, so nothing of it may start JAX. Where there is no server (a cluster,
+macOS, a command typed by hand) a stage runs by itself.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import importlib
+import json
+import os
+import runpy
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple, cast
+
+from pipeline.runtime import streams
+
+SOCKET = "METACLOAK_STAGES"
+"""Names the server's socket in the environment of a workflow's jobs."""
+
+_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
+_STREAMS = (0, 1, 2)
+_LENGTH = 8  # bytes that say how long a request is
+
+
+class _Request(NamedTuple):
+    """Names the program that a client asks for, and what its process has."""
+
+    program: str
+    imports: str
+    arguments: list[str]
+    folder: str
+    environment: dict[str, str]
+
+
+def start(module: str = __name__) -> None:
+    """Starts the server of this process's jobs; it ends after this process, and its last stage."""
+    if sys.platform != "linux":
+        return
+    path = Path(tempfile.mkdtemp(prefix="metacloak-")) / "stages"
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(str(path))
+    listener.listen(128)
+    life, held = os.pipe()  # the server reads its end when this process ends, however it does
+    handed = (listener.fileno(), life)
+    words = [sys.executable, "-m", module, str(path), *map(str, handed)]
+    server = subprocess.Popen(words, pass_fds=handed, stdin=subprocess.DEVNULL)
+    atexit.register(server.wait)
+    atexit.register(os.close, held)
+    os.close(life)
+    listener.close()
+    os.environ[SOCKET] = str(path)
+
+
+def delegate(program: str, imports: str) -> int | None:
+    """Has the server run `python -m program` with this process's arguments.
+
+    Args:
+        program: the module to run.
+        imports: module that the server imports first, for this stage and those after it.
+
+    Returns:
+        The exit code; None where there is no server: the caller does the work.
+    """
+    streams.complete()
+    with socket.socket(socket.AF_UNIX) as server:
+        try:
+            server.connect(os.environ[SOCKET])
+        except (KeyError, OSError):
+            return None
+        asked = _Request(program, imports, sys.argv, str(Path.cwd()), dict(os.environ))
+        request = json.dumps(asked).encode()
+        socket.send_fds(server, [len(request).to_bytes(_LENGTH)], _STREAMS)
+        server.sendall(request)
+        with _passed_on(server):
+            code = server.recv(2, socket.MSG_WAITALL)
+    status = int.from_bytes(code, signed=True) if len(code) == 2 else -signal.SIGKILL
+    if status < 0:  # ends by the signal that ended the stage
+        signal.signal(-status, signal.SIG_DFL)
+        os.kill(os.getpid(), -status)
+    return status
+
+
+@contextmanager
+def _passed_on(server: socket.socket) -> Iterator[None]:
+    """Hands signals on to the stage; SIGINT of a terminal reaches it as it reaches us."""
+
+    def hand_on(number: int, _: object) -> None:
+        with suppress(OSError):
+            server.sendall(bytes([number]))
+
+    before = {
+        signal.SIGTERM: signal.signal(signal.SIGTERM, hand_on),
+        signal.SIGINT: signal.signal(signal.SIGINT, hand_on),
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@dataclass
+class _Job:
+    """A stage at work: its process, and the client that waits for it."""
+
+    process: int
+    client: socket.socket
+    ended: int
+    """Descriptor that can be read once the process has ended."""
+
+
+class _Server:
+    """Forks a process for every request, and tells its client how it ended."""
+
+    def __init__(self, listener: socket.socket, life: int) -> None:
+        self._waiting = selectors.DefaultSelector()
+        self._jobs: set[int] = set()
+        self._listener, self._life = listener, life
+        self._wait_for(listener.fileno(), self._accept)
+        self._wait_for(life, self._finish)
+
+    def serve(self) -> _Request | None:
+        """Serves until the workflow has ended, and its stages. In a fork: returns what to run."""
+        while self._listener.fileno() >= 0 or self._jobs:
+            for key, _ in self._waiting.select():
+                if request := key.data():
+                    return cast(_Request, request)
+        return None
+
+    def _wait_for(self, descriptor: int, then: Callable[[], _Request | None]) -> None:
+        self._waiting.register(descriptor, selectors.EVENT_READ, then)
+
+    def _finish(self) -> None:
+        self._waiting.unregister(self._life)
+        self._waiting.unregister(self._listener)
+        self._listener.close()
+
+    def _accept(self) -> _Request | None:
+        client, _ = self._listener.accept()
+        received = _received(client)
+        if received is None:
+            client.close()
+            return None
+        request, given = received
+        with suppress(Exception):  # the fork meets the same fault, and tells it
+            importlib.import_module(request.imports)
+        process = os.fork()
+        if not process:
+            self._leave()
+            _become(request, given)
+            return request
+        for stream in given:
+            os.close(stream)
+        job = _Job(process, client, os.pidfd_open(process))
+        self._jobs.add(process)
+        self._wait_for(job.ended, lambda: self._tell(job))
+        self._wait_for(client.fileno(), lambda: self._hand_on(job))
+        return None
+
+    def _leave(self) -> None:
+        """Closes, in a fork, what belongs to the server and to other stages."""
+        for key in list(self._waiting.get_map().values()):
+            os.close(key.fd)
+        self._waiting.close()
+
+    def _hand_on(self, job: _Job) -> None:
+        """Sends the stage the signals that its client got; a client that is gone takes it along."""
+        numbers = job.client.recv(16)
+        for number in numbers or [signal.SIGKILL]:
+            os.kill(job.process, number)
+        if not numbers:
+            self._waiting.unregister(job.client)
+
+    def _tell(self, job: _Job) -> None:
+        _, status = os.waitpid(job.process, 0)
+        with suppress(KeyError):
+            self._waiting.unregister(job.client)
+        with suppress(OSError):
+            job.client.sendall(os.waitstatus_to_exitcode(status).to_bytes(2, signed=True))
+        job.client.close()
+        self._waiting.unregister(job.ended)
+        os.close(job.ended)
+        self._jobs.discard(job.process)
+
+
+def _received(client: socket.socket) -> tuple[_Request, list[int]] | None:
+    """Reads a request and the streams that come with it; None if the client has gone."""
+    head, given, _, _ = socket.recv_fds(client, _LENGTH, len(_STREAMS))
+    length = int.from_bytes(head)
+    body = client.recv(length, socket.MSG_WAITALL) if length else b""
+    if len(given) < len(_STREAMS) or len(body) < length:
+        return None
+    return _Request(*json.loads(body)), list(given)
+
+
+def _become(request: _Request, given: list[int]) -> None:
+    """Gives this fork the streams, folder, environment and arguments of its client."""
+    ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for stream, own in zip(given, _STREAMS, strict=True):
+        os.dup2(stream, own)
+        os.close(stream)
+    os.chdir(request.folder)
+    os.environ.clear()
+    os.environ.update(request.environment)
+    os.environ.pop(SOCKET, None)
+    sys.argv = request.arguments
+
+
+def serve(path: Path, listener: int, life: int) -> None:
+    """Serves requests at the socket `path`; returns in the server at its end, in a fork never."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    request = _Server(socket.socket(fileno=listener), life).serve()
+    if request is not None:
+        runpy.run_module(request.program, run_name="__main__", alter_sys=True)
+        sys.exit(0)
+    path.unlink(missing_ok=True)
+    path.parent.rmdir()
+
+
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]), *map(int, sys.argv[2:4]))

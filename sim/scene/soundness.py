@@ -1,0 +1,213 @@
+"""Checks that a scene has a meaning: refuses what has none, and warns of what may be meant."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterator
+from functools import cache
+
+import jax
+import numpy as np
+import shapely
+
+from sim.core import Floats, SimulationError
+from sim.scene.scene import Scene
+from sim.solvers import MotionLaw, TimeSeries
+from sim.structure import Lattice, polygons
+
+LOG = logging.getLogger(__name__)
+
+SHORTEST_LIGAMENT = 1e-6
+"""Of a ligament at rest, over the spacing: its law divides by its length."""
+JUMP, SOME_JUMP = 0.05, 0.01
+"""Of a motion at its start, over its largest displacement: refused, and warned of."""
+INSTANTS = 513
+"""At which a motion is looked at."""
+LARGE = 100_000
+"""Unknowns from which on memory and time are told in advance."""
+ENTRIES = 8.0
+"""Of a factor, over n log2(n) unknowns: 7.0 of 120 thousand (`make bench`)."""
+SECONDS = 6e-9
+"""To factorise a tangent of n unknowns, over n^1.5."""
+FACTORISATIONS = 4
+"""For each load."""
+HELD_STATES = 4
+"""Arrays of all states that a solve and its adjoint hold."""
+
+
+class SceneError(SimulationError):
+    """Refuses a scene without a meaning.
+
+    Args:
+        reason: what is wrong and what to change.
+        key: of the problem file that it is about.
+    """
+
+    def __init__(self, reason: str, key: str) -> None:
+        super().__init__(reason)
+        self.key = key
+
+
+def check_scene(
+    scene: Scene, vertices: Floats | None = None, times: Floats | None = None
+) -> tuple[str, ...]:
+    """Checks structure, supports, drives and size; returns warnings, logged once a process.
+
+    Args:
+        scene: the scene.
+        vertices: (n_vertices, 2) of the structure, mm; by default the initial one.
+        times: (n_times,) of the output, s; by default the start and the end.
+
+    Raises:
+        SceneError: something has no meaning.
+    """
+    asked = np.array([0.0, scene.loads.duration]) if times is None else times
+    check_units(scene.lattice, scene.lattice.vertices if vertices is None else vertices)
+    _check_ids(scene)
+    found = [*_loose_units(scene), *_size(scene, len(asked))]
+    for number, motion in enumerate(scene.loads.motions):
+        if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(motion)):
+            found += _drive(scene, motion, f"load case {number}", float(asked[-1]))
+    for warning in found:
+        _warn(warning)
+    return tuple(found)
+
+
+@cache
+def _warn(text: str) -> None:
+    LOG.warning("%s", text)
+
+
+def check_units(lattice: Lattice, vertices: Floats) -> None:
+    """Refuses units whose edges cross, or run clockwise, and ligaments without length.
+
+    Raises:
+        SceneError: naming the unit or the ligament.
+    """
+    rings = polygons(lattice, vertices)
+    wrong = np.flatnonzero(
+        ~shapely.is_valid(rings) | ~shapely.is_ccw(shapely.get_exterior_ring(rings))
+    )
+    if len(wrong) > 0:
+        i, j = lattice.index[wrong[0]]
+        raise SceneError(
+            f"unit {wrong[0]} at [{i}, {j}] ({len(wrong)} in all) has edges that cross or corners"
+            " that run clockwise, so no area and inertia of its own; move its corners",
+            "lattice",
+        )
+    lengths = np.linalg.norm(lattice.ligament_vectors, axis=1)
+    if lengths.min(initial=np.inf) < SHORTEST_LIGAMENT * lattice.spacing:
+        one, other = lattice.ligament_units[lengths.argmin()]
+        raise SceneError(
+            f"the ligament between units {one} and {other} has no length"
+            f" ({lengths.min():.3g} mm); keep corners of neighbours apart",
+            "lattice.ligament_length",
+        )
+
+
+def _check_ids(scene: Scene) -> None:
+    """Refuses ids of units that there are not."""
+    loads, n = scene.loads, scene.lattice.n_units
+    named = {
+        "supports": [each.units for each in loads.supports],
+        "drive.units": [case.units for case in loads.cases],
+        "objective.region": [scene.objective.region],
+        "cloak": [scene.design.cloak],
+    }
+    for key, ids in named.items():
+        every = np.concatenate([np.zeros(0, dtype=np.int64), *ids])
+        if len(wrong := every[(every < 0) | (every >= n)]) > 0:
+            raise SceneError(f"there is no unit {wrong[0]}; the lattice has 0 to {n - 1}", key)
+
+
+def _loose_units(scene: Scene) -> Iterator[str]:
+    """Warns of units that a single ligament holds."""
+    count = np.bincount(scene.lattice.ligament_units.ravel(), minlength=scene.lattice.n_units)
+    loose = np.setdiff1d(np.flatnonzero(count == 1), scene.loads.held // 3)
+    if len(loose) > 0:
+        i, j = scene.lattice.index[loose[0]]
+        yield (
+            f"units that hang on one ligament: {len(loose)}, the first at [{i}, {j}]; join or"
+            " remove them if that is not meant"
+        )
+
+
+def _size(scene: Scene, n_times: int) -> Iterator[str]:
+    """Estimates memory and time of a large structure.
+
+    Raises:
+        SceneError: it needs more memory than there is.
+    """
+    n = 3 * scene.lattice.n_units - len(scene.loads.held)
+    if n < LARGE:
+        return
+    memory = 8.0 * (ENTRIES * n * np.log2(n) + HELD_STATES * n_times * n)
+    seconds = SECONDS * n**1.5 * FACTORISATIONS * n_times * len(scene.loads.cases)
+    told = f"{scene.lattice.n_units} units: {n} unknowns, about {memory / 1e9:.2g} GB"
+    installed = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if memory > installed:
+        what = f"{told}, of which this machine has {installed / 1e9:.2g}; take fewer units or steps"
+        raise SceneError(what, "lattice")
+    time = f", and about {max(1.0, seconds / 60):.0f} min a path" if scene.loads.static else ""
+    yield f"{told}{time}"
+
+
+def _drive(scene: Scene, motion: MotionLaw, case: str, end: float) -> Iterator[str]:
+    """Checks the motion of a load case up to a time.
+
+    Raises:
+        SceneError: it is no series, leads beyond the lattice, starts with a jump, or moves the
+            structure as a rigid body.
+    """
+    if isinstance(motion, TimeSeries):
+        _series(motion, case, end)
+    instants = np.linspace(0.0, end, INSTANTS)
+    with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
+        course = np.asarray(motion(instants)).reshape(INSTANTS, -1, 3)
+    far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
+    size = np.ptp(scene.lattice.vertices, axis=0)
+    if not far <= size.max():
+        raise SceneError(
+            f"{case} moves its units by {far:.4g} mm, further than the lattice is long"
+            f" ({size[0]:.4g} by {size[1]:.4g} mm); lower the amplitude",
+            "drive.amplitude",
+        )
+    if scene.loads.static:
+        _held_back(scene, course, case)
+        return
+    whole = np.abs(course * [1.0, 1.0, scene.lattice.spacing / 2]).max(axis=(1, 2))
+    jump = whole[0] / max(whole.max(), 1e-300)
+    said = f"{case} starts with a jump, of {jump:.2g} of its largest displacement"
+    if jump > JUMP:
+        raise SceneError(f"{said}; let it start from rest", "drive")
+    if jump > SOME_JUMP:
+        yield said
+
+
+def _series(motion: TimeSeries, case: str, end: float) -> None:
+    times = np.asarray(motion.times, dtype=float)
+    if len(times) != len(motion.motion) or len(times) < 2 or not (np.diff(times) > 0).all():
+        raise SceneError(
+            f"the times of {case} do not ascend, or are not one for each of its motions; sort them,"
+            " each once",
+            "drive.file",
+        )
+    slack = 1e-9 * end
+    if times[0] > slack or times[-1] < end - slack:
+        raise SceneError(
+            f"{case} is known from {times[0]:.6g} to {times[-1]:.6g} s, and is asked for from 0 to"
+            f" {end:.6g} s; give a longer series, or a shorter horizon",
+            "drive.file",
+        )
+
+
+def _held_back(scene: Scene, course: Floats, case: str) -> None:
+    """Refuses a static load that nothing resists: all driven units move alike, without a turn."""
+    alike = (course[..., 2] == 0).all() and (course == course[:, :1]).all()
+    moves = np.flatnonzero((course[..., :2] != 0).any(axis=(0, 1)))
+    if alike and len(moves) > 0 and not np.isin(scene.loads.clamped % 3, moves).any():
+        raise SceneError(
+            f"nothing holds the structure against {case}: it moves along as one; clamp some units",
+            "supports",
+        )

@@ -1,0 +1,147 @@
+"""A stage that a server runs behaves as one that runs by itself, however it ends."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+import pytest
+
+from pipeline.runtime import ROOT, stage_server
+
+PROGRAM = """
+import os, signal, sys, time
+from pathlib import Path
+print("out of", Path.cwd().name, os.environ["COLOUR"], "server" in os.environ, sys.argv[1:])
+print("complains", file=sys.stderr)
+what = sys.argv[1]
+if what == "sleep":
+    Path("process").write_text(str(os.getpid()))
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        sys.exit(130)
+if what == "segfault":
+    os.kill(os.getpid(), signal.SIGSEGV)
+sys.exit(int(what))
+"""
+CLIENT = """
+import sys
+from pipeline.runtime import delegate
+code = delegate("program", "colorsys")
+sys.exit(99 if code is None else code)
+"""
+ENVIRONMENT = os.environ | {"COLOUR": "orange", "PYTHONPATH": str(ROOT)}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "program.py").write_text(PROGRAM)
+    return tmp_path
+
+
+@pytest.fixture
+def server(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Runs a server until the test is over, in which `program` can be imported."""
+    monkeypatch.setenv("PYTHONPATH", f"{folder}:{ROOT}")
+    monkeypatch.setenv(stage_server.SOCKET, "")
+    ended = []
+    monkeypatch.setattr(atexit, "register", lambda *call: ended.append(call))
+    stage_server.start()
+    ENVIRONMENT[stage_server.SOCKET] = os.environ[stage_server.SOCKET]
+    yield
+    for then, *arguments in reversed(ended):
+        then(*arguments)
+    assert not Path(ENVIRONMENT[stage_server.SOCKET]).parent.exists()
+
+
+def client(folder: Path, *words: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", CLIENT, *words]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        command, cwd=folder, env=ENVIRONMENT, text=True, stdout=pipe, stderr=pipe
+    )
+
+
+def sleeping(folder: Path) -> psutil.Process:
+    """Waits until the stage sleeps."""
+    process = folder / "process"
+    deadline = time.monotonic() + 30
+    while not process.exists() or not process.read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    return psutil.Process(int(process.read_text()))
+
+
+@pytest.mark.usefixtures("server")
+def test_a_stage_has_the_streams_folder_environment_and_arguments_of_its_client(
+    folder: Path,
+) -> None:
+    both = [client(folder, "3", "a b"), client(folder, "0")]
+    for process, code, words in zip(both, (3, 0), ("['3', 'a b']", "['0']"), strict=True):
+        out, err = process.communicate(timeout=60)
+        assert process.returncode == code
+        assert out == f"out of {folder.name} orange False {words}\n"
+        assert err == "complains\n"
+
+
+@pytest.mark.usefixtures("server")
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGTERM, -signal.SIGTERM), (signal.SIGINT, 130)]
+)
+def test_a_signal_reaches_the_stage(folder: Path, number: int, code: int) -> None:
+    process = client(folder, "sleep")
+    stage = sleeping(folder)
+    process.send_signal(number)
+    process.communicate(timeout=30)
+    assert process.returncode == code
+    assert not stage.is_running()
+
+
+@pytest.mark.usefixtures("server")
+def test_a_killed_client_takes_its_stage_along(folder: Path) -> None:
+    process = client(folder, "sleep")
+    stage = sleeping(folder)
+    process.kill()
+    process.communicate(timeout=30)
+    psutil.wait_procs([stage], timeout=30)
+    assert not stage.is_running()
+
+
+@pytest.mark.usefixtures("server")
+def test_a_stage_that_crashes_ends_its_client_alike(folder: Path) -> None:
+    process = client(folder, "segfault")
+    process.communicate(timeout=60)
+    assert process.returncode == -signal.SIGSEGV
+
+
+def test_a_client_without_a_server_does_the_work_itself(folder: Path) -> None:
+    ENVIRONMENT[stage_server.SOCKET] = str(folder / "nothing")
+    process = client(folder, "0")
+    process.communicate(timeout=60)
+    assert process.returncode == 99
+
+
+def test_stages_and_pages_leave_the_server_with_one_thread() -> None:
+    """A fork has only the thread that forked: whatever another one held stays held."""
+    names = "\n".join(
+        [
+            "import importlib, os, pipeline",
+            "from pipeline.runtime import STAGES",
+            "from reports.catalogue import REPORTS",
+            "for row in [*STAGES.values(), *REPORTS.values()]:",
+            "    importlib.import_module(row.module)",
+            "print(len(os.listdir('/proc/self/task')))",
+        ]
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", names], cwd=ROOT, check=True, capture_output=True, text=True
+    )
+    assert done.stdout == "1\n"

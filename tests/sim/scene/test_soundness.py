@@ -1,0 +1,145 @@
+"""Scenes without a meaning are refused in one sentence; what may be meant is warned of."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sim
+from benchmarks.scenes import MATERIAL
+from sim.core import Floats, Ints
+from sim.quasistatics import StaticSolver
+from sim.scene import SceneError, check_scene
+from sim.solvers import MotionLaw, solve_case
+from tests.sim.structures import Rig, hand_made, rotating_squares
+
+LEFT = 5 * np.arange(5)
+RIGHT = LEFT + 4
+
+
+def scene(motion: MotionLaw | None = None, **changes: Any) -> sim.Scene:  # noqa: ANN401
+    """5 x 5 squares between a clamped column and one that is pressed in."""
+    drive = sim.PrescribedMotion(RIGHT, motion or sim.LinearRamp(-3.0, 1.0))
+    made = sim.Scene(
+        sim.Structure(rotating_squares(), MATERIAL),
+        sim.Loads((drive,), (sim.Clamp(LEFT),), static=True),
+        sim.Objective(region=np.array([12]), steps=2),
+        sim.Design(cloak=np.array([6, 8])),
+    )
+    return made.updated(**changes)
+
+
+def series(start: float = 0.0, times: tuple[float, ...] = (0.0, 0.5, 1.0)) -> sim.TimeSeries:
+    return sim.TimeSeries(np.array(times), np.outer([start, 1.0, 2.0], [1.0, 0.0, 0.0]))
+
+
+def crossed(unit: int) -> Floats:
+    """Two neighbouring corners of a unit swapped."""
+    vertices = rotating_squares().vertices.copy()
+    vertices[4 * unit : 4 * unit + 2] = vertices[4 * unit + 1 : 4 * unit - 1 : -1][:2]
+    return vertices
+
+
+MOVING = {"static": False, "frequency": 10.0, "steps": None, "samples": 3}
+REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
+    "beyond": (scene(sim.LinearRamp(-400.0, 1.0)), "400 mm, further than", "drive.amplitude"),
+    "far beyond": (scene(sim.LinearRamp(1e300, 1.0)), "further than", "drive.amplitude"),
+    "shaken beyond": (scene(sim.Harmonic(90.0, 10.0), **MOVING), "90 mm", "drive.amplitude"),
+    "no supports": (scene(supports=()), "moves along as one; clamp", "supports"),
+    "supports across": (scene(supports=(sim.Clamp(LEFT, ("uy",)),)), "moves along", "supports"),
+    "unsorted": (scene(series(times=(0.0, 0.7, 0.5))), "do not ascend", "drive.file"),
+    "twice": (scene(series(times=(0.0, 0.5, 0.5))), "do not ascend", "drive.file"),
+    "too short": (scene(series(times=(0.0, 0.2, 0.9))), "from 0 to 0.9 s", "drive.file"),
+    "too late": (scene(series(times=(0.1, 0.2, 1.0))), "from 0.1 to 1 s", "drive.file"),
+    "jump": (scene(series(start=1.0), **MOVING), "starts with a jump, of 0.5", "drive"),
+    "no length": (
+        scene(lattice=sim.quads(5, 5, 15.0, 0.0, 0.3)), "has no length", "lattice.ligament_length",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("posed", "what", "key"), REFUSED.values(), ids=REFUSED)
+def test_what_has_no_meaning_is_refused(posed: sim.Scene, what: str, key: str) -> None:
+    for door in (check_scene, sim.simulate, sim.evaluate):
+        with pytest.raises(SceneError, match=what) as refusal:
+            door(posed)
+        assert refusal.value.key == key
+
+
+def test_sound_scenes_pass() -> None:
+    sound = (
+        scene(),
+        scene(supports=(sim.Clamp(LEFT, ("ux",)),)),
+        scene(series(start=1.0)),  # a path begins where its first load is
+        scene(series(), **MOVING),
+        scene(sim.Harmonic(3.0, 10.0), supports=(), **MOVING),
+    )
+    assert [check_scene(each) for each in sound] == [()] * len(sound)
+
+
+def test_units_that_cross_themselves_are_refused() -> None:
+    for vertices in (crossed(7), rotating_squares().vertices * [-1.0, 1.0]):
+        with pytest.raises(SceneError, match=r"unit \d+ at .* edges that cross or corners"):
+            sim.simulate(scene(), vertices=vertices)
+    far = np.full(scene().space.n_variables, 20.0) * (-1.0) ** np.arange(scene().space.n_variables)
+    with pytest.raises(SceneError, match="edges that cross"):
+        sim.simulate(scene(), far)
+    rig = Rig(rotating_squares(), LEFT, RIGHT, sim.LinearRamp(-1.0, 1.0))
+    values = rig.values._replace(mass=-rig.values.mass)
+    with pytest.raises(sim.SimulationError, match="less than none"):
+        solve_case(StaticSolver(rig.topology, np.ones(1)), values, rig.drive)
+
+
+def test_a_small_jump_and_a_loose_unit_are_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    noisy = scene(series(start=0.03), **MOVING)
+    assert "starts with a jump, of 0.015" in check_scene(noisy)[0]
+    lattice = rotating_squares()
+    ends = np.sort(lattice.ligament_units, axis=1).tolist()
+    cut = [ends.index(pair) for pair in ([6, 7], [7, 8], [7, 12])]
+    loose = scene(lattice=replace(lattice, ligaments=np.delete(lattice.ligaments, cut, axis=0)))
+    plan = sim.make_plan(loose)
+    assert plan.warnings == tuple(plan.record()["warnings"])
+    assert plan.warnings[0].startswith("units that hang on one ligament: 1, the first at [2, 1]")
+    assert caplog.messages.count(plan.warnings[0]) == 1
+
+
+def test_large_structures_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """500 x 500 units, at any number of loads: estimated by the trend of smaller ones."""
+    large = scene(lattice=sim.quads(500, 500, 15.0, 2.25, 0.3), supports=(sim.Clamp(LEFT * 500),))
+    (told,) = check_scene(large, times=np.linspace(0.01, 1.0, 100))
+    assert told.startswith("250000 units: 749970 unknowns, about ")
+    assert "GB, and about" in told
+    assert "min a path" in told
+    monkeypatch.setattr("os.sysconf", lambda name: 1 << (12 if name == "SC_PAGE_SIZE" else 16))
+    with pytest.raises(SceneError, match=r"this machine has .*; take fewer units"):
+        check_scene(large)
+
+
+def row(motion: MotionLaw, driven: Ints) -> Rig:
+    """Three squares in a row, the first clamped."""
+    square = np.array([[4.0, 0.0], [0.0, 4.0], [-4.0, 0.0], [0.0, -4.0]])
+    places = [square + np.array([10.0 * k, 0.0]) for k in range(3)]
+    return Rig(hand_made(places, np.array([[0, 6], [4, 10]])), np.array([0]), driven, motion)
+
+
+def test_a_ligament_that_vanishes_on_the_way_is_an_error() -> None:
+    """Its ends meet at the second of four loads."""
+    rig = row(sim.LinearRamp(-4.0, 1.0), np.array([1]))
+    solver = StaticSolver(rig.topology, np.linspace(0.25, 1.0, 4))
+    with pytest.raises(sim.SimulationError, match="units 0 and 1 has no length left in state 1"):
+        solve_case(solver, rig.values, rig.drive)
+
+
+@pytest.mark.parametrize("softer", [1e-3, 1e-9])
+def test_soft_structures_are_solved_as_well_as_stiff_ones(softer: float) -> None:
+    """A floor in N would call any state of a soft one balanced."""
+    rig = Rig(rotating_squares(), LEFT, RIGHT, sim.LinearRamp(-3.0, 1.0))
+    soft = rig.values._replace(law=softer * rig.values.law, contact=softer * rig.values.contact)
+    stiff, found = (
+        solve_case(StaticSolver(rig.topology, np.array([0.5, 1.0])), values, rig.drive)[0]
+        for values in (rig.values, soft)
+    )
+    np.testing.assert_allclose(found, stiff, atol=1e-9)
