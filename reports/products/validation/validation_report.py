@@ -35,6 +35,7 @@ def report(args: argparse.Namespace) -> None:
         },
         "priors": asked["priors"],
         "signed": _signed(samples),
+        "held": list(_held(samples)),
         "inside": bool(samples["inside"].item()),
         "correlation": [
             f"{value:+.2f}" for value in samples["correlation"].values[np.triu_indices(3, 1)]
@@ -160,6 +161,17 @@ def _left_out(made: xr.Dataset) -> PageTable:
         )
     ]
     return PageTable(["Left out", "Curve", "Band", "Measured over median", "Half width"], rows)
+
+
+def _held(made: xr.Dataset) -> Iterator[str]:
+    """Counts curves inside by what was left out, and tells where all lie on one side."""
+    without = made["without"].values.astype(str)
+    for left in dict.fromkeys(without):
+        mine = without == left
+        inside = int(made["left_out_inside"].values[mine].sum())
+        sides = np.sign(made["left_out_deviation"].values[mine])
+        side = {3: "all above", -3: "all below"}.get(int(3 * sides.mean()), "on both sides of")
+        yield f"without {left} {inside} of {mine.sum()} inside, {side} the median"
 
 
 def _mechanisms(made: xr.Dataset) -> PageTable:
