@@ -54,7 +54,10 @@ class Snap(NamedTuple):
 
 
 def split_branches(displacement: Floats, force: Floats) -> list[LoadBranch]:
-    """Splits a record where the displacement turns by a good part of its range."""
+    """Splits a record where the displacement turns by a good part of its range.
+
+    A shorter approach to the start, and a shorter way back at the end, are left out.
+    """
     turns, reach = [0], TURN * float(np.ptp(displacement))
     rising = None
     for k, here in enumerate(displacement):
@@ -62,13 +65,13 @@ def split_branches(displacement: Floats, force: Floats) -> list[LoadBranch]:
         if rising is None:
             if abs(here - last) > reach:
                 rising = here > last
-                turns.append(k)
+                way = displacement[: k + 1]
+                turns = [int(way.argmin() if rising else way.argmax()), k]
         elif (here > last) == rising:
             turns[-1] = k
         elif abs(here - last) > reach:
             turns.append(k)
             rising = not rising
-    turns[-1] = len(displacement) - 1
     parts = [
         (displacement[first : last + 1], force[first : last + 1]) for first, last in pairwise(turns)
     ]
