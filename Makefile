@@ -8,8 +8,7 @@ PAGES := all fig1 index movies calibrate validation benchmark
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
-INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes $(OFFLINE)
-OFFLINE := $(if $(WHEELS),--no-index --find-links "$(abspath $(WHEELS))")
+INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
 PYTEST ?= -n auto --dist loadfile --no-loadscope-reorder --ignore tests/clients --ignore tests/cluster --ignore tests/slow
 SOURCES := $(wildcard sim pipeline reports benchmarks tests docs)
 WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
@@ -17,7 +16,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup dev reproduce wheels test test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup dev reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -34,9 +33,11 @@ help:
 	@echo "make movies    the paper's movies: results/movies"
 	@echo "make reproduce build fig2@quick (or STUDY=...) twice from nothing, and compare all bytes"
 	@echo "make test      run the tests"
+	@echo "make nightly   run what takes longer: the four below, with a table of them (PARTS=clients: one)"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
-	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/run)"
+	@echo "make clients   run the tests that need other programs: Chromium, a slicer, CAD (see .ci/nightly)"
 	@echo "make cluster   make this machine a SLURM of one node and run the tests on it"
+	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make benchmark run time against error of every solver, and more: results/benchmark (an hour)"
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
@@ -47,7 +48,6 @@ help:
 	@echo "make dev       the same, with the tools of tests, linters and documentation"
 	@echo "make wheels WHEELS=folder   download what make setup needs into the folder"
 	@echo "make docs      the documentation as a site: results/docs/index.html"
-	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make lock      renew requirements.lock from pyproject.toml (with Python 3.11)"
 	@echo "make clean     remove results and caches (.venv stays)"
 
@@ -61,16 +61,16 @@ dev: .venv/requirements-dev.lock
 	    "Name another one: make $(or $(MAKECMDGOALS),setup) PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	    echo "error: '$(PYTHON)' comes without venv or pip. On Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@echo "Setting up .venv from requirements.lock (a minute or two, once)" >&2
+	@echo "Setting up .venv from requirements.lock (half a minute, once)" >&2
 	@test -e $@ || $(PYTHON) -m venv --clear .venv
 	@rm -f $@
-	@$(INSTALL) -r requirements.lock
+	@$(INSTALL) requirements.lock
 	@cp requirements.lock $@
 
 .venv/requirements-dev.lock: requirements-dev.lock | setup
-	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (a minute, once)" >&2
+	@echo "Adding what requirements-dev.lock names for tests, linters and documentation (once)" >&2
 	@rm -f $@
-	@$(INSTALL) -r requirements-dev.lock
+	@$(INSTALL) requirements-dev.lock
 	@cp requirements-dev.lock $@
 
 # Into the same folder for every Python that is to be served: make wheels WHEELS=folder PYTHON=python3.12
@@ -95,6 +95,9 @@ reproduce: setup
 test: dev
 	$(BIN)/python -m pytest $(PYTEST)
 
+nightly: dev
+	@.ci/nightly $(PARTS)
+
 pythons:
 	@.ci/pythons
 
@@ -108,7 +111,6 @@ clients: dev
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/clients
 
 cluster: dev
-	tests/cluster/start.sh
 	$(BIN)/python -m pytest tests/cluster
 
 lint: dev
@@ -144,7 +146,7 @@ LOCK = CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --
 ITSELF := '/^metacloak @/d; /^\# WARNING: pip install will/d; /^\# Consider using a hashable/d'
 lock: setup
 	@test -x .cache/lock/bin/pip-compile || { $(PYTHON) -m venv .cache/lock && .cache/lock/bin/pip install --quiet pip-tools; }
-	$(LOCK) --extra all --output-file requirements.lock pyproject.toml
+	$(LOCK) --extra all --extra install --output-file requirements.lock pyproject.toml
 	sed -i $(ITSELF) requirements.lock
 	$(LOCK) --extra dev --constraint requirements.lock --output-file requirements-dev.lock pyproject.toml
 	sed -i $(ITSELF) requirements-dev.lock

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -38,9 +37,8 @@ def tables(text: str) -> dict[str, list[TableRow]]:
 
 def figure(measured: dict[str, list[TableRow]]) -> Figure:
     """Draws the time of loss and gradient beside the baselines, and time against error."""
-    drawn, (left, right) = plt.subplots(
-        1, 2, figsize=(style.TWO_COLUMNS / style.MM_PER_INCH, 2.5), width_ratios=(1, 1.2)
-    )
+    drawn = Figure(figsize=(style.TWO_COLUMNS / style.MM_PER_INCH, 2.5))
+    left, right = drawn.subplots(1, 2, width_ratios=(1, 1.2))
     _beside(left, measured)
     _against(right, measured["precision"])
     drawn.tight_layout(w_pad=2.0)

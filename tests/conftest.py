@@ -1,7 +1,10 @@
-from __future__ import annotations
-
+import ctypes
+import gc
 import signal
+import sys
 
+import psutil
+import pytest
 from hypothesis import HealthCheck, settings
 
 from pipeline.runtime import pin
@@ -16,3 +19,31 @@ settings.register_profile(
     "suite", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("suite")
+
+LARGE, GROWTH = 1000 << 20, 150 << 20
+"""Bytes from which a process drops what JAX has compiled, and by which it has to grow till then."""
+_process, _kept = psutil.Process(), [0]
+
+gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
+
+
+LONG = ("e2e", "workflow", "docs", "solvers")
+"""Folders with files of a minute; begun first, they keep no worker at the end."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.path.parent.name not in LONG)
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()
+    gc.enable()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_teardown() -> None:
+    if "jax" in sys.modules and _process.memory_info().rss > max(LARGE, _kept[0] + GROWTH):
+        sys.modules["jax"].clear_caches()
+        gc.collect()
+        ctypes.CDLL(None).malloc_trim(0)
+        _kept[0] = _process.memory_info().rss

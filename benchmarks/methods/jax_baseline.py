@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -99,6 +98,8 @@ def respond(
     scene: Scene, drive: PrescribedMotion, method: RungeKutta, times: Array
 ) -> Callable[[Parameters], tuple[Array, dict[str, Array]]]:
     """Maps parameters to the motion (n_times, n_units, 3) and the solver's counts."""
+    import diffrax
+
     rates, motion = field(scene, drive)
     n_free = scene.topology.n_free
     zero = (jnp.zeros(n_free), jnp.zeros(n_free))

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy.stats import spearmanr
 
 from benchmarks.harness import MeasuringLimits, Tell
 from benchmarks.tracking import plain_opencv
@@ -172,6 +171,8 @@ def accuracy(found: Floats, real: TruthVideo, px_per_mm: float) -> str:
 
 def honesty(track: Track, real: TruthVideo) -> str:
     """Formats spread of error over sigma, their least rank correlation, faults found and false."""
+    from scipy.stats import spearmanr
+
     seen = real.visible & np.isfinite(track.displacement).all(axis=-1)
     seen[0] = False
     error, sigma = (track.displacement - real.truth)[seen], track.sigma[seen]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from pipeline.calibration.fit_uncertainty import Uncertainty, slopes
 from pipeline.calibration.inputs import ConstantName, Constants
@@ -108,9 +108,9 @@ def _quantile(fit: Fit) -> float:
     """Computes the quantile of the 95 % intervals: Student's, where the noise was estimated."""
     experiments = fit.model.experiments
     if all(each.measured.known for each in experiments):
-        return float(student.ppf(0.975, np.inf))
+        return float(ndtri(0.975))
     unbiased = sum(each.measured.unbiased for each in experiments)
-    return float(student.ppf(0.975, max(len(fit.residual) - len(fit.unknowns) - unbiased, 1)))
+    return float(stdtrit(max(len(fit.residual) - len(fit.unknowns) - unbiased, 1), 0.975))
 
 
 def measure_quality(fit: Fit) -> Quality:

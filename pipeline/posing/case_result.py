@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,16 +20,16 @@ if TYPE_CHECKING:
 from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
-from sim.quasistatics import StaticRecord
+from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver
 from sim.scene import mimicking, sample_times, scales, strain_energies
 from sim.solvers import solve_case
 from sim.structure import clearance
 
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
-NOT_ASKED, UNSTABLE, STABLE, JUMPED = -1, 0, 1, 2
-"""Stability of a state: no equilibrium; no minimum of the energy; a minimum; one that the structure
-jumped to from where its path ended."""
+NOT_ASKED, UNSTABLE, STABLE = -1, 0, 1
+"""Stability of a state: no equilibrium; no minimum of the energy; a minimum. More by
+``LIMIT_POINT`` or ``BRANCHING`` is a minimum that it came to from where its path ended."""
 LOG = logging.getLogger(__name__)
 
 
@@ -65,8 +66,11 @@ class CaseResult(NamedTuple):
     gap: Floats
     overlapping: Floats
     stability: NDArray[np.int8]
+    snap: Floats
+    eigenvalue: Floats
     region: Floats
     loss: float
+    loss_other_branch: float
     loss_samples: float
     loss_error: float
     displacement_error: float
@@ -89,6 +93,16 @@ def measure(
         measure = mimicking(scene, _target(motion, scene, case.number, intact, at), weights)
         return float(measure(motion[None, at], case.values)[0])
 
+    def other_loss(solved: Solved) -> float:
+        """Loss on the other branch of where the path branches; NaN if it does not."""
+        case, record = solved.case, solved.record
+        if not isinstance(record, StaticRecord) or not (record.jumped == BRANCHING).any():
+            return np.nan
+        assert isinstance(case.solver, StaticSolver)
+        mirrored = replace(case.solver, sense=-case.solver.sense)
+        motion = solve_case(mirrored, case.values, case.drive)[0].reshape(solved.displacement.shape)
+        return loss_of(motion, case, times.integrated, None)
+
     def reduce(solved: Solved) -> CaseResult:
         case, motion = solved.case, solved.displacement
         finer = case.solver.refined(solved.record)
@@ -101,7 +115,7 @@ def measure(
             each[times.integrated][:, scene.objective.region] / scales(scene.lattice.spacing)
             for each in (motion, refined)
         )
-        shown = motion[times.shown]
+        shown, path = motion[times.shown], _path(solved, times.shown)
         seen = observe(scene.topology, case.values, shown)
         found = clearance(scene.lattice, vertices, shown[::stride])
         return CaseResult(
@@ -112,9 +126,12 @@ def measure(
             roi_energy=_roi_energy(scene, case, shown),
             gap=_at_stride(found.gap, stride, len(shown)),
             overlapping=_at_stride(found.overlaps, stride, len(shown)),
-            stability=_stability(solved, times.shown),
+            stability=path.stability,
+            snap=path.snap,
+            eigenvalue=path.eigenvalue,
             region=motion[:, scene.objective.region],
             loss=loss,
+            loss_other_branch=other_loss(solved),
             loss_samples=loss_of(motion, case, times.sampled, mean),
             loss_error=abs(loss - fine_loss) / (1.0 if scene.objective.reference else fine_loss),
             displacement_error=float(
@@ -148,16 +165,29 @@ def _at_stride(values: NDArray[np.generic], stride: int, size: int) -> Floats:
     return out
 
 
-def _stability(solved: Solved, at: Ints) -> NDArray[np.int8]:
+class _Path(NamedTuple):
+    """Stability along a path at the times shown: flags, loads of snaps, smallest eigenvalues."""
 
-    record = solved.record
-    if isinstance(record, StaticRecord):
-        flags = np.where(record.stable == 1, np.where(record.jumped == 1, JUMPED, STABLE), UNSTABLE)
-        for flag, what in ((UNSTABLE, "is not stable"), (JUMPED, "was reached by a jump")):
-            if len(which := np.flatnonzero(flags == flag)):
-                LOG.warning("the equilibrium %s at load %s of %d", what, which + 1, len(flags))
-        return flags[at].astype(np.int8)
-    return np.full(len(at), NOT_ASKED, dtype=np.int8)
+    stability: NDArray[np.int8]
+    snap: Floats
+    eigenvalue: Floats
+
+
+def _path(solved: Solved, at: Ints) -> _Path:
+    """Describes what happened on the way to each of the times shown (``at``, ascending)."""
+    record, nothing = solved.record, np.full(len(at), np.nan)
+    if not isinstance(record, StaticRecord):
+        return _Path(np.full(len(at), NOT_ASKED, dtype=np.int8), nothing, nothing)
+    for load in record.snapped[record.jumped > 0]:
+        share = load / solved.case.solver.output_times[-1]
+        LOG.warning("the structure snaps at %.4g of the load", share)
+    if not record.stable.all():
+        LOG.warning("%d equilibria are not stable", np.count_nonzero(record.stable == 0))
+    ways = np.concatenate([[0], at[:-1] + 1])
+    jumped = np.maximum.reduceat(record.jumped, ways)
+    flags = np.where(record.stable[at] == 1, STABLE + jumped, UNSTABLE)
+    snap = np.fmax.reduceat(record.snapped, ways)
+    return _Path(flags.astype(np.int8), snap, record.eigenvalue[at])
 
 
 def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from sim.constraints import ConstraintVector
     from sim.core import SimulationError
     from sim.optimise import InfeasibleStartError
-    from sim.scene import Scene
+    from sim.scene import Scene, SnapMargin
 
-_KEYS = {"convexity": "convex"}
+_KEYS = {"convexity": "constraints.convex", "snap": "objective.snap"}
 
 
 def infeasible_start(
-    error: InfeasibleStartError, constraints: ConstraintVector, source: Path
+    error: InfeasibleStartError, constraints: ConstraintVector | SnapMargin, source: Path
 ) -> UserError:
     """Explains that no design near the start can be made."""
     kind, where = constraints.named(error.constraint)
@@ -28,7 +28,7 @@ def infeasible_start(
         f"infeasible at the start, by {error.violation:.3g} mm (angles times 5 mm) at {where},"
         " and no design nearby can be made",
         file=source,
-        key=f"constraints.{_KEYS.get(kind, kind)}",
+        key=_KEYS.get(kind, f"constraints.{kind}"),
         remedy="ask for less there, or start from another lattice",
     )
 

@@ -25,13 +25,13 @@ LAWS = ("angle", "geometric")
 DIFFERENCE = 0.1
 """Relative difference of the losses under the two laws at which a design depends on the law."""
 _DIMS = ("structure", "contact_law", "case")
-_MEASURES = ("loss_by_contact", "overlaps_by_contact", "gap_by_contact")
+_MEASURES = ("loss_by_contact", "overlaps_by_contact", "gap_by_contact", "snaps_by_contact")
 
 
 def by_contact(
     structures: dict[str, PosedStructure], laws: dict[str, ContactModel]
 ) -> dict[str, tuple[Any, ...]]:
-    """Compares loss, overlaps and smallest gap of static structures under either law.
+    """Compares loss, overlaps, smallest gap and snaps of static structures under either law.
 
     NaN in studies of motion in time, and where a structure cannot be simulated under a law.
 
@@ -65,7 +65,7 @@ def geometric(asked: Problem) -> Problem:
 def _under(
     name: str, structure: PosedStructure, law: str, contact: ContactModel
 ) -> NDArray[np.float64]:
-    """Simulates losses, largest number of overlaps and smallest gap (3, n_cases) under a law."""
+    """Simulates losses, overlaps at most, smallest gaps and snaps (4, n_cases) under a law."""
     nothing = np.full((len(_MEASURES), len(structure.scene.loads.cases)), np.nan)
     if not structure.scene.loads.static:
         return nothing
@@ -82,5 +82,6 @@ def _under(
             mimicking(scene, target)(response.displacement, response.parameters),
             [each.overlaps.max() for each in found],
             [each.gap.min() for each in found],
+            [np.count_nonzero(record.jumped) for record in response.records],
         ]
     )

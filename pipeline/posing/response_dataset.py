@@ -30,8 +30,8 @@ _OBSERVED = {
     "max_shear": "shear",
     "max_bend": "bend",
 }
-_OF_STEPS = ("roi_energy", "gap", "overlapping", "stability")
-_OF_CASES = ("loss", "loss_samples", "loss_error", "displacement_error")
+_OF_STEPS = ("roi_energy", "gap", "overlapping", "stability", "snap", "eigenvalue")
+_OF_CASES = ("loss", "loss_other_branch", "loss_samples", "loss_error", "displacement_error")
 
 Table = dict[str, list[CaseResult]]
 
@@ -56,7 +56,7 @@ def assemble_response(
         **by_contact(structures, contact_laws(asked)),
         "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
     }
-    for name in ("loss", "loss_samples", "loss_by_contact"):
+    for name in ("loss", "loss_other_branch", "loss_samples", "loss_by_contact"):
         variables[name] = (*variables[name], {"units": loss_units(asked)})
     return xr.Dataset(variables, _coordinates(asked, structures, times))
 

@@ -78,6 +78,9 @@ def scene_of(
             kind=problem.objective.kind,
             samples=samples + 1 - samples % 2,
             steps=problem.horizon.steps,
+            snap_margin=problem.objective.snap_margin
+            if problem.objective.snap == "avoid"
+            else None,
         ),
         numerics=Numerics(problem.solver.accuracy, problem.solver.integrator),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +22,12 @@ from pipeline.posing import (
     network_variables,
     spread,
     start_vector,
+    times_of,
     unit_coordinates,
 )
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
-from sim.constraints import KIND_NAMES, ConstraintVector, margins
+from sim.constraints import KIND_NAMES, margins
 from sim.core import Floats, SimulationError
 from sim.optimise import (
     Evaluation,
@@ -36,7 +38,7 @@ from sim.optimise import (
     Result,
     SqpOptions,
 )
-from sim.scene import Paths, Plan, Scene, make_plan, minimise
+from sim.scene import Paths, Plan, Scene, constraints_of, make_plan, minimise
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 LOG = logging.getLogger(__name__)
@@ -123,13 +125,13 @@ def optimise(
                     limits_of(asked),
                     start,
                     options=_options(asked, method),
-                    plan=plan,
+                    plan=replace(plan, passed=times_of(asked, scene).asked),
                     journal=journal,
                     paths=Paths(folder / f"{method}.paths"),
                     callback=show,
                 )
         except InfeasibleStartError as error:
-            constraints = ConstraintVector(scene.space, limits_of(asked))
+            constraints = constraints_of(scene, plan, limits_of(asked))
             raise failures.infeasible_start(error, constraints, source) from error
         except SimulationError as error:
             tried = failures.SimulatedStructure(source, scene, "initial", plan.solver.output_times)

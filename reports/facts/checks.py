@@ -13,7 +13,7 @@ from reports.facts.fact_records import Fact, number, percent, share, within
 from reports.study import RigidUnits
 
 JUMPED = 2
-"""Flag of a stable state that the path came to by a jump."""
+"""Least flag of a stable state that the path came to by a jump or on a branch."""
 
 _MARGINS = {
     "edge_length": "Edge lengths",
@@ -104,9 +104,13 @@ def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
         label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
         note = f"of {flags.size}; where the tangent is not positive definite"
         yield number(f"unstable_{key}", label, count, note=note)
-        label, count = f"Jumps to another branch, {name}", int((flags == JUMPED).sum())
+        label, count = f"Jumps to another branch, {name}", int((flags >= JUMPED).sum())
         note = "loads reached only past a limit point or a branching"
         yield number(f"jumps_{key}", label, count, note=note)
+        least = float(part["eigenvalue"].min())
+        label = f"Smallest eigenvalue of the tangent, {name}"
+        note = "of all loads, at fixed supports and drive; the path ends where it vanishes"
+        yield number(f"eigenvalue_{key}", label, least, "N/mm", digits=3, note=note)
 
 
 def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:

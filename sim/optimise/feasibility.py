@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.core import Floats
+from sim.core import Floats, SimulationError
 from sim.optimise.problem import ConstraintPoint, CountedProblem, InfeasibleStartError
 from sim.optimise.qp import reachable, shortest_step
 
@@ -21,16 +21,19 @@ def project(
     """Finds a design near ``x`` with every margin at least ``depth``; None if no round does.
 
     Each round is a shortest Newton step for the linearised constraints and changes no variable by
-    more than ``reach``.
+    more than ``reach``. A design whose constraints cannot be evaluated is none.
     """
-    place = problem.place(np.clip(x, problem.lower, problem.upper))
-    for _ in range(rounds):
-        if place.values.min(initial=np.inf) >= depth:
-            return place
-        step = _newton(problem, place, reach, depth + INSET)
-        if step is None:
-            return None
-        place = problem.place(np.clip(place.x + step, problem.lower, problem.upper))
+    try:
+        place = problem.place(np.clip(x, problem.lower, problem.upper))
+        for _ in range(rounds):
+            if place.values.min(initial=np.inf) >= depth:
+                return place
+            step = _newton(problem, place, reach, depth + INSET)
+            if step is None:
+                return None
+            place = problem.place(np.clip(place.x + step, problem.lower, problem.upper))
+    except SimulationError:
+        return None
     return place if place.values.min(initial=np.inf) >= depth else None
 
 

@@ -39,11 +39,11 @@ def minimise(
         options: of the method.
         callback: called with each Evaluation as it is recorded.
         confirm: what ``evaluate`` should return without help of earlier evaluations, if it has
-            that; a design whose loss it does not find again is not returned.
+            that; the best design by this loss is returned.
 
     Raises:
         InfeasibleStartError: no feasible design near the start.
-        SimulationError: the start cannot be simulated.
+        SimulationError: the start cannot be simulated, or no design is confirmed.
         ValueError: options of another method.
     """
     start = np.array(x0, dtype=float)

@@ -16,7 +16,10 @@ Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
 """Design (n,) -> loss, gradient (n,), further numbers worth keeping, such as the single cases."""
 
 Constrain = Callable[[Floats], tuple[Floats, "sp.csr_array | Floats"]]
-"""Design (n,) -> values (m,), required to be >= 0, and their Jacobian (m, n), sparse or dense."""
+"""Design (n,) -> values (m,), required to be >= 0, and their Jacobian (m, n), sparse or dense.
+
+It may raise SimulationError, for a design that is then avoided.
+"""
 
 Callback = Callable[["Evaluation"], None]
 
@@ -248,22 +251,28 @@ class CountedProblem:
         )
 
     def _confirmed(self) -> EvaluatedPoint:
-        """Returns the best design; with ``confirm``, the best whose loss is found again."""
+        """Returns the best design; with ``confirm``, the one whose loss by that is the best."""
         if self.best is None:
             raise RuntimeError("no evaluation succeeded")
         if self.confirm is None:
             return self.best
+        found: EvaluatedPoint | None = None
         succeeded = (each for each in self.evaluations if each.failure is None)
         for each in sorted(succeeded, key=lambda each: (each.violation, each.loss)):
+            if found is not None and (found.violation, found.loss) <= (each.violation, each.loss):
+                break
             try:
                 loss, gradient, aux = self.confirm(each.x.copy())
             except SimulationError as failure:
                 log.warning("evaluation %d is not confirmed: %s", each.number, failure)
                 continue
-            if abs(loss - each.loss) <= CONFIRMED * abs(each.loss):
+            if abs(loss - each.loss) > CONFIRMED * abs(each.loss):
+                log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)
+            if found is None or (each.violation, loss) < (found.violation, found.loss):
                 place = self.place(each.x)
-                return EvaluatedPoint(
-                    place.x, place.values, place.jacobian, each.number, each.loss, gradient, aux
+                found = EvaluatedPoint(
+                    place.x, place.values, place.jacobian, each.number, loss, gradient, aux
                 )
-            log.warning("evaluation %d is not confirmed: its loss is %.5g", each.number, loss)
-        return self.best
+        if found is None:
+            raise SimulationError("no design can be simulated by the path as it is reported")
+        return found

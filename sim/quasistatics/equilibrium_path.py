@@ -1,48 +1,89 @@
 """Follows equilibrium paths by Newton continuation, compiled, with their exact adjoint.
 
 Between two output loads the increment adapts itself. An increment is smooth if no tangent on the
-way was indefinite and the correction is short beside the step predicted; one that is not is cut, so
-that the path is followed up to where it ends: a limit point or a branching. There the structure
-jumps: the energy is descended to a minimum at the next load, and the jump is recorded.
+way or at its end was indefinite and the motion is that of the trapezoidal rule; one that is not is
+cut, and none is longer than the smallest eigenvalue of the tangent lets expect, so that the path is
+followed up to where it ends: a limit point or a branching. From there it goes on in the state that
+damped motion comes to, and the critical point is recorded.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
 from sim.energy import Bars, System, Workspace, admissible_step, hessian_product, mixed, workspace
 from sim.quasistatics.newton import (
-    FACTORS,
     INCREMENTS,
     KEEP_FROM_BARRIER,
     SHIFTED,
     correct,
     factorise_shifted,
     factorise_tangent,
-    leave_saddle,
     solve_free,
 )
+from sim.quasistatics.snap import lowest_mode, push, relax
 
-SMALLEST_INCREMENT = 1e-6
-SMALLEST_SMOOTH = 1e-3
-"""Part of the way between two loads below which an increment that is not smooth is a jump."""
-SHORT = 0.5
-"""Correction of a smooth increment at most, over the step predicted."""
-ON_THE_WAY = 1e-3
-"""Relative residual that suffices between two output loads."""
-EASY = 5
-"""Factorisations of a correction after which the next increment is doubled."""
-MAX_SADDLES = 4
+SMALLEST_INCREMENT = 1e-8
+"""Part of the way between two loads below which the path has ended."""
+CLOSE = 1e-6
+"""Part of the way that the end of a path is passed by."""
+CROOKED, CROOKED_LENGTH = 0.05, 1e-3
+"""Departure of a smooth increment from the trapezoidal rule at most, over its length and in mm."""
+SHORTER, LONGER = 0.25, 4.0
+"""Limits of the next increment over the last."""
+SHORT = 0.2
+"""Correction of a known step at most, over its length."""
+TOWARDS_CRITICAL = 0.75
+"""Part of the way to where the eigenvalue is expected to vanish that an increment goes at most."""
+CRITICAL = 1e-3
+"""Eigenvalue at the end of a path below which it is singular there, over the first state's."""
+UNLOADED = 1e-7
+"""Share of the load that acts on a critical mode up to which it does not: there the path branches,
+elsewhere it turns back in a limit point."""
+NOTICEABLE = 1e-2
+"""Movement at the end of a path that is a jump, mm."""
+BEYOND = 1e-3
+"""Way of the held dofs by which a branching is passed, mm: nearer to it no state is stable enough
+to be found."""
+SWEEPS, SWEEPS_AT_LOADS = 2, 40
+"""Inverse iterations for the eigenvalue of an increment and of an output load at most."""
+EIGENVALUE = 1e-6
+"""Relative change that ends them."""
+
+INCREMENT, VALUE, RATE, FIRST = 0, 1, 2, 3
+"""Places in the pace: part of the way to go next, smallest eigenvalue, rate of change of its square
+over the length of the held dofs' way, and eigenvalue of the first state."""
+SMOOTH, LIMIT_POINT, BRANCHING = 0, 1, 2
+"""Kinds of the way to a load."""
+
+
+class Branch(NamedTuple):
+    """Holds the equilibria at all loads.
+
+    Attributes:
+        states: (n_loads, n_dofs).
+        tangents: (n_loads, n_dofs) step to each along the path's tangent at the one before.
+        stable: (n_loads,) whether each is a minimum of the energy.
+        jumped: (n_loads,) whether the path ended on the way there, in a limit point or a branching,
+            and went on after a jump.
+        snapped: (n_loads,) part of the way from the load before at which it did; NaN if it did not.
+        eigenvalue: (n_loads,) smallest one of the tangent, with rotations times the scale, N/mm.
+    """
+
+    states: Floats
+    tangents: Floats
+    stable: Ints
+    jumped: Ints
+    snapped: Floats
+    eigenvalue: Floats
 
 
 @inlined
-def _predict(motion: Floats, load: Floats, share: float, system: System, work: Workspace) -> None:
-    """Fills ``work.step`` along the path: the held dofs by ``share`` of the way to ``load``."""
-    work.product[:] = 0.0
-    for i in range(len(system.held)):
-        d = system.held[i]
-        work.product[d] = (load[i] - motion[d]) * share
+def _tangent_step(motion: Floats, system: System, work: Workspace) -> None:
+    """Fills ``work.step`` with that of the path for the held dofs' part in ``work.product``."""
     # K_ff du_f = -K_fh du_h
     hessian_product(motion, system, work.turn, work.product, work.force)
     solve_free(system, work)
@@ -51,92 +92,203 @@ def _predict(motion: Floats, load: Floats, share: float, system: System, work: W
 
 
 @inlined
-def _length(one: Floats, other: Floats, system: System) -> float:
-    """Distance of the free dofs of two motions, mm."""
+def _towards(motion: Floats, load: Floats, share: float, system: System, work: Workspace) -> None:
+    """Fills ``work.product`` with a share of the held dofs' way to a load."""
+    work.product[:] = 0.0
+    for i in range(len(system.held)):
+        d = system.held[i]
+        work.product[d] = (load[i] - motion[d]) * share
+
+
+@inlined
+def _length(step: Floats, dofs: Ints, system: System) -> float:
+    """Norm of a step's dofs, mm."""
     total = 0.0
-    for d in system.dofs:
-        total += ((one[d] - other[d]) * system.scale[d]) ** 2
+    for d in dofs:
+        total += (step[d] * system.scale[d]) ** 2
     return np.sqrt(total)
 
 
 @inlined
 def _settle(
-    motion: Floats, predicted: float, relative: float, absolute: float, system: System,
-    work: Workspace, counts: Ints,
-) -> tuple[bool, bool]:  # fmt: skip
-    """Corrects a motion that was predicted over the length ``predicted``.
+    motion: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints
+) -> bool:  # fmt: skip
+    """Corrects a motion; tells whether no tangent was indefinite, that at the end included.
 
-    Returns:
-        whether it is in balance now, and whether that was smooth.
+    The workspace then holds a factor of that.
     """
     shifted = counts[SHIFTED]
-    work.guess[:] = motion
     found = correct(motion, relative, absolute, system, work, counts)
-    short = _length(motion, work.guess, system) <= SHORT * predicted
-    return found, short and counts[SHIFTED] == shifted
+    definite = found and counts[SHIFTED] == shifted
+    return definite and factorise_tangent(motion, system, work, 0.0, counts)
+
+
+@inlined
+def _crooked(motion: Floats, predicted: Floats, system: System, work: Workspace) -> float:
+    """Compares the way from ``work.saved`` with the trapezoidal rule; 1 is the most there may be.
+
+    ``predicted`` is the step along the path's tangent at its start; the workspace holds a factor of
+    the tangent at its end.
+    """
+    work.product[:] = 0.0
+    for d in system.held:
+        work.product[d] = motion[d] - work.saved[d]
+    _tangent_step(motion, system, work)
+    # u1 - u0 = (t0 + t1) / 2
+    work.trial[:] = motion - work.saved
+    work.product[:] = work.trial - 0.5 * (predicted + work.step)
+    most = max(CROOKED * _length(work.trial, system.dofs, system), CROOKED_LENGTH)
+    return _length(work.product, system.dofs, system) / most
 
 
 @compiled
-def _stabilise(
-    motion: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints
-) -> tuple[bool, bool]:
-    """Leaves the saddles that ``motion`` may be on, and factorises the tangent.
+def _leave(
+    motion: Floats, load: Floats, ahead: float, mode: Floats, sense: float, first: float,
+    drag: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints,
+) -> tuple[float, int]:  # fmt: skip
+    """Goes on from the end of a path by damped motion.
+
+    Args:
+        motion: at the end of the path; moved.
+        load: (n_held,).
+        ahead: part of the way there that leads beyond the end.
+        mode: (n_free,) estimate of the critical one, S v.
+        sense: in which a branching is left: 1 moves the mode's largest component up, -1 down.
+        first: eigenvalue of the first state.
+        drag: of the damped motion.
+        relative: tolerance of the residual, relative to the largest reaction.
+        absolute: its floor, N.
+        system: the structure.
+        work: holds a factor of the tangent, and one of that in the new state after it.
+        counts: gathers the work.
 
     Returns:
-        whether the tangent is positive definite, and whether a saddle was left.
+        the part of the way gone, negative if the structure came to no rest; and the kind of the
+        path's end.
     """
-    for saddles in range(MAX_SADDLES):
-        if factorise_tangent(motion, system, work, 0.0, counts):
-            return True, saddles > 0
-        leave_saddle(motion, system, work, counts)
-        if not correct(motion, relative, absolute, system, work, counts):
-            return False, True
-    return factorise_tangent(motion, system, work, 0.0, counts), True
+    work.saved[:] = motion
+    value = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+    _towards(motion, load, 1.0, system, work)
+    way = _length(work.product, system.held, system)
+    hessian_product(motion, system, work.turn, work.product, work.force)
+    along, force = 0.0, 0.0
+    for i in range(len(mode)):
+        d = system.dofs[i]
+        along -= mode[i] * work.force[d] / system.scale[d]
+        force += (work.force[d] / system.scale[d]) ** 2
+    branches = abs(along) <= UNLOADED * np.sqrt(force)
+    if branches:
+        along = sense * mode[np.abs(mode).argmax()]
+        ahead = max(ahead, min(1.0, BEYOND / max(way, BEYOND)))
+    for i in range(len(system.held)):
+        d = system.held[i]
+        motion[d] = load[i] if ahead == 1.0 else motion[d] + ahead * (load[i] - motion[d])
+    push(motion, mode, np.sign(along), system, work)
+    if not relax(motion, drag, relative, absolute, system, work, counts):
+        return -1.0, LIMIT_POINT
+    work.trial[:] = motion - work.saved
+    if branches and abs(value) < CRITICAL * first:
+        return ahead, BRANCHING
+    jumped = _length(work.trial, system.dofs, system) > NOTICEABLE
+    return ahead, LIMIT_POINT if jumped else SMOOTH
+
+
+@inlined
+def _ahead(increment: float, left: float, way: float, pace: Floats) -> float:
+    """Part of the way for the next increment: none goes past where the eigenvalue may vanish."""
+    if pace[RATE] >= 0.0:
+        return min(increment, left)
+    # lambda^2 falls linearly towards a limit point, and faster than that towards a branching
+    expected = TOWARDS_CRITICAL * pace[VALUE] ** 2 / -pace[RATE]
+    return min(increment, left, max(expected / way, CLOSE))
+
+
+@inlined
+def _step_ahead(
+    motion: Floats, load: Floats, share: float, predicted: Floats, system: System, work: Workspace
+) -> float:
+    """Moves along the path's tangent by a share of the way to a load, short of the barrier.
+
+    Returns:
+        the part of that share gone; ``predicted`` is filled with the step.
+    """
+    work.saved[:] = motion
+    _towards(motion, load, share, system, work)
+    _tangent_step(motion, system, work)
+    allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
+    predicted[:] = allowed * work.step
+    motion += predicted
+    if allowed == 1.0 and share == 1.0:
+        for i in range(len(system.held)):
+            motion[system.held[i]] = load[i]
+    return allowed
 
 
 @inlined
 def _advance(
-    motion: Floats, load: Floats, relative: float, absolute: float, increment: float,
-    system: System, work: Workspace, counts: Ints,
-) -> tuple[float, float, bool]:  # fmt: skip
+    motion: Floats, load: Floats, sense: float, pace: Floats, mode: Floats, predicted: Floats,
+    drag: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints,
+) -> tuple[float, int, float]:  # fmt: skip
     """Follows the path to one load; the workspace holds a factor of the tangent before and after.
 
+    Args:
+        motion: moved.
+        load: (n_held,).
+        sense: see ``_leave``.
+        pace: (4,) see ``INCREMENT``; changed.
+        mode: (n_free,) eigenvector of the smallest eigenvalue, S v; changed.
+        predicted: (n_dofs,) scratch.
+        drag: of the damped motion.
+        relative: tolerance of the residual, relative to the largest reaction.
+        absolute: its floor, N.
+        system: the structure.
+        work: see above.
+        counts: gathers the work.
+
     Returns:
-        the fraction of the way reached, with ``motion`` there; the increment to go on with; and
-        whether the structure jumped.
+        the fraction of the way reached, with ``motion`` there; the kind of the way; and where on it
+        the path ended, NaN if it did not.
     """
-    done, jumped = 0.0, False
+    _towards(motion, load, 1.0, system, work)
+    way = _length(work.product, system.held, system)
+    done, kind, ended = 0.0, SMOOTH, np.nan
     while done < 1.0:
-        work.saved[:] = motion
         counts[INCREMENTS] += 1
-        ahead = min(increment, 1.0 - done)
-        _predict(motion, load, ahead / (1.0 - done), system, work)
-        allowed = min(1.0, KEEP_FROM_BARRIER * admissible_step(motion, system, work.step))
-        if not allowed * ahead >= SMALLEST_INCREMENT:  # held units drive a void into its barrier
-            return done, increment, jumped
-        motion += allowed * work.step
-        last = allowed == 1.0 and ahead == 1.0 - done
-        if last:
-            for i in range(len(system.held)):
-                motion[system.held[i]] = load[i]
-        before = counts[FACTORS]
-        wanted = relative if last else ON_THE_WAY
-        predicted = _length(motion, work.saved, system)
-        found, smooth = _settle(motion, predicted, wanted, absolute, system, work, counts)
-        if found and not smooth and allowed * ahead <= SMALLEST_SMOOTH:
-            found, _ = _stabilise(motion, relative, absolute, system, work, counts)
-            smooth = jumped = True
-        if found and smooth:
-            done = 1.0 if last else done + allowed * ahead
-            if counts[FACTORS] - before <= EASY:
-                increment = min(1.0, 2.0 * increment)
-        else:
+        ahead = _ahead(pace[INCREMENT], 1.0 - done, way, pace)
+        share = ahead / (1.0 - done)
+        gone = ahead * _step_ahead(motion, load, share, predicted, system, work)
+        if not gone >= SMALLEST_INCREMENT:  # held units drive a void into its barrier
             motion[:] = work.saved
-            increment = 0.25 * allowed * ahead
-            usable = factorise_shifted(motion, system, work, counts) >= 0.0
-            if increment < SMALLEST_INCREMENT or not usable:
-                return done, increment, jumped
-    return done, increment, jumped
+            break
+        last = share == 1.0 and gone == ahead
+        smooth = _settle(motion, relative, absolute, system, work, counts)
+        crooked = _crooked(motion, predicted, system, work) if smooth else np.inf
+        change = min(LONGER, max(SHORTER, 0.9 / np.sqrt(max(crooked, 1e-300))))
+        if crooked <= 1.0:
+            done = 1.0 if last else done + gone
+            value = lowest_mode(system, work, mode, SWEEPS, 0.0)
+            pace[RATE] = (value**2 - pace[VALUE] ** 2) / max(gone * way, 1e-300)
+            pace[VALUE] = value
+            pace[INCREMENT] = min(1.0, max(pace[INCREMENT] if last else CLOSE, change * gone))
+            continue
+        motion[:] = work.saved
+        pace[INCREMENT] = min(change, 0.9) * gone
+        if factorise_shifted(motion, system, work, counts) < 0.0:
+            break
+        if pace[INCREMENT] < SMALLEST_INCREMENT:
+            beyond = min(1.0, CLOSE / (1.0 - done))
+            share, end = _leave(
+                motion, load, beyond, mode, sense, pace[FIRST], drag, relative, absolute, system,
+                work, counts,
+            )  # fmt: skip
+            if share < 0.0:
+                break
+            if end != SMOOTH:
+                kind, ended = end, done
+            done = 1.0 if share == 1.0 else done + share * (1.0 - done)
+            pace[INCREMENT], pace[RATE] = CLOSE, 0.0
+            pace[VALUE] = lowest_mode(system, work, mode, SWEEPS, 0.0)
+    return done, kind, ended
 
 
 @inlined
@@ -151,32 +303,35 @@ def _repeat(
     motion += step
     for i in range(len(system.held)):
         motion[system.held[i]] = load[i]
-    predicted = _length(motion, work.saved, system)
-    found, smooth = _settle(motion, predicted, relative, absolute, system, work, counts)
-    if not (found and smooth):
+    work.guess[:] = motion
+    smooth = _settle(motion, relative, absolute, system, work, counts)
+    work.guess[:] = motion - work.guess
+    short = SHORT * _length(step, system.dofs, system)
+    if not (smooth and _length(work.guess, system.dofs, system) <= short):
         motion[:] = work.saved
-    return found and smooth
+        factorise_shifted(motion, system, work, counts)
+        return False
+    return True
 
 
 @compiled
 def follow(
-    loads: Floats, bends: Floats, trusted: Ints, system: System, relative: float, absolute: float,
-    states: Floats, tangents: Floats, stable: Ints, jumped: Ints, counts: Ints,
+    loads: Floats, bends: Floats, trusted: Ints, sense: float, system: System, relative: float,
+    absolute: float, drag: Floats, branch: Branch, counts: Ints,
 ) -> tuple[int, float]:  # fmt: skip
-    """Fills ``states`` (n_loads, n_dofs) with the equilibria at ``loads`` (n_loads, n_held).
+    """Fills a branch with the equilibria at ``loads`` (n_loads, n_held).
 
     Args:
         loads: the path.
         bends: (n_loads, n_dofs) by how much the path of a similar structure departs from its
             tangent between two loads, to be tried first.
         trusted: (n_loads,) whether to try that.
+        sense: in which the critical mode of a branching is followed, 1 or -1.
         system: the structure.
         relative: tolerance of the residual, relative to the largest reaction.
         absolute: its floor, N.
-        states: filled.
-        tangents: (n_loads, n_dofs) filled: step to each load along the tangent at the one before.
-        stable: (n_loads,) filled: whether the tangent there is positive definite.
-        jumped: (n_loads,) filled: whether the structure jumped on the way there.
+        drag: (n_dofs,) of the damped motion after a snap.
+        branch: filled.
         counts: (4,) gathers the work.
 
     Returns:
@@ -184,32 +339,41 @@ def follow(
     """
     work = workspace(system)
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
+    mode = np.sin(1.0 + np.arange(len(system.dofs)))
     # rest itself may be out of balance: a void may start in contact
     if not correct(motion, relative, absolute, system, work, counts):
         return 0, 0.0
-    positive, left = _stabilise(motion, relative, absolute, system, work, counts)
-    jumped[0] = left
-    increment = 1.0
+    if not factorise_tangent(motion, system, work, 0.0, counts):
+        factorise_shifted(motion, system, work, counts)
+        share, branch.jumped[0] = _leave(
+            motion, motion[system.held], 0.0, mode, sense, np.inf, drag, relative, absolute,
+            system, work, counts,
+        )  # fmt: skip
+        branch.snapped[0] = 0.0
+        if share < 0.0:
+            return 0, 0.0
+    first = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+    pace = np.array([1.0, first, 0.0, first])
     for p in range(len(loads)):
-        done, leapt = 0.0, False
-        _predict(motion, loads[p], 1.0, system, work)
-        tangents[p] = work.step
+        done = 0.0
+        _towards(motion, loads[p], 1.0, system, work)
+        _tangent_step(motion, system, work)
+        branch.tangents[p] = work.step
         if trusted[p]:
             step[:] = work.step + bends[p]
             if _repeat(motion, loads[p], step, relative, absolute, system, work, counts):
-                done = 1.0
-            else:
-                factorise_shifted(motion, system, work, counts)
+                done, pace[RATE] = 1.0, 0.0
         if done < 1.0:
-            done, increment, leapt = _advance(
-                motion, loads[p], relative, absolute, increment, system, work, counts
-            )
-        states[p] = motion
+            done, kind, ended = _advance(
+                motion, loads[p], sense, pace, mode, step, drag, relative, absolute, system, work,
+                counts,
+            )  # fmt: skip
+            branch.jumped[p], branch.snapped[p] = max(kind, branch.jumped[p]), ended
+        branch.states[p] = motion
         if done < 1.0:
             return p, done
-        positive, left = _stabilise(motion, relative, absolute, system, work, counts)
-        states[p], stable[p] = motion, positive
-        jumped[p] = jumped[p] or leapt or left
+        pace[VALUE] = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
+        branch.eigenvalue[p], branch.stable[p] = pace[VALUE], 1
     return len(loads), 0.0
 
 

@@ -2,7 +2,7 @@
 
 Every step descends the energy and stops short of the contact barrier. An indefinite tangent is
 shifted until it is positive definite, so that the descent ends in a minimum or, rarely, exactly on
-a saddle, which ``leave_saddle`` leaves.
+a saddle.
 """
 
 from __future__ import annotations
@@ -24,9 +24,6 @@ SMALLER_SHIFT = 0.125
 KEEP_FACTOR, RENEW_FACTOR = 1e-2, 0.1
 """A step that reduces the residual by more than the one has a factor worth keeping, until a step
 reduces it by less than the other."""
-SADDLE_ITERATIONS = 10
-SADDLE_STEP = 1e-2
-"""Largest movement by which a saddle is left, mm."""
 
 GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
 """Places in the counts that the solvers gather."""
@@ -158,30 +155,3 @@ def correct(
         limit = RENEW_FACTOR if keep else KEEP_FACTOR
         keep = shift == 0.0 and length == 1.0 and residual < limit * before
     return False
-
-
-@compiled
-def leave_saddle(motion: Floats, system: System, work: Workspace, counts: Ints) -> None:
-    """Moves ``motion`` a little along the direction in which the energy falls most steeply.
-
-    That is the lowest mode of the tangent, by inverse iteration; of its two senses the one whose
-    largest component is positive.
-    """
-    if factorise_shifted(motion, system, work, counts) <= 0.0:
-        return
-    for i in range(len(system.dofs)):
-        d = system.dofs[i]
-        work.force[d] = np.sin(1.0 + i) * system.scale[d]
-    for _ in range(SADDLE_ITERATIONS):
-        solve_free(system, work)
-        largest = 0
-        for d in system.dofs:
-            if abs(work.step[d] * system.scale[d]) > abs(
-                work.step[largest] * system.scale[largest]
-            ):
-                largest = d
-        work.step[:] = work.step / (work.step[largest] * system.scale[largest])
-        for d in system.dofs:
-            work.force[d] = -work.step[d] * system.scale[d] ** 2
-    allowed = KEEP_FROM_BARRIER * admissible_step(motion, system, work.step)
-    motion += min(SADDLE_STEP, allowed) * work.step

@@ -9,8 +9,8 @@ import numpy as np
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
-from sim.quasistatics.equilibrium_path import adjoint, follow
-from sim.solvers import PrescribedMotion, check_connected, check_start
+from sim.quasistatics.equilibrium_path import Branch, adjoint, follow
+from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
 
 ROUNDING, ROUNDING_OF_MOTION = 4e-14, 1e-15
@@ -26,8 +26,11 @@ class StaticRecord:
         states: (n_times, n_dofs) equilibria.
         tangents: (n_times, n_dofs) step to each along the path's tangent at the one before.
         stable: (n_times,) whether each is a minimum of the energy.
-        jumped: (n_times,) whether the structure jumped on the way there: its path ended in a limit
-            point or branched.
+        jumped: (n_times,) whether the structure jumped on the way there: 1 from a limit point, 2
+            from a branching, else 0.
+        snapped: (n_times,) load parameter at which it last did, NaN if it did not.
+        eigenvalue: (n_times,) smallest one of the tangent at fixed held dofs, with rotations times
+            the topology's scale, N/mm.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
         topology: as solved, with room for all units that met; None if it was the solver's.
     """
@@ -36,6 +39,8 @@ class StaticRecord:
     tangents: Floats
     stable: Ints
     jumped: Ints
+    snapped: Floats
+    eigenvalue: Floats
     counts: Ints
     topology: Topology | None = None
 
@@ -57,6 +62,7 @@ class StaticSolver:
             the tolerance allows. Where that structure jumped its step is not tried. A step is the
             tangent's, bent as it was there.
         substeps: loads to pass on the way to each output load, that one included.
+        sense: in which the critical mode of a branching is followed: 1 or -1.
     """
 
     topology: Topology
@@ -66,6 +72,7 @@ class StaticSolver:
     threads: int = 1
     start: StaticRecord | None = None
     substeps: int = 1
+    sense: float = 1.0
 
     def refined(self, record: StaticRecord) -> StaticSolver:
         """Passes twice the loads, each to a hundred times tighter a tolerance."""
@@ -83,39 +90,58 @@ class StaticSolver:
         top = self.topology
         check_connected(top)
         loads = drive.values(top.held, self._passed)
-        states, tangents = (np.zeros((len(loads), top.n_dofs)) for _ in range(2))
-        stable, jumped = (np.zeros(len(loads), dtype=np.int64) for _ in range(2))
+        branch = _empty_branch(len(loads), top.n_dofs)
         counts = np.zeros(4, dtype=np.int64)
-        bends, trusted = self._known(states)
+        bends, trusted = self._known(branch.states)
         system = system_of(top, values)
         rounding = ROUNDING + ROUNDING_OF_MOTION * np.abs(loads * top.scale[top.held]).max(
             initial=0
         )
         floor = max(self.absolute, rounding) * float(values.law[:, 0].max())
         check_start(top, values, system.contacts, np.zeros(top.n_dofs))
+        drag = system.damping if (system.damping[top.free_dofs] > 0).all() else top.scale**2
         reached, fraction = follow(
-            loads, bends, trusted, system, self.relative, floor, states, tangents, stable, jumped,
-            counts,
-        )  # fmt: skip
+            loads, bends, trusted, self.sense, system, self.relative, floor, drag, branch, counts
+        )
         raise_new_pairs(system.contacts)
         if reached < len(loads):
-            where = top.smallest_void_angles(values.void, states[reached].reshape(-1, 3)).argmin()
-            unit = int(top.ligament_units[where, 0])
-            raise SimulationError(
-                f"no equilibrium found beyond load {reached // self.substeps} of"
-                f" {len(self.output_times)} (at {fraction:.3g} of"
-                f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
-                " stable state; try a smaller load or more load steps",
-                step=reached // self.substeps,
-                unit=unit,
-                states=states[:reached][self.substeps - 1 :: self.substeps],
-            )
-        last = slice(self.substeps - 1, None, self.substeps)
-        on_the_way = jumped.reshape(-1, self.substeps).max(axis=1)
-        record = StaticRecord(
-            states[last].copy(), tangents[last].copy(), stable[last].copy(), on_the_way, counts, top
+            raise self._ended(values, branch.states[: reached + 1], fraction)
+        record = self._record(branch, counts)
+        check_ligaments(top, values, record.states)
+        return record.states.copy(), np.zeros_like(record.states), record
+
+    def _ended(
+        self, values: ConcreteParameters, states: Floats, fraction: float
+    ) -> SimulationError:
+        """Explains that no equilibrium was found beyond the last of the states."""
+        top, reached = self.topology, len(states) - 1
+        where = top.smallest_void_angles(values.void, states[-1].reshape(-1, 3)).argmin()
+        unit = int(top.ligament_units[where, 0])
+        return SimulationError(
+            f"no equilibrium found beyond load {reached // self.substeps} of"
+            f" {len(self.output_times)} (at {fraction:.3g} of"
+            f" the way to the next; the narrowest void is at unit {unit}): jammed contact or no"
+            " stable state; try a smaller load or more load steps",
+            step=reached // self.substeps,
+            unit=unit,
+            states=states[:-1][self.substeps - 1 :: self.substeps],
         )
-        return states[last].copy(), np.zeros_like(states[last]), record
+
+    def _record(self, branch: Branch, counts: Ints) -> StaticRecord:
+        """Keeps the output loads of all that were passed."""
+        last = slice(self.substeps - 1, None, self.substeps)
+        before = np.concatenate([[0.0], self._passed[:-1]])
+        snapped = (before + branch.snapped * (self._passed - before)).reshape(-1, self.substeps)
+        return StaticRecord(
+            branch.states[last].copy(),
+            branch.tangents[last].copy(),
+            branch.stable[last].copy(),
+            branch.jumped.reshape(-1, self.substeps).max(axis=1),
+            np.fmax.reduce(snapped, axis=1),
+            branch.eigenvalue[last].copy(),
+            counts,
+            self.topology,
+        )
 
     @property
     def _passed(self) -> Floats:
@@ -130,7 +156,7 @@ class StaticSolver:
         if start is None or start.states.shape != states.shape:
             return states, np.zeros(len(states), dtype=np.int64)
         steps = np.diff(start.states, axis=0, prepend=0.0)
-        return steps - start.tangents, 1 - start.jumped
+        return steps - start.tangents, (start.jumped == 0).astype(np.int64)
 
     def backward(
         self, values: ConcreteParameters, record: StaticRecord, bar_u: Floats, bar_v: Floats
@@ -148,3 +174,10 @@ class StaticSolver:
                 step=unstable,
             )
         return as_values(bars), self.output_times, bars.drive
+
+
+def _empty_branch(n_loads: int, n_dofs: int) -> Branch:
+    states, tangents = (np.zeros((n_loads, n_dofs)) for _ in range(2))
+    stable, jumped = (np.zeros(n_loads, dtype=np.int64) for _ in range(2))
+    snapped, eigenvalue = (np.full(n_loads, np.nan) for _ in range(2))
+    return Branch(states, tangents, stable, jumped, snapped, eigenvalue)

@@ -1,5 +1,6 @@
 from .evaluation import Evaluator as Evaluator
 from .evaluation import GradientChain as GradientChain
+from .evaluation import constraints_of as constraints_of
 from .evaluation import evaluate as evaluate
 from .evaluation import minimise as minimise
 from .objectives import DisplacementMimicking as DisplacementMimicking
@@ -29,6 +30,7 @@ from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
+from .snap_margin import SnapMargin as SnapMargin
 from .soundness import SceneError as SceneError
 from .soundness import check_scene as check_scene
 from .warm_starts import Paths as Paths

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from sim.core import Floats, Ints
 from sim.scene.scene import Scene
@@ -76,6 +75,8 @@ def quarter_turn(lattice: Lattice, vertices: Floats) -> NetworkImage | None:
         lattice: the network.
         vertices: (n_vertices, 2) of the structure, mm.
     """
+    from scipy.spatial import KDTree
+
     middle = (lattice.site.min(axis=0) + lattice.site.max(axis=0)) / 2
 
     def images(points: Floats, tolerance: float) -> Ints | None:

@@ -13,14 +13,15 @@ import numpy as np
 from jax import Array
 
 from sim.constraints import ConstraintVector, Limits
-from sim.core import Floats
+from sim.core import Floats, Ints
 from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
-from sim.scene.plan import Plan, make_plan
+from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking, parameters_of_design
+from sim.scene.snap_margin import SnapMargin
 from sim.scene.warm_starts import Paths
 from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
 from sim.structure import Parameters
@@ -116,13 +117,18 @@ class Evaluator:
         plan: of `make_plan`; by default one from the initial structure.
         memory: of equilibrium paths, that those of a static scene start from; unused where
             imperfect copies are simulated.
+        at: where in the plan's output the samples of the loss are, if there are others.
 
     Raises:
         ValueError: the scene has nothing to redesign, or no region of interest.
     """
 
     def __init__(
-        self, scene: Scene, plan: Plan | None = None, memory: Memory | None = None
+        self,
+        scene: Scene,
+        plan: Plan | None = None,
+        memory: Memory | None = None,
+        at: Ints | slice = slice(None),
     ) -> None:
         self.scene, self.plan = scene, plan or make_plan(scene)
         if scene.space.n_variables == 0:
@@ -132,7 +138,7 @@ class Evaluator:
         weights, measure = jnp.asarray(scene.loads.case_weights), mimicking(scene)
 
         def mean(displacement: Array, values: Parameters[Array]) -> tuple[Array, Array]:
-            each = measure(displacement, values)[place]
+            each = measure(displacement[:, at], values)[place]
             return combined(each, weights, scene.objective.sharpness), each
 
         self._cases = tuple(scene.loads.cases[case] for case in simulated)
@@ -226,7 +232,7 @@ def minimise(
     return minimise_loss(
         "mma" if isinstance(options, MmaOptions) else "sqp",
         computed if journal is None else journal.wrap(computed),
-        ConstraintVector(scene.space, limits),
+        constraints_of(scene, made, limits),
         np.zeros(scene.space.n_variables) if start is None else start,
         options=options,
         callback=record,
@@ -234,11 +240,21 @@ def minimise(
     )
 
 
-def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
-    """Evaluates by a path followed anew in small steps; None of a motion in time.
+def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector | SnapMargin:
+    """Lists what a design must keep to."""
+    geometry = ConstraintVector(scene.space, limits)
+    return geometry if scene.objective.snap_margin is None else SnapMargin(scene, plan, geometry)
 
-    A path that starts from that of a similar design, or steps far, may pass where it should end.
+
+def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
+    """Evaluates by a path followed anew, over the loads of the plan; None of a motion in time.
+
+    A path that starts from that of a similar design may pass where it should end.
     """
     if not isinstance(plan.solver, StaticSolver):
         return None
-    return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+    if plan.passed is None:
+        return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+    solver = replace(plan.solver, output_times=plan.passed)
+    at = np.searchsorted(plan.passed, sample_times(scene) * (1 - 1e-9))
+    return Evaluator(scene, replace(plan, solver=solver), at=at)

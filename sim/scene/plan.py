@@ -65,6 +65,8 @@ class Plan:
         decisions: one line for each thing decided.
         skipped: one line for each thing left out.
         warnings: one line for each thing that may not be meant; logged when the plan is made.
+        passed: (n_loads,) load parameters, those of the loss among them, by which the paths of a
+            static scene are followed anew to confirm losses; None for four for each of these.
     """
 
     integrator: Literal["static", "implicit", "explicit"]
@@ -73,6 +75,7 @@ class Plan:
     decisions: tuple[str, ...]
     skipped: tuple[str, ...]
     warnings: tuple[str, ...] = ()
+    passed: Floats | None = None
 
     @property
     def simulated(self) -> Ints:

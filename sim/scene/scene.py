@@ -132,6 +132,8 @@ class Objective:
             compare with rest.
         sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
             a large one a smooth maximum.
+        snap_margin: smallest eigenvalue of the tangent that a design must keep at all loads of a
+            static scene, over that of the initial structure at rest; None where it may snap.
     """
 
     region: Ints = field(default_factory=_none)
@@ -140,6 +142,7 @@ class Objective:
     steps: int | None = None
     reference: Scene | None = None
     sharpness: float = 1.0
+    snap_margin: float | None = None
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,9 @@ from sim.quasistatics import StaticRecord
 
 log = logging.getLogger(__name__)
 
+_KEPT = ("states", "tangents", "stable", "jumped", "snapped", "eigenvalue")
+"""Parts of a record that are stored."""
+
 
 class Paths:
     """Stores the paths of an optimisation's designs, one record for each simulated case.
@@ -58,13 +61,8 @@ class Paths:
                 old.unlink()
         unfinished = self.folder / f"{name}.new"
         with unfinished.open("wb") as file:
-            np.savez(
-                file,
-                states=np.stack([one.states for one in records]),
-                tangents=np.stack([one.tangents for one in records]),
-                stable=np.stack([one.stable for one in records]),
-                jumped=np.stack([one.jumped for one in records]),
-            )
+            parts = {name: np.stack([getattr(one, name) for one in records]) for name in _KEPT}
+            np.savez(file, allow_pickle=False, **parts)
             file.flush()
             os.fsync(file.fileno())
         unfinished.rename(self.folder / name)
@@ -78,11 +76,14 @@ class Paths:
 def _records(path: Path) -> list[StaticRecord]:
     """Reads the records in a file, whose entries have checksums."""
     with np.load(path) as stored:
-        parts = (stored[name] for name in ("states", "tangents", "stable", "jumped"))
-        return [
-            StaticRecord(states, tangents, stable, jumped, np.zeros(4, dtype=np.int64))
-            for states, tangents, stable, jumped in zip(*parts, strict=True)
-        ]
+        parts = {name: stored[name] for name in _KEPT}
+    return [
+        StaticRecord(
+            **{name: part[case] for name, part in parts.items()},
+            counts=np.zeros(4, dtype=np.int64),
+        )
+        for case in range(len(parts["states"]))
+    ]
 
 
 def _name(design: Floats) -> str:

@@ -23,6 +23,7 @@ from .loads import held_dofs as held_dofs
 from .loads import held_values as held_values
 from .validation import check_connected as check_connected
 from .validation import check_free_dofs as check_free_dofs
+from .validation import check_ligaments as check_ligaments
 from .validation import check_masses as check_masses
 from .validation import check_start as check_start
 from .validation import inadmissible as inadmissible

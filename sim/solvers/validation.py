@@ -113,13 +113,21 @@ def check_ligaments(topology: Topology, values: ConcreteParameters, states: Floa
 
     Its energy has a tip there: forces vanish in a state that is far from balance.
     """
-    motion = states.reshape(len(states), -1, 3)
-    one, other = (
-        _ligament_ends(motion[:, topology.ligament_units[:, end]], values.arm[:, end])
-        for end in range(2)
-    )
-    length = np.linalg.norm(values.vector + other - one, axis=2)
-    share = length / np.linalg.norm(values.vector, axis=1)
+    x, y, turn = states.reshape(len(states), -1, 3).transpose(2, 0, 1)
+    c, s = np.cos(turn), np.sin(turn)
+    squares: Floats = np.zeros((len(states), len(values.vector)))
+    for axis, (along, sign) in enumerate(((x, -1.0), (y, 1.0))):
+        # the end moves by u + (R - 1) a, with the rows (c, -s) and (s, c) of R
+        ends = [
+            along[:, unit]
+            + (c[:, unit] - 1.0) * arm[:, axis]
+            + sign * s[:, unit] * arm[:, 1 - axis]
+            for unit, arm in zip(
+                topology.ligament_units.T, values.arm.transpose(1, 0, 2), strict=True
+            )
+        ]
+        squares += (values.vector[:, axis] + ends[1] - ends[0]) ** 2
+    share = np.sqrt(squares) / np.linalg.norm(values.vector, axis=1)
     if share.min(initial=np.inf) < COLLAPSED:
         state, ligament = np.unravel_index(share.argmin(), share.shape)
         a, b = topology.ligament_units[ligament]
@@ -129,13 +137,6 @@ def check_ligaments(topology: Topology, values: ConcreteParameters, states: Floa
             step=int(state),
             unit=int(a),
         )
-
-
-def _ligament_ends(motion: Floats, arm: Floats) -> Floats:
-    """Displacements (n, n_ligaments, 2) of the ends of ligaments at units that move."""
-    c, s = np.cos(motion[..., 2]), np.sin(motion[..., 2])
-    turned = np.stack([c * arm[:, 0] - s * arm[:, 1], s * arm[:, 0] + c * arm[:, 1]], axis=2)
-    return motion[..., :2] + turned - arm
 
 
 def inadmissible(

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -26,7 +24,7 @@ Open = Callable[[Path, int, int, float], Chrome]
 def program(*names: str) -> str:
     """Path of the first of these programs that is installed."""
     found = next((path for name in names if (path := shutil.which(name))), None)
-    assert found, f"{names[0]} is not installed: .ci/run tells which Debian packages are wanted"
+    assert found, f"{names[0]} is not installed: .ci/nightly tells which Debian packages are wanted"
     return found
 
 

@@ -1,7 +1,5 @@
 """Searches the documentation in headless Chromium, opened from disk."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

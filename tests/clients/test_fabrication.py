@@ -1,7 +1,5 @@
 """Programs that a lab opens the files with: slicer, mesh checker, CAD, Inkscape, PDF viewer."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

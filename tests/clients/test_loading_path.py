@@ -1,7 +1,5 @@
 """The page of a static study in headless Chromium: its figure, its loads, its colours."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

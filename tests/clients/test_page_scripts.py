@@ -1,7 +1,5 @@
 """The same player on a static study: load steps instead of time, one case, a lost unit."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from pathlib import Path

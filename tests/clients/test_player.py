@@ -1,7 +1,5 @@
 """Drives the report's page in headless Chromium, as a reader would."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A page with recordings, and the index over pages, in headless Chromium."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

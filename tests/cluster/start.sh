@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Makes this machine a SLURM cluster of one node, without systemd and without accounting, as root.
-# For the tests of this folder, on a machine to spare: it replaces /etc/slurm/slurm.conf.
+# For the tests of this folder, on a machine to spare: it replaces /etc/slurm/slurm.conf. `stop.sh` ends
+# the daemons that were started, whose names are kept in /run/cluster_of_tests.
 set -euo pipefail
 [ "$(id -u)" -eq 0 ] || exec sudo "$0"
 
@@ -42,13 +43,18 @@ EOF
 
 runs() { [ -s "$1" ] && kill -0 "$(cat "$1" 2>/dev/null)" 2>/dev/null; }
 
-runs /run/munge/munged.pid || runuser -u munge -- munged
+: >/run/cluster_of_tests
+if ! runs /run/munge/munged.pid; then
+    runuser -u munge -- munged
+    echo munge/munged >>/run/cluster_of_tests
+fi
 for daemon in slurmctld slurmd; do
     if runs "/run/$daemon.pid"; then
         kill "$(cat "/run/$daemon.pid")"
         while runs "/run/$daemon.pid"; do sleep 0.1; done
     fi
     "$daemon" -c
+    echo "$daemon" >>/run/cluster_of_tests
 done
 for _ in $(seq 100); do
     if sinfo --noheader --states=idle --format=%n 2>/dev/null | grep -qx "$node"; then exit 0; fi

@@ -1,7 +1,5 @@
 """Figure 3 on a real SLURM of one node: a node lost, the submitter killed, the same bytes."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -13,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+import pytest
 
 from pipeline.workflow.stale_jobs import PREFIX
 from tests.e2e.checkout import Checkout, wait_until
@@ -38,6 +37,17 @@ ASKED = {
     "family_report": ("2000M", "1", "30:00"),
 }
 """Memory, cores and time of the jobs of each rule; the others run where the submitter does."""
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[None]:
+    """This machine, as a cluster of one node."""
+    scripts = Path(__file__).parent
+    try:
+        subprocess.run([scripts / "start.sh"], check=True)
+        yield
+    finally:
+        subprocess.run([scripts / "stop.sh"], check=True)
 
 
 @dataclass(frozen=True)
@@ -116,6 +126,7 @@ def on_a_node(process: psutil.Process) -> bool:
         return False
 
 
+@pytest.mark.usefixtures("cluster")
 def test_whatever_is_lost_the_results_are_those_of_one_machine(tmp_path: Path) -> None:
     alone = made(tmp_path / "alone")
     checkout = alone.copied(tmp_path / "checkout")

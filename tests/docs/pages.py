@@ -1,7 +1,5 @@
 """The documentation as its readers use it: blocks of commands, YAML, Python and messages."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator

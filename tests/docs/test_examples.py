@@ -1,7 +1,5 @@
 """YAML on the pages is what the pages say of it; messages are the code's own."""
 
-from __future__ import annotations
-
 import inspect
 import shutil
 from itertools import pairwise

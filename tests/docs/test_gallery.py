@@ -1,7 +1,5 @@
 """Every example runs, is short, gives the numbers that are pinned here, and is on the page."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 

@@ -1,7 +1,5 @@
 """The documentation renders, links to nothing that is not there, and needs no network."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

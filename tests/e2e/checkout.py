@@ -58,7 +58,7 @@ class Checkout:
     def made(cls, root: Path) -> Checkout:
         """A copy of the working tree, its study added, committed as a whole."""
         for room in ROOMS:
-            shutil.copytree(ROOT / room, root / room, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(ROOT / room, root / room, ignore=shutil.ignore_patterns("*.pyc.*"))
         for name in FILES:
             shutil.copy2(ROOT / name, root)
         (root / ".venv").symlink_to(sys.prefix)

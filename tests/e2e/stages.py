@@ -1,7 +1,5 @@
 """The stages of a study by their own command lines, within this process."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

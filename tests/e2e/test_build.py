@@ -1,7 +1,5 @@
 """What a build leaves: readable logs, complete results, and nothing to be done."""
 
-from __future__ import annotations
-
 import resource
 
 from tests.e2e.checkout import Checkout, assert_plain

@@ -1,7 +1,5 @@
 """A lab's video and YAML in the folder of recordings take the place of the virtual one there."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

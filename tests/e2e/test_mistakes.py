@@ -1,28 +1,12 @@
 """Mistakes and refusals meet the real stages: one message, an exit code, and nothing lost."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
-import pytest
 import xarray as xr
 
 from tests.e2e.checkout import STUDY, Checkout, assert_one_message
 
-BAD_PROBLEMS = {
-    "unknown key": ("spacing: 15 mm", "spacng: 15 mm", "lattice.spacng"),
-    "missing unit": ("spacing: 15 mm", "spacing: 15", "lattice.spacing"),
-    "wrong unit": ("density: 6.18 kg/m^2", "density: 6.18 kg", "material.density"),
-    "negative stiffness": (
-        "axial_stiffness: 120 N/mm",
-        "axial_stiffness: -120 N/mm",
-        "material.axial_stiffness",
-    ),
-    "cloak outside the lattice": ("radius: 22 mm", "radius: 220 mm", "cloak.disc.radius"),
-    "infeasible constraint": ("edge_length: 5 mm", "edge_length: 12 mm", "constraints.edge_length"),
-    "drive on a clamped unit": ("units: centre", "units: corners", "drive.units"),
-}
 DESIGN = ("--method", "mma", "--out")
 # Root may write where modes forbid it, by its capability CAP_DAC_OVERRIDE (1): this drops it.
 ORDINARY_RIGHTS = """
@@ -38,12 +22,11 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (16 << 10, 16 << 10))
 """
 
 
-@pytest.mark.parametrize(("old", "new", "key"), BAD_PROBLEMS.values(), ids=BAD_PROBLEMS)
-def test_a_bad_problem(fresh: Checkout, old: str, new: str, key: str) -> None:
-    fresh.edit(old, new)
+def test_a_bad_problem(fresh: Checkout) -> None:
+    fresh.edit("spacing: 15 mm", "spacng: 15 mm")
     place = f"experiments/{STUDY}/problem.yaml, line"
     for ended in (fresh.make(), fresh.stage("pipeline design", *DESIGN, "x.nc")):
-        assert_one_message(ended, place, key, "value:")
+        assert_one_message(ended, place, "lattice.spacng", "value:")
     assert not (fresh.root / "x.nc").exists()
     assert not fresh.results.exists()
 

@@ -1,12 +1,11 @@
 """Whatever ends `make`, the same command goes on, and ends with the same bytes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import struct
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 from tests.e2e.checkout import Checkout, assert_plain, wait_until
@@ -15,6 +14,7 @@ HEADER = struct.Struct("<4sQI")
 METHODS = ("sqp", "mma")
 
 Run = subprocess.Popen[str]
+Moment = Callable[[Checkout], bool]
 
 
 def records(journal: Path) -> list[bytes]:
@@ -77,24 +77,32 @@ def press_ctrl_c(run: Run, checkout: Checkout) -> None:
     assert not list(checkout.root.glob(".snakemake/locks/*"))
 
 
-def test_no_end_at_any_moment_changes_the_results(undisturbed: Checkout, fresh: Checkout) -> None:
-    def there_is(*patterns: str) -> Callable[[], bool]:
-        return lambda: any(list(fresh.results.glob(pattern)) for pattern in patterns)
+def evaluated(count: int) -> Moment:
+    """More than so many evaluations are kept."""
+    return lambda checkout: len(journal(checkout, "sqp")) > count
 
-    def evaluated(count: int) -> Callable[[], bool]:
-        return lambda: len(journal(fresh, "sqp")) > count
 
-    ends: list[tuple[str, Callable[[], bool], Callable[[Run, Checkout], None]]] = [
-        ("early in an optimisation", evaluated(2), kill_stage),
-        ("later in it", evaluated(5), press_ctrl_c),
-        ("while a design is written", there_is(".part_*_design_*.nc"), kill_everything),
-        ("while it is simulated", there_is("logs/simulate.log", "logs/sweep_*.log"), kill_make),
-        ("while the report is drawn", there_is("logs/report.log"), kill_everything),
-    ]
-    for moment, has_come, end in ends:
+def there_is(*patterns: str) -> Moment:
+    """There is such a file among the results."""
+    return lambda checkout: any(list(checkout.results.glob(pattern)) for pattern in patterns)
+
+
+ENDS: dict[str, tuple[Moment, Callable[[Run, Checkout], None]]] = {
+    "early in an optimisation": (evaluated(2), kill_stage),
+    "later in it": (evaluated(5), press_ctrl_c),
+    "while a design is written": (there_is(".part_*_design_*.nc"), kill_everything),
+    "while it is simulated": (there_is("logs/simulate.log", "logs/sweep_*.log"), kill_make),
+    "while the report is drawn": (there_is("logs/report.log"), kill_everything),
+}
+
+
+def check_ends(moments: Iterable[str], undisturbed: Checkout, fresh: Checkout) -> None:
+    """Ends a build at each of these moments, and compares what comes of it."""
+    for moment in moments:
+        has_come, end = ENDS[moment]
         before = {method: journal(fresh, method) for method in METHODS}
         run = fresh.start()
-        wait_until(has_come, run)
+        wait_until(partial(has_come, fresh), run)
         end(run, fresh)
         for method, known in before.items():
             assert journal(fresh, method)[: len(known)] == known, f"{moment}: evaluations lost"
@@ -105,6 +113,12 @@ def test_no_end_at_any_moment_changes_the_results(undisturbed: Checkout, fresh: 
         assert journal(fresh, method) == journal(undisturbed, method)
     assert not list(fresh.results.glob("**/.part_*"))
     assert not fresh.jobs()
+
+
+def test_no_end_of_an_optimisation_changes_the_results(
+    undisturbed: Checkout, fresh: Checkout
+) -> None:
+    check_ends(list(ENDS)[:2], undisturbed, fresh)
 
 
 def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:

@@ -1,7 +1,5 @@
 """Small static studies by the real stages, with the losses that they are known to reach."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A small study of waves by the real stages: design, response, shorter steps, report."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tries to lose or to spoil something: ``python -m tests.hostile [inputs] [kills] [places]``."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys
@@ -46,7 +44,7 @@ def _inputs(asked: argparse.Namespace) -> Part:
 
 
 @contextmanager
-def _built() -> Iterator[tuple[Checkout, float]]:
+def built() -> Iterator[tuple[Checkout, float]]:
     """Builds a small study in a checkout; yields it, and how long that took, in s."""
     with tempfile.TemporaryDirectory() as folder:
         checkout = kills.filmed(Checkout.made(Path(folder, "checkout")))
@@ -64,7 +62,7 @@ def _kills(asked: argparse.Namespace) -> Part:
         found.append(kill)
         _tell(str(kill))
 
-    with _built() as (checkout, span):
+    with built() as (checkout, span):
         other = checkout.copied(checkout.root.with_name("killed"))
         wanted = kills.built(checkout)
         faults = kills.killed(other, wanted, asked.kills, asked.seed, span, tell)
@@ -83,7 +81,7 @@ def _kills(asked: argparse.Namespace) -> Part:
 def _places(asked: argparse.Namespace) -> Part:
     del asked
     found: list[places.Tried] = []
-    with _built() as (checkout, _):
+    with built() as (checkout, _):
         for one in (one for attempt in places.ALL for one in attempt(checkout)):
             found.append(one)
             _tell(str(one))

@@ -3,8 +3,6 @@
 ``python -m tests.hostile.inputs SEED NUMBERS`` tries some: a line of JSON before and after each.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import math
@@ -99,8 +97,8 @@ def _damaged(subject: Subject, good: bytes, random: Random) -> tuple[str, bytes]
         other = random.choice([each for each in SUBJECTS if each is not subject])
         with tempfile.TemporaryDirectory() as name:
             return "swapped", other.make(Path(name)).read_bytes()
-    chosen = random.choice(known)
-    return chosen.__name__.replace("_", " "), chosen(good, random)
+    how, damaged = random.choice(known)
+    return how, damaged(good, random)
 
 
 def _end(subject: Subject, path: Path, good: Told, *, sealed: bool) -> tuple[str, str]:

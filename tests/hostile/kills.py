@@ -1,7 +1,5 @@
 """Kills a small study from end to end at random moments, and compares what is there at the end."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

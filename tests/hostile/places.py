@@ -1,7 +1,5 @@
 """Works where nobody should: full disks, odd paths, wrong clocks, no terminal, no fonts."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -40,6 +38,9 @@ class Tried:
     fault: str = ""
 
 
+Attempt = Callable[[Checkout], Iterator[Tried]]
+
+
 def stages(out: Path) -> dict[str, list[str]]:
     """Returns the command lines of the stages that write, from what is built to a folder."""
     study = ["--problem", f"experiments/{STUDY}/problem.yaml"]
@@ -49,7 +50,7 @@ def stages(out: Path) -> dict[str, list[str]]:
     return {
         "select": [*study, "--designs", f"{TARGET}/design_sqp.nc", "--out", f"{out}/design.nc"],
         "simulate": [*study, "--design", design, "--out", f"{out}/response.nc"],
-        "virtual_lab": [
+        "film": [
             *("render", f"experiments/{STUDY}/recordings/cloaked.yaml", *shown),
             *("--out", f"{out}/film.mp4"),
         ],
@@ -179,13 +180,8 @@ def no_fonts(checkout: Checkout) -> Iterator[Tried]:
     with tempfile.TemporaryDirectory() as folder:
         nowhere = {"HOME": "/nonexistent", "FONTCONFIG_FILE": "/nonexistent"}
         nowhere |= {"XDG_CACHE_HOME": f"{folder}/cache", "MPLCONFIGDIR": f"{folder}/matplotlib"}
-        command = [
-            ".venv/bin/python",
-            "-m",
-            "reports",
-            "study",
-            *stages(Path(folder))["report"],
-        ]
+        words = stages(Path(folder))["report"]
+        command = [".venv/bin/python", "-m", "reports", "study", *words]
         environment = {**os.environ, **nowhere}
         ended = subprocess.run(
             command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False
@@ -212,7 +208,7 @@ def odd_paths(checkout: Checkout) -> Iterator[Tried]:
             yield Tried(f"path: {place}", "make", fault or ("a command was run" if pwned else ""))
 
 
-ALL: tuple[Callable[[Checkout], Iterator[Tried]], ...] = (
+ALL: tuple[Attempt, ...] = (
     *(small_files, full_disk, read_only, two_at_once, no_fonts, no_terminal, wrong_clock),
     odd_paths,
 )

@@ -1,10 +1,8 @@
 """Lists the kinds of files that the project reads: one of each, and how the stages read it."""
 
-from __future__ import annotations
-
 import shutil
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -28,7 +26,7 @@ from pipeline.tracking.frames import import_video, load_cell, recording, video
 from pipeline.tracking.output import dic_points
 from pipeline.virtual_lab import encode_video
 from tests.hostile import damage
-from tests.hostile.damage import Damage
+from tests.hostile.damage import Damages
 from tests.pipeline import static
 from tests.pipeline.problem import test_lattices
 from tests.pipeline.samples import sample
@@ -73,7 +71,7 @@ class Subject:
     sort: Sort
     make: Callable[[Path], Path]
     read: Callable[[Path], Told]
-    damages: Sequence[Damage] = ()
+    damages: Damages = ()
     sealed: bool = False
     whole: bool = True
 

@@ -1,7 +1,5 @@
 """Tries damaged files in small; `python -m tests.hostile inputs` tries a thousand."""
 
-from __future__ import annotations
-
 from tests.hostile import inputs
 from tests.hostile.subjects import SUBJECTS
 

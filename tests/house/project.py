@@ -1,7 +1,5 @@
 """Reads the project's own source: its modules, what they import, and what they define."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass

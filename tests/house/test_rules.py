@@ -1,7 +1,5 @@
 """The rules that keep the house in order: rooms, arrows, names."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess
@@ -40,6 +38,7 @@ FLOORS = {
 HEAVY = {
     "av",
     "cv2",
+    "diffrax",
     "ezdxf",
     "jax",
     "lxml",

@@ -1,7 +1,5 @@
 """Random datasets that obey their tables."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Text of static problems: the authors' scenes, and small ones that are quick to solve."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 GEOMETRIC = 3

@@ -1,7 +1,5 @@
 """The design that changes nothing, to feed stages that want one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

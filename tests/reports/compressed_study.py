@@ -152,6 +152,8 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
             "reaction_force": (TABLES["response"]["reaction_force"].dims, force),
             "drive_displacement": (("case", "time", "xy"), drive),
             "loss": (("structure", "case"), loss),
+            "loss_other_branch": (("structure", "case"), np.full(loss.shape, np.nan)),
+            "snap": (("structure", "case", "time"), np.full(motion.shape[:3], np.nan)),
         },
         unit_coordinates(whole)
         | {

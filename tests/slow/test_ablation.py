@@ -1,7 +1,5 @@
 """What is skipped by compiling loops once, and by loops that keep old factors."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import pytest

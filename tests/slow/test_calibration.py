@@ -4,8 +4,6 @@ Each kind of data alone; noise is estimated from the data. The bound is that of 
 the true constants and the true noise.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The steps that a plan chooses for the lattice of Figure 7, intact and with its void."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,21 +1,31 @@
-"""The pages after the tutorial do as they say, with a draft in the place of its study."""
-
-from __future__ import annotations
+"""The tutorial and the pages after it do as they say, with a draft in the place of its study."""
 
 import re
 
 import pytest
 
+from pipeline.problem.reading import load, preset_names
 from tests.docs.pages import PLACE, text
 from tests.docs.walk import Reader
 
 
 @pytest.fixture(scope="module")
 def reader(tmp_path_factory: pytest.TempPathFactory) -> Reader:
-    """Who has done as the tutorial says."""
-    made = Reader.in_folder(tmp_path_factory.mktemp("pages") / "checkout", draft=True)
-    made.told("docs/tutorial.md")
-    return made
+    return Reader.in_folder(tmp_path_factory.mktemp("pages") / "checkout", draft=True)
+
+
+def test_the_tutorial(reader: Reader) -> None:
+    root, told = reader.checkout.root, reader.told("docs/tutorial.md")
+    problem = root / "experiments/logo/problem.yaml"
+    assert load(problem).title == "Logo"
+    assert preset_names(problem) == ("quick",)
+    assert (root / "results/logo@quick/report/index.html").stat().st_size > 100_000
+    altered, cloaked = re.findall(r"error ([\d.]+) force", told)
+    assert float(cloaked) < 0.8 * float(altered)
+    size = sum(path.stat().st_size for path in (root / "results/logo@quick").rglob("*"))
+    stated = re.search(r"^\| a draft .*\| (\d+) \|$", text("docs/install.md"), re.MULTILINE)
+    assert stated is not None
+    assert 0.2 < size / (int(stated[1]) * 1e6) < 1.0
 
 
 def test_a_video_of_ones_own(reader: Reader) -> None:

@@ -1,7 +1,5 @@
 """What a drive that is known by measurement alone costs: by the adjoint as by differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A track tells the ratios of stiffness, whatever stays with its units and however it is driven."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The design is the initial lattice, every variable moved a little at random, and 
 random direction. The steps are so small that hardly a void or gap crosses the contact's cutoff.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The baseline of the benchmarks, compiled as a whole, solves the same problem."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The continuous adjoint of the baseline works, and comes to the discrete one."""
 
-from __future__ import annotations
-
 from benchmarks.harness import errors
 from benchmarks.methods import selection
 

@@ -1,7 +1,5 @@
 """The whole installation from a folder of packages, as docs/install.md tells it."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -12,8 +10,10 @@ from pipeline.runtime import ROOT
 
 
 def test_an_installation_without_a_network(tmp_path: Path) -> None:
-    for name in ("Makefile", "requirements.lock", "requirements-dev.lock"):
-        shutil.copy(ROOT / name, tmp_path)
+    script = "pipeline/workflow/install_lock.py"
+    (tmp_path / script).parent.mkdir(parents=True)
+    for name in ("Makefile", "requirements.lock", "requirements-dev.lock", script):
+        shutil.copy(ROOT / name, tmp_path / name)
     unwanted = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS"}
     environment = {name: value for name, value in os.environ.items() if name not in unwanted}
     nowhere = {"http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}

@@ -1,7 +1,5 @@
 """The tutorials to the letter: the whole study, its specimens and its recordings."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tests.docs.pages import WALKED

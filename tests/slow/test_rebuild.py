@@ -1,12 +1,5 @@
-"""Builds of `fig2@quick` that take minutes: from nothing in two folders, and killed at random."""
+"""Builds of `fig2@quick` that take minutes: from nothing in two folders."""
 
-from __future__ import annotations
-
-import os
-import random
-import signal
-import subprocess
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +8,6 @@ import pytest
 from tests.e2e.checkout import Checkout
 
 TARGET = "fig2@quick"
-KILLS = 12
 
 
 @pytest.fixture(scope="module")
@@ -41,22 +33,3 @@ def test_compiled_just_now_or_long_ago_the_bytes_are_the_same(
 ) -> None:
     second = first.copied(tmp_path / "checkout")
     assert build(second).built(TARGET) == first.built(TARGET)
-
-
-@pytest.mark.parametrize("kill", [os.killpg, os.kill], ids=["everything", "make"])
-def test_kills_at_random_moments(
-    first: Checkout, tmp_path: Path, kill: Callable[[int, int], None]
-) -> None:
-    checkout = first.copied(tmp_path / "checkout")
-    moments = random.Random(0)
-    for _ in range(KILLS):
-        run = checkout.start(TARGET)
-        try:
-            run.wait(moments.uniform(1.0, 12.0))
-        except subprocess.TimeoutExpired:
-            kill(run.pid, signal.SIGKILL)
-        if kill is os.kill:
-            run.wait()  # what it started lives on and holds the pipe
-        else:
-            run.communicate()
-    assert build(checkout).built(TARGET) == first.built(TARGET)

@@ -1,7 +1,5 @@
 """The full studies reach the losses that tests/data/studies.yaml expects of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Heavy clips of the tracker: dots and speckle against truth, and long recordings."""
 
-from __future__ import annotations
-
 import tracemalloc
 
 import cv2

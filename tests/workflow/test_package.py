@@ -1,7 +1,5 @@
 """The package that is installed: one name, the workflow in it, and studies in any folder."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,49 +1,66 @@
-"""An environment from a folder of packages, without a network."""
-
-from __future__ import annotations
+"""An environment from a folder of packages, without a network, by uv or by pip."""
 
 import hashlib
+import json
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from zipfile import ZipFile
+from zipfile import ZipFile, ZipInfo
 
 import pytest
 
 from pipeline.runtime import ROOT
+from pipeline.workflow.install_lock import uv_settings
 
-WHEEL = "nothing-1.0-py3-none-any.whl"
-FILES = {
-    "nothing.py": "value = 1\n",
-    "nothing-1.0.dist-info/METADATA": "Metadata-Version: 2.1\nName: nothing\nVersion: 1.0\n",
-    "nothing-1.0.dist-info/WHEEL": (
-        "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-    ),
-    "nothing-1.0.dist-info/RECORD": "",
-}
-
-
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """A folder with the Makefile, a package in wheels/, and a lock that asks for it."""
-    shutil.copy(ROOT / "Makefile", tmp_path)
-    (tmp_path / "wheels").mkdir()
-    with ZipFile(tmp_path / "wheels" / WHEEL, "w") as wheel:
-        for name, text in FILES.items():
-            wheel.writestr(name, text)
-    found = hashlib.sha256((tmp_path / "wheels" / WHEEL).read_bytes()).hexdigest()
-    (tmp_path / "requirements.lock").write_text(f"nothing==1.0 --hash=sha256:{found}\n")
-    return tmp_path
+SECRET = "user:hunter2"
+UV = "uv.data/scripts/uv"
+TELLING = """#!python
+import json, os, sys
+told = {name: value for name, value in os.environ.items() if name[:3] in ("UV_", "SSL")}
+with open("told.json", "w") as file:
+    json.dump([sys.argv[1:], told], file)
+"""
 
 
-def set_up(folder: Path) -> subprocess.CompletedProcess[str]:
-    unwanted = {"MAKEFLAGS", "MAKELEVEL", "MFLAGS", "PIP_NO_INDEX", "PIP_FIND_LINKS"}
+def wheel(folder: Path, name: str, files: dict[str, str], version: str = "1.0") -> str:
+    """Packs a package; returns its line of a lock."""
+    info = f"{name}-{version}.dist-info"
+    about = {
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        f"{info}/RECORD": "",
+    }
+    path = folder / f"{name}-{version}-py3-none-any.whl"
+    with ZipFile(path, "w") as packed:
+        for place, text in {**files, **about}.items():
+            entry = ZipInfo(place.replace(".data", f"-{version}.data"))
+            entry.external_attr = 0o100755 << 16
+            packed.writestr(entry, text)
+    found = hashlib.sha256(path.read_bytes()).hexdigest()
+    return f"{name}=={version} \\\n    --hash=sha256:{found}\n"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what sets up, whose environment is made once."""
+    folder, script = tmp_path_factory.mktemp("checkout"), Path("pipeline/workflow/install_lock.py")
+    (folder / script.parent).mkdir(parents=True)
+    shutil.copy(ROOT / script, folder / script)
+    shutil.copy(ROOT / "Makefile", folder)
+    (folder / "wheels").mkdir()
+    return folder
+
+
+def set_up(folder: Path, *lock: str, offline: bool = True) -> subprocess.CompletedProcess[str]:
+    """`make setup` with these lines of a lock."""
+    (folder / "requirements.lock").write_text("".join(lock))
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFL", "PIP_", "UV_"))}
     return subprocess.run(
-        ["make", "setup", "WHEELS=wheels", f"PYTHON={sys.executable}"],
+        ["make", "setup", *["WHEELS=wheels"] * offline, f"PYTHON={sys.executable}"],
         cwd=folder,
-        env={name: value for name, value in os.environ.items() if name not in unwanted},
+        env=kept | {"PIP_CONFIG_FILE": str(folder / "pip.conf")},
         capture_output=True,
         text=True,
         check=False,
@@ -51,8 +68,63 @@ def set_up(folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_folder_of_packages_is_enough(folder: Path) -> None:
-    ended = set_up(folder)
+    line = wheel(folder / "wheels", "nothing", {"nothing.py": "value = 1\n"})
+    ended = set_up(folder, line)
     assert ended.returncode == 0, ended.stdout + ended.stderr
-    python = folder / ".venv/bin/python"
-    subprocess.run([str(python), "-c", "import nothing"], check=True)
-    assert set_up(folder).stdout.strip().endswith("Nothing to be done for 'setup'.")
+    subprocess.run([folder / ".venv/bin/python", "-c", "import nothing"], check=True)
+    again = subprocess.run(
+        ["make", "setup"], cwd=folder, capture_output=True, text=True, check=True
+    )
+    assert again.stdout.strip().endswith("Nothing to be done for 'setup'.")
+
+
+def test_uv_is_given_the_settings_of_pip_and_nobody_sees_them(folder: Path) -> None:
+    line = wheel(folder / "wheels", "uv", {UV: TELLING})
+    (folder / "pip.conf").write_text(
+        f"[global]\nno-index = true\ncert = /of/all\nindex-url = https://{SECRET}@localhost/simple\n"
+        f"[install]\nfind-links =\n    {folder}/wheels\n    /not/there\ncert = {folder}/pip.conf\n"
+    )
+    ended = set_up(folder, line, offline=False)
+    (folder / "pip.conf").unlink()
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    words, told = json.loads((folder / "told.json").read_text())
+    assert SECRET not in ended.stdout + ended.stderr + " ".join(words)
+    assert words[:4] == ["pip", "install", "--quiet", "--require-hashes"]
+    assert "requirements.lock" in words
+    assert (
+        told.items()
+        >= {
+            "UV_DEFAULT_INDEX": f"https://{SECRET}@localhost/simple",
+            "UV_NO_INDEX": "true",
+            "UV_FIND_LINKS": f"{folder}/wheels",
+            "SSL_CERT_FILE": f"{folder}/pip.conf",
+        }.items()
+    )
+
+
+def test_pip_installs_where_uv_fails(folder: Path) -> None:
+    broken = wheel(folder / "wheels", "uv", {UV: "#!python\nraise SystemExit(3)\n"}, "2.0")
+    other = wheel(folder / "wheels", "other", {"other.py": "value = 1\n"})
+    ended = set_up(folder, broken, other)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "uv cannot install here, pip does" in ended.stderr
+    subprocess.run([folder / ".venv/bin/python", "-c", "import other"], check=True)
+
+
+@pytest.mark.parametrize(
+    ("listed", "settings"),
+    [
+        ("", {}),
+        (":env:.index-url=''", {}),
+        (
+            ":env:.index-url='https://a'\nglobal.index-url='https://b'\ninstall.index-url='https://c'",
+            {"UV_DEFAULT_INDEX": "https://a"},
+        ),
+        ("global.extra-index-url='file:///a\\nhttps://b'", {"UV_INDEX": "file:///a https://b"}),
+        ("global.find-links='/ https://b file:///not/there'", {"UV_FIND_LINKS": "/,https://b"}),
+        (":env:.default-timeout='180'\nlist.format='columns'", {"UV_HTTP_TIMEOUT": "180"}),
+        ("user.proxy='x'", {}),
+    ],
+)
+def test_settings_of_pip_become_those_of_uv(listed: str, settings: dict[str, str]) -> None:
+    assert uv_settings(listed) == settings

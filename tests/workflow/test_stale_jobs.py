@@ -1,7 +1,5 @@
 """What a killed run left on a cluster, with stand-ins for the commands of SLURM."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

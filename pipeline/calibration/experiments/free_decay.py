@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import detrend, find_peaks
 
 from pipeline.calibration.experiments.experiment import LEAST_LINES, MeasuredValues
 from pipeline.calibration.inputs import ConstantName, Constants, FreeDecay
@@ -68,6 +67,8 @@ def fit_peaks(time: Floats, angle: Floats) -> DecayPeaks | None:
     ratio is 1 / sqrt(1 + (w / m)^2). The logarithms are weighted by the peaks' heights, since noise
     moves those of low ones more. None where there are too few peaks, or they do not decay.
     """
+    from scipy.signal import detrend, find_peaks
+
     even = np.linspace(time[0], time[-1], len(time))
     course = detrend(np.interp(even, time, angle))
     spectrum = np.abs(np.fft.rfft(course * np.hanning(len(course))))

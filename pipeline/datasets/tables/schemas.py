@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import yaml
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 Kind = (
     Literal["design", "design_method", "response", "sweep", "scatter", "verification", "spectrum"]

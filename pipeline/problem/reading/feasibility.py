@@ -111,6 +111,9 @@ def _horizon(problem: Problem) -> Findings:
 
 def _robust(problem: Problem) -> Findings:
     robust = problem.objective.robust
+    if problem.objective.snap == "avoid" and not problem.static:
+        what = f"a structure under a {problem.drive.kind} drive has no path of equilibria"
+        yield ProblemFault(what, ("objective", "snap"), "leave it out, or drive by a linear_ramp")
     if robust is not None and robust.loads and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no frequency to vary"
         yield ProblemFault(what, ("objective", "robust", "loads"), "leave them out")

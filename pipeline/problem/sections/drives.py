@@ -115,6 +115,11 @@ class LinearRampDrive(_Directed):
 class TimeSeriesDrive(Section):
     """A measured motion (x, y, theta) of the driven units, read from a file beside the problem.
 
+    The file is a CSV whose heading names the columns `time (s)`, `ux (mm)`, `uy (mm)` and
+    `theta (rad)`, or other units of these kinds in the brackets; lines above it are comments. Times
+    ascend from zero to the end of the horizon at least, where `horizon: { duration: 1 s }` gives
+    it; the motion starts at rest, and between two lines it is interpolated linearly.
+
     Attributes:
         kind: which of the drives this is.
         units: that are driven.

@@ -52,9 +52,15 @@ class ObjectiveSection(Section):
         target: stay at rest, or do as in the intact lattice.
         region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
         robust: what else the design is to hold against, if anything.
+        snap: whether a static structure may snap to another branch of equilibria on its way, or is
+            designed to avoid it.
+        snap_margin: smallest eigenvalue of the tangent that all loads must then leave, as a share
+            of that of the initial structure at rest.
     """
 
     kind: Literal["displacement", "strain_energy"]
     target: Literal["rest", "intact"]
     region: Literal["surroundings"] | Region = "surroundings"
     robust: Robust | None = None
+    snap: Literal["allow", "avoid"] = "allow"
+    snap_margin: Ratio = 0.05

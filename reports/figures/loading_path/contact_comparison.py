@@ -44,7 +44,10 @@ def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iter
             note = f"{overlapping(count)}, smallest gap {gap}, by geometry"
             if law != "angle":
                 change = loss / float(losses.sel(structure=name, contact_law="angle")) - 1.0
-                note = f"{percent(change)} against the angle law; {note}"
+                snaps = response["snaps_by_contact"].sel(structure=name)
+                apart = (snaps != snaps.sel(contact_law="angle")).any()
+                other = ", on another branch: one of them snaps" if apart else ""
+                note = f"{percent(change)} against the angle law{other}; {note}"
             yield number(key, label, loss, unit, digits=3, note=note)
 
 

@@ -26,6 +26,8 @@ from reports.study import RedesignResults, StudyResults
 
 BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""
+RIGHT_AXIS = 9.0
+"""Room for the labels of an axis on the right, mm."""
 
 
 def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
@@ -93,7 +95,7 @@ def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignRe
 
 def _jumps(axes: Axes, path: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
     """Draws crosses where a structure came to another branch of equilibria."""
-    jumped = (response["stability"] == JUMPED).any("case")
+    jumped = (response["stability"] >= JUMPED).any("case")
     for name in structures(response):
         at = jumped.sel(structure=name).values
         colour = style.STRUCTURE_COLOURS[name]
@@ -143,9 +145,23 @@ def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
 def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     """Draws force of the drive, and of the load cell where there is one."""
     _plain_panel(axes, study.problem, path, measures.reaction(study.response), "force (N)")
+    if path.static:
+        _eigenvalues(axes, study, path)
     measured.forces(axes, study)
     if study.problem.objective.target == "rest":  # or another panel has told it
         _sides(axes, study)
+
+
+def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws the smallest eigenvalue of the tangent, dotted, against an axis on the right."""
+    box, margin = axes.get_position(), RIGHT_AXIS / style.TWO_COLUMNS
+    axes.set_position((box.x0, box.y0, box.width - margin, box.height))
+    right, mean = axes.twinx(), over_cases(study.problem, 1e3 * study.response["eigenvalue"])
+    for name in structures(study.response):
+        colour = style.STRUCTURE_COLOURS[name]
+        right.plot(path.values, mean.sel(structure=name), color=colour, lw=1.0, ls=":")
+    right.set(ylim=(0.0, None), ylabel="eigenvalue (N/m)")
+    right.yaxis.set_major_locator(MaxNLocator(4))
 
 
 def _sides(axes: Axes, study: StudyResults) -> None:

@@ -33,7 +33,7 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Result", measure_facts(study, path)),
         *grouped("Measured", measured.measured_facts(study, path)),
         *recording_facts.recorded_facts(study.recordings),
-        *grouped("Loss", loss_facts(study)),
+        *grouped("Loss", loss_facts(study, path)),
         *grouped("Lateral contraction", contraction_facts(study, path)),
         *grouped("Reaction", reaction_facts(study, path)),
         *grouped("Optimisation", checks.history_facts(study.design)),
@@ -148,7 +148,7 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield number(key, label, most, measure.unit, digits=3, note=note)
 
 
-def loss_facts(study: StudyResults) -> Iterator[Fact]:
+def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields the loss that was minimised, before and after."""
     unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
     loss = over_cases(study.problem, study.response["loss"])
@@ -157,7 +157,27 @@ def loss_facts(study: StudyResults) -> Iterator[Fact]:
         label = f"Loss, {display_name(study.problem, name).lower()}"
         yield number(f"loss_{key}", label, value, unit, digits=3)
     yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
+    yield from _snap_facts(study, path, end, unit)
     yield from checks.error_facts(study.response, "relative; the largest of all structures")
+
+
+def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> Iterator[Fact]:
+    """Yields where the cloaked structure snaps, and its losses where the path branches."""
+    part = study.response.sel(structure="cloaked")
+    loads = np.unique(part["snap"].values[np.isfinite(part["snap"].values)])
+    if not len(loads):
+        return
+    places = np.interp(loads, part["time"].values, path.values)
+    where = " and ".join(worded(float(place), path.unit, 3) for place in places)
+    other = float(
+        over_cases(study.problem, study.response["loss_other_branch"]).sel(structure="cloaked")
+    )
+    words, note = worded(loss, unit, 3), "at a limit point; the loss is that after it"
+    if np.isfinite(other):
+        words += f" or {worded(other, unit, 3)}"
+        note = "where the path branches; the loss on either branch"
+    ours = f"snaps at {where}: {words}"
+    yield Fact("snaps", "Loss, cloaked", float(places[0]), path.unit, ours, note=note)
 
 
 def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:

@@ -130,7 +130,13 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
             words,
             (),
         )
-    words = "Force of the drive along its direction."
+    words = "Force of the drive along its direction"
+    if path.static:
+        words += (
+            "; dotted, smallest eigenvalue of the tangent at fixed supports and drive: where it "
+            "vanishes a path ends, and the structure snaps"
+        )
+    words += "."
     yield "Reaction", lambda axes: curves.reaction_panel(axes, study, path), words, ()
     if (copies := study.scatter) is not None:
         words = (
@@ -160,7 +166,7 @@ def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:
 def marks(studies: Sequence[StudyResults]) -> str:
     """Tells what else is drawn with the curves of the measure, each after a semicolon."""
     bands = any(study.scatter is not None for study in studies)
-    jumps = any((study.response["stability"] == JUMPED).any() for study in studies)
+    jumps = any((study.response["stability"] >= JUMPED).any() for study in studies)
     second = any(study.redesign is not None and study.redesign.changed for study in studies)
     return (
         ("; the bands hold 90 % of the imperfect cloaks" if bands else "")
@@ -199,7 +205,7 @@ def fields(study: StudyResults) -> list[ColourField]:
 def loading_path_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
     """Returns what the page says of itself."""
     key = measures.measure_of(study.problem).key
-    headline = (f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction")
+    headline = (f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction", "snaps")
     return study_text(
         study, caption, facts, credit=credit(study.problem.report.paper), headline=headline
     )

@@ -49,6 +49,7 @@ def path(study: StudyResults) -> Columns:
         "strain_energy_Nmm": response["strain_energy"],
         "contact_energy_Nmm": response["contact_energy"],
         "min_void_angle_rad": response["min_void_angle"],
+        "eigenvalue_N_per_mm": response["eigenvalue"],
     }
     return columns | by_structure(study, series)
 

@@ -28,7 +28,7 @@ def wave_facts(study: StudyResults) -> list[Fact]:
     return [
         *grouped("Scene", (*scene_facts(study, path), *drive_facts(study))),
         *grouped("Result", error_facts(study)),
-        *grouped("Loss", (*loss_facts(study), *sum_facts(study))),
+        *grouped("Loss", (*loss_facts(study, path), *sum_facts(study))),
         *grouped("Marked places", place_facts(study)),
         *grouped("Contact on the edges", edge_facts(study)),
         *grouped("Time steps", step_facts(study.verification)),

@@ -1,7 +1,5 @@
 """Small calibrations whose data are computed, for the quick tests and for the trials of seeds."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

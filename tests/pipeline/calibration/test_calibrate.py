@@ -1,7 +1,5 @@
 """The constants of computed specimens are found again, with the errors that the noise makes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mistake in a calibration or in its files is told in one message, and nothing is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Zeros of load cells, the cell of a track, and the cut-off of contact: found, or refused."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The drive of a fit: the true motion without what stays with a unit, and with its covariance."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Metrics against what they must be, and how often their intervals hold the truth."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

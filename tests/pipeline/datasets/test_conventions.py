@@ -1,7 +1,5 @@
 """Files of every kind keep the CF conventions, and those of the first version are still read."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys
@@ -82,4 +80,4 @@ def test_a_file_of_the_first_version_is_read(kind: Kind, tmp_path: Path) -> None
             variable.units = "px" if pixels else OLD.get(table.units, table.units)
     migrated = datasets.read(path, kind)
     xr.testing.assert_identical(migrated, now)
-    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 2
+    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 3

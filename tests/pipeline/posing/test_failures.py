@@ -1,7 +1,5 @@
 """A design that cannot be made is told with its place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Designs for more than one load, and for imperfect copies."""
 
-from __future__ import annotations
-
 import json
 from copy import deepcopy
 from pathlib import Path
@@ -53,6 +51,7 @@ def test_a_robust_design_tells_the_losses_of_the_drives_own_cases(
     robust: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "design_sqp.nc"
+    robust.write_text(robust.read_text().replace("evaluations: 4", "evaluations: 2"))
     words = ["--problem", str(robust), "--preset", "quick", "--method", "sqp", "--quiet"]
     assert run_stage("design", [*words, "--out", str(out)]) == 0
     made = datasets.read(out, "design_method")

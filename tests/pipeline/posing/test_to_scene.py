@@ -1,7 +1,5 @@
 """Problems that can be read but have no meaning: one message, whatever stage meets them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +9,7 @@ from pipeline.__main__ import run_stage
 from pipeline.posing import scene_of
 from pipeline.posing.to_scene import contact_laws
 from pipeline.problem.reading import load
+from pipeline.runtime import UserError
 from sim.structure import VoidAngleContact
 from tests.pipeline.static import SHIELD, write
 
@@ -50,6 +49,17 @@ def test_the_file_the_key_and_a_remedy_are_told(
     assert f"file:   {path}\n" in told
     assert f"key:    {key}" in told
     assert "remedy: " in told
+
+
+@pytest.mark.parametrize("drive", ["[1, 2]", "3", "[]"])
+def test_a_drive_that_is_no_section_is_told_in_words(drive: str, tmp_path: Path) -> None:
+    path = write(tmp_path, SHIELD, amplitude=9)
+    text = path.read_text(encoding="utf-8")
+    ramp = text[text.index("drive:") : text.index("horizon:")]
+    path.write_text(text.replace(ramp, f"drive: {drive}\n"), encoding="utf-8")
+    with pytest.raises(UserError, match="keys and values are wanted here") as caught:
+        load(path)
+    assert caught.value.key == "drive"
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Several designs of one problem, each named by its number."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

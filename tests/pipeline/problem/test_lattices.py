@@ -1,7 +1,5 @@
 """Kagome lattices and lattices from files, through the same chain as squares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Shapes of voids: polygons, curves, formulas and images, with size, centre and orientation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Voids, inclusions and targets, from the problem file to the response."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A stage that a server runs behaves as one that runs by itself, however it ends."""
 
-from __future__ import annotations
-
 import atexit
 import os
 import signal

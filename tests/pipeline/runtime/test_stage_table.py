@@ -1,7 +1,5 @@
 """One table: what it says of stages is so in the rules, and commands are found in it."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A process without standard streams writes no messages into its datasets."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

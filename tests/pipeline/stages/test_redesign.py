@@ -1,7 +1,5 @@
 """A design by the angle law with contact on distance: kept where both agree, else optimised."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Modes, transmission and waves of a small study, and the page that shows them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A small void from its problem to its response, and a path that ends early."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

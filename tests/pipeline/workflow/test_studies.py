@@ -1,7 +1,5 @@
 """Names of studies and presets that would be those of other targets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -183,7 +183,7 @@ def test_the_second_design_is_told_of_and_drawn(shield: StudyResults) -> None:
     assert values(shield)["second_rotation_reduction"].value == pytest.approx(90.0)
     assert values(shield)["second_overlaps"].value == 1
     assert values(shield)["jumps_second_design"].value == 0
-    measure = made(shield).axes[-3]
+    measure = made(shield).axes[-4]
     assert "Cloaked, no overlap" in {line.get_label() for line in measure.lines}
     assert "dashed" in figure.loading_path_figure(shield).caption
 
@@ -213,6 +213,18 @@ def test_a_jump_is_marked_and_counted(shield: StudyResults) -> None:
     np.testing.assert_allclose(points, [[7.5, 0.1 * values(shield)["rotation_altered"].value / 2]])
     assert "crosses mark jumps" in figure.loading_path_figure(jumped).caption
     assert "crosses" not in figure.loading_path_figure(shield).caption
+
+
+def test_a_snap_is_a_headline_with_the_losses_of_both_branches(shield: StudyResults) -> None:
+    assert "snaps" not in values(shield)
+    response = shield.response.copy(deep=True)
+    response["snap"][1, 0, 4] = float(response["time"][4])
+    told = dataclasses.replace(shield, datasets=shield.datasets | {"response": response})
+    assert values(told)["snaps"].ours == "snaps at 7.5 mm: 0.05 N mm"
+    response["loss_other_branch"][1, 0] = 0.07
+    assert values(told)["snaps"].ours == "snaps at 7.5 mm: 0.05 N mm or 0.07 N mm"
+    text = figure.loading_path_text(told, "", list(values(told).values()))
+    assert "snaps" in {fact.key for fact in text.headline}
 
 
 def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:

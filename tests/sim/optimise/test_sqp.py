@@ -202,21 +202,23 @@ def test_kicks_leave_a_poor_optimum_and_keep_the_best() -> None:
 
 
 @pytest.mark.parametrize("method", ["sqp", "mma"])
-def test_a_design_that_is_not_confirmed_is_not_returned(method: Method) -> None:
+def test_the_best_design_is_that_whose_confirmed_loss_is_the_best(method: Method) -> None:
+    """Low losses are not found again: the lowest not at all, others with half as much again."""
     known = corner()
 
     def confirm(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         loss, gradient, aux = known.loss(x)
         if loss < -1.4:
             raise SimulationError("out of reach")
-        return loss + (0.1 if loss < -1.2 else 0.0), gradient, aux
+        return loss + (0.5 if loss < -1.2 else 0.0), gradient, aux
 
     found = minimise(method, known.loss, known.constraints, known.start, confirm=confirm)
     losses = np.array([each.loss for each in found.evaluations if each.violation == 0.0])
     assert losses.min() < -1.4
-    assert found.loss == losses[losses >= -1.2].min()
-    assert found.loss == known.loss(found.x)[0]
-    assert found.evaluations[found.best].loss == found.loss
+    reachable = losses[losses >= -1.4]
+    confirmed = reachable + np.where(reachable < -1.2, 0.5, 0.0)
+    assert found.loss == confirmed.min() == confirm(found.x)[0]
+    assert (found.evaluations[found.best].x == found.x).all()
 
 
 def test_runs_are_reproducible_bit_for_bit() -> None:

@@ -10,7 +10,7 @@ from benchmarks.scenes import BARRIER, CUTOFF
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import gradient, system_of, workspace
 from sim.linalg import number_free_dofs
-from sim.quasistatics import StaticSolver
+from sim.quasistatics import BRANCHING, StaticSolver
 from sim.solvers import LinearRamp, MotionLaw, PrescribedMotion, TimeSeries, solve_case
 from sim.structure import ConcreteParameters, quads
 from tests.sim.structures import NONE, Rig, mixed_polygons, rotating_squares
@@ -174,7 +174,7 @@ def test_a_straight_chain_buckles_and_says_so() -> None:
     lateral = np.abs(record.states.reshape(10, 9, 3)[:, :, 1]).max(axis=1)
     first = int(np.flatnonzero(record.jumped)[0])
     np.testing.assert_array_equal(record.stable, 1)
-    assert record.jumped.sum() == 1
+    assert record.jumped[record.jumped > 0].tolist() == [BRANCHING]
     assert (lateral[:first] < 1e-9).all()
     assert (lateral[first:] > 1.0).all()
 
@@ -187,7 +187,7 @@ def test_a_long_chain_finds_its_way_out_of_a_branch_that_ends(length: int) -> No
     rig = Rig(squares, np.array([0]), np.array([length - 1]), drive)
     record = StaticSolver(rig.topology, np.linspace(0.1, 1.0, 10)).forward(rig.values, rig.drive)[2]
     np.testing.assert_array_equal(record.stable, 1)
-    assert record.jumped.sum() == 1
+    assert record.jumped[record.jumped > 0].tolist() == [BRANCHING]
 
 
 def bowed() -> Rig:

@@ -1,0 +1,3 @@
+from tests.e2e.conftest import fresh, undisturbed
+
+__all__ = ["fresh", "undisturbed"]
