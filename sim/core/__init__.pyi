@@ -1,4 +1,5 @@
 from . import compiling as compiling
+from . import instruction_set as instruction_set
 from .arrays import Floats as Floats
 from .arrays import Image as Image
 from .arrays import Ints as Ints
