@@ -13,6 +13,10 @@ from .plan import Plan as Plan
 from .plan import concrete_parameters as concrete_parameters
 from .plan import make_plan as make_plan
 from .plan import sample_times as sample_times
+from .relaxation import AsBuilt as AsBuilt
+from .relaxation import Relaxed as Relaxed
+from .relaxation import as_built as as_built
+from .relaxation import relaxed as relaxed
 from .scene import DOFS as DOFS
 from .scene import Accuracy as Accuracy
 from .scene import Clamp as Clamp

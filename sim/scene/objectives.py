@@ -143,11 +143,11 @@ def strain_energies(
     whole = jnp.asarray(displacement)
     first, second = (whole[..., ligament_units[:, end], :] for end in range(2))
     arm, vector = parameters.arm[ligaments], parameters.vector[ligaments]
-    law = LigamentLaw(*parameters.law[ligaments].T)
+    law, natural = LigamentLaw(*parameters.law[ligaments].T), parameters.natural[ligaments]
     ends = (values.reshape(-1, *values.shape[-2:]) for values in (first, second))
-    flat = _energies(*ends, arm[:, 0], arm[:, 1], vector, law)
+    flat = _energies(*ends, arm[:, 0], arm[:, 1], vector, law, natural)
     return flat.reshape(first.shape[:-1])
 
 
-_energies = jax.jit(jax.vmap(jax.vmap(ligament_energy), in_axes=(0, 0, None, None, None, None)))
+_energies = jax.jit(jax.vmap(jax.vmap(ligament_energy), in_axes=(0, 0, *(None,) * 5)))
 """Energies (n_states, n) of the ligaments between units in states (n_states, n, 3)."""
