@@ -129,7 +129,7 @@ def track_video(
         motion = at_frame_times(motion, time, late, exposure)
     motion = _since_rest(motion, shown.averaged, offset)
     _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
-    faults = timing_faults(time, motion, sigmas, same)
+    faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
