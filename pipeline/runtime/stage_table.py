@@ -189,7 +189,7 @@ _ROWS = (
         extra="fabrication",
         inputs=("design",),
         unused=(
-            *("doc", "report", "solver", "prediction", "spectrum"),
+            *("doc", "report", "prediction", "spectrum"),
             *("response", "sweep", "robustness"),
         ),
         options=(
@@ -301,6 +301,15 @@ The first writes the constants with their errors to NC, and beside it a YAML of 
 lines that a problem file takes. The second computes the sets that the calibration calls virtual,
 and writes them with a calibration.yaml that names them, which the first then takes. These are
 labelled SYNTHETIC.""",
+    ),
+    Stage(
+        "validate",
+        "predict a measured test from tests of other samples, and measure load cycles",
+        extra="validation",
+        parts={
+            "samples": (option("file", type=Path, metavar="POPULATION.yaml"), _OUT),
+            "cycles": (option("file", type=Path, metavar="LOAD_CYCLES.yaml"), _OUT),
+        },
     ),
     Stage(
         "markers",
