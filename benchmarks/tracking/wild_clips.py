@@ -165,11 +165,11 @@ def make(name: str, folder: Path, frames: int | None = None) -> WildClip:
     stamps = times if script.stamps is None else script.stamps[: len(times)]
     place = view.project(shown.centre + seen(times)[..., :2] - middle)
     reach = shown.radius * view.scale
-    visible = ((place > reach[:, None]) & (place < np.array(view.size) - 1 - reach[:, None])).all(
-        axis=-1
+    visible = np.asarray(
+        ((place > reach[:, None]) & (place < np.array(view.size) - 1 - reach[:, None])).all(axis=-1)
     )
     if script.hidden is not None:
-        visible &= ~script.hidden(place, times)
+        visible = visible & ~script.hidden(place, times)
     fault = np.zeros(len(times), bool)
     fault[[one for one in script.fault if one < len(times)]] = True
     truth = own(times) if script.follows else seen(times)
@@ -221,7 +221,8 @@ def _filmed(images: list[Singles], stamps: Floats, script: _Script, path: Path) 
         shown = [np.clip(np.round(image * 257), 0, 65535).astype(np.uint16) for image in images]
     if pixels == "yuv444p":
         share = [(image[..., None] - 30) / 175 for image in images]
-        shown = [eight_bit(np.array(_RED) + part * (np.array(_TEAL) - _RED)) for part in share]
+        mixed = [np.array(_RED) + part * (np.array(_TEAL) - _RED) for part in share]
+        shown = [eight_bit(np.asarray(colour, np.float32)) for colour in mixed]
     write_video(path, shown, list(stamps), codec, pixels, crf)
     yield from read_frames(path)
 
@@ -234,7 +235,7 @@ def _glide(length: float, there: float) -> Callable[[Floats], Floats]:
 
 
 def _hand(image: Singles, time: float) -> None:
-    reach = _hand_reach(time)
+    reach = float(_hand_reach(np.array(time)))
     points = [
         (0, 0),
         (reach, 60),
@@ -250,8 +251,8 @@ def _hand(image: Singles, time: float) -> None:
         cv2.circle(image, (at, 40 + 7 * at % 560), 9, _SKIN - 25.0, -1)
 
 
-def _hand_reach(time: float) -> float:
-    return 300.0 * time / 0.8
+def _hand_reach(time: Floats) -> Floats:
+    return np.asarray(300.0 * time / 0.8)
 
 
 def _under_hand(place: Floats, times: Floats) -> Mask:

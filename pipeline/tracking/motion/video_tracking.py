@@ -104,7 +104,7 @@ def track_video(
         UserError: no frames, or the specimen is not in the first one.
     """
     shown = average_at_rest(frames)
-    if not shown.count:
+    if not shown.averaged:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
     ways = recognise(shown.image, specimen, px_per_mm, setup)
     if doubt := ambiguity_text(ways):
@@ -127,14 +127,14 @@ def track_video(
     if setup.readout or exposure:
         late = row_times(motion, specimen, calibration, setup)
         motion = at_frame_times(motion, time, late, exposure)
-    motion = _since_rest(motion, shown.count, offset)
+    motion = _since_rest(motion, shown.averaged, offset)
     _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
-    faults = timing_faults(time, motion, sigmas, same)
+    faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
     coded = not len(later) or float(np.median(later)) > _CODED
     sigma = uncertainty.calibrate_sigma(
-        motion, sigmas, specimen.centre, steady, time, shown.count, coded
+        motion, sigmas, specimen.centre, steady, time, shown.averaged, coded
     )
     sigma[~np.isfinite(motion)] = np.nan
     start = float(times[0])
@@ -247,7 +247,7 @@ def _tracker(
     templates = learn_templates(shown.image, camera, grid, *look)
     walls = None if depth is None else SideWalls(specimen, depth, grid, templates, *look)
     blur = ExposureBlur(templates, calibration.pixel) if walls is None else None
-    noise = shown.noise * float(np.sqrt(1 + 1 / shown.count))
+    noise = shown.noise * float(np.sqrt(1 + 1 / shown.averaged))
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)
     return Tracker(specimen, PoseFitter(camera, templates), relocaliser, walls, shutter, blur)

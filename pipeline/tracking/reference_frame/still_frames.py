@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.frames import BrokenOffError, Frame
-from sim.core import Floats
+from sim.core import Singles
 
 _MOST, _MEMORY = 64, 1 << 27
 """Frames, and pixels of all, that are averaged at most."""
@@ -31,13 +31,13 @@ class StillFrames(NamedTuple):
     Attributes:
         frames: all of the video, the averaged ones again.
         image: mean of those in which nothing moves; the first frame alone, if the next differs.
-        count: number of them; zero in a video without frames.
+        averaged: number of them; zero in a video without frames.
         noise: standard deviation of the brightness in a single one.
     """
 
     frames: Iterator[Frame]
     image: Picture
-    count: int
+    averaged: int
     noise: float
 
 
@@ -46,14 +46,16 @@ def average_at_rest(frames: Iterator[Frame]) -> StillFrames:
     first = next(frames, None)
     if first is None:
         return StillFrames(iter(()), np.zeros((0, 0), np.float32), 0, 0.0)
-    kept, total = [first], first.image.astype(np.float32)
+    kept, total = [first], np.asarray(first.image, np.float32).copy()
     most = min(_MOST, max(1, _MEMORY // first.image.size))
     ahead: Frame | None = None
     error: BrokenOffError | KeyboardInterrupt | None = None
     noises: list[float] = []
     try:
         while len(kept) < most and (ahead := next(frames, None)) is not None:
-            noise = _noise_between(total / np.float32(len(kept)), ahead.image, len(kept))
+            noise = _noise_between(
+                np.asarray(total / len(kept), np.float32), ahead.image, len(kept)
+            )
             if noise is None:
                 break
             noises.append(noise)
@@ -63,7 +65,7 @@ def average_at_rest(frames: Iterator[Frame]) -> StillFrames:
     except (BrokenOffError, KeyboardInterrupt) as broken:
         error = broken
     count = len(kept)
-    image: Picture = first.image if count == 1 else total / np.float32(count)
+    image: Picture = first.image if count == 1 else np.asarray(total / count, np.float32)
     noise = float(np.median(noises)) if noises else image_noise(first.image)
     again = itertools.chain(kept, () if ahead is None else (ahead,), _after(frames, error))
     return StillFrames(again, image, count, noise)
@@ -83,19 +85,19 @@ def image_noise(image: Picture) -> float:
     return float(np.median(np.abs(rough))) / _NORMAL
 
 
-def _noise_between(mean: Floats, image: Picture, count: int) -> float | None:
+def _noise_between(mean: Singles, image: Picture, count: int) -> float | None:
     """Returns the noise of a frame that shows what the mean of some does; nothing if it moved."""
     if mean.shape != image.shape:
         return None
     shown = image.astype(np.float32)
     gain = float(np.vdot(shown, mean)) / max(float(np.vdot(mean, mean)), 1e-9)  # lamps flicker
-    change = shown - np.float32(gain) * mean
+    change = np.asarray(shown - np.float32(gain) * mean, np.float32)
     spread = max(image_noise(change), _ROUNDED)
     rows, columns = (size // _BLOCK for size in image.shape)
     blocks = cv2.resize(
         change[: rows * _BLOCK, : columns * _BLOCK], (columns, rows), interpolation=cv2.INTER_AREA
     )
-    blocks *= _BLOCK / spread
+    blocks = np.asarray(blocks, np.float64) * (_BLOCK / spread)
     if float(np.mean(blocks**2)) > _ALIKE or float(np.abs(blocks).max()) > _JUMP:
         return None
     return spread / float(np.sqrt(1 + 1 / count))
