@@ -4,7 +4,7 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
-PAGES := all fig1 index movies calibrate benchmark
+PAGES := all fig1 index movies calibrate validation benchmark
 PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
@@ -28,6 +28,7 @@ help:
 	@echo "make fig2_gains         what designs gain that hold against more than the study asks for"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make calibrate constants of the specimens from tests of small ones: results/calibration"
+	@echo "make validation  measured specimens beside their prediction: results/validation/index.html"
 	@echo "make index     that page alone, over what is there"
 	@echo "make movies    the paper's movies: results/movies"
 	@echo "make reproduce build fig2@quick (or STUDY=...) twice from nothing, and compare all bytes"
@@ -39,7 +40,7 @@ help:
 	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make benchmark run time against error of every solver, and more: results/benchmark (an hour)"
 	@echo "make bench     measure speed against the baselines"
-	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
+	@echo "make bench-tracking   measure tracking: rendered clips, known pictures, VIDEOS=folder"
 	@echo "make stress    try to break the numbers: results/stress/index.html; fails if any is wrong"
 	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs kills places)"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
@@ -128,7 +129,7 @@ bench: dev
 	$(BIN)/python -m benchmarks
 
 bench-tracking: dev
-	$(BIN)/python -m benchmarks tracking --videos "$(VIDEOS)"
+	$(BIN)/python -m benchmarks tracking $(if $(VIDEOS),--videos "$(VIDEOS)")
 
 stress: dev
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \

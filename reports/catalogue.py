@@ -31,6 +31,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         for name in (
             *("design", "response", "sweep", "scatter", "verification", "geometric-design"),
             *("geometric-response", "spectrum", "gains", "calibration", "track"),
+            *("samples", "cycles"),
         )
     },
     "--datasets": _path("NC", "what was measured", nargs="+"),

@@ -2,3 +2,4 @@ from . import calibration_dataset as calibration_dataset
 from . import computed_sets as computed_sets
 from .fit_constants import fit_calibration as fit_calibration
 from .fit_constants import simulation_fault as simulation_fault
+from .load_cycle_study import study_cycles as study_cycles

@@ -43,7 +43,9 @@ def simulate_forces(
     """Simulates a test: displacements in mm and noisy forces in N."""
     assert asked.virtual is not None
     displacement = np.linspace(0.0, asked.virtual.end, asked.virtual.points + 1)[1:]
-    force = force_displacement.pose_simulation(asked, true, displacement).predict(true)
+    force = force_displacement.pose_simulation(
+        asked.lattice, asked.test, true, displacement
+    ).predict(true)
     return displacement, force + asked.virtual.noise * random.normal(size=len(force))
 
 

@@ -303,6 +303,15 @@ and writes them with a calibration.yaml that names them, which the first then ta
 labelled SYNTHETIC.""",
     ),
     Stage(
+        "validate",
+        "predict a measured test from tests of other samples, and measure load cycles",
+        extra="validation",
+        parts={
+            "samples": (option("file", type=Path, metavar="POPULATION.yaml"), _OUT),
+            "cycles": (option("file", type=Path, metavar="LOAD_CYCLES.yaml"), _OUT),
+        },
+    ),
+    Stage(
         "markers",
         "write sheets of marks for the tracking, to print and stick on the units",
         extra="tracking",

@@ -48,6 +48,12 @@ def description(wildcards: Wildcards) -> str:
     return found.get("description") or f"{found['folder']}/calibration.yaml"
 
 
+def measured_files(folder: str, root: Path = WORK) -> list[str]:
+    """Lists the measured files of a validation, all of which its YAML may name."""
+    found = (root / "experiments/validation" / folder).glob("*.csv")
+    return sorted(path.relative_to(root).as_posix() for path in found)
+
+
 def _described(source: str) -> Calibration | None:
     """Reads the calibration; None where it cannot be read, of which the stage will tell why."""
     try:

@@ -1,11 +1,14 @@
 from . import force_displacement as force_displacement
 from . import free_decay as free_decay
 from . import full_field as full_field
+from . import load_cycles as load_cycles
 from . import tracked_specimen as tracked_specimen
 from .experiment import Experiment as Experiment
 from .force_displacement import ForceTest as ForceTest
 from .free_decay import DecayTest as DecayTest
 from .full_field import FullFieldExperiment as FullFieldExperiment
 from .full_field import per_dof as per_dof
+from .load_cycles import LoadBranch as LoadBranch
+from .load_cycles import Snap as Snap
 from .tracked_specimen import TrackedSpecimen as TrackedSpecimen
 from .tracked_specimen import pose_specimen as pose_specimen

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import jax
 import jax.numpy as jnp
@@ -11,13 +12,22 @@ import numpy as np
 from jax import Array
 
 from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
+from pipeline.calibration.experiments.load_cycles import prepare_record
 from pipeline.calibration.experiments.simulated_experiment import (
     KnownDrive,
     Seen,
     SpecimenSimulation,
 )
-from pipeline.calibration.inputs import ConstantName, Constants, ForceDisplacement
+from pipeline.calibration.inputs import (
+    ConstantName,
+    Constants,
+    ForceColumns,
+    ForceDisplacement,
+    RecordOptions,
+    TestKind,
+)
 from pipeline.problem.fields import csv_columns, units
+from pipeline.problem.sections import Lattice as Specimen
 from pipeline.runtime import UserError
 from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
@@ -31,7 +41,18 @@ TOLERANCE = 1e-12
 """Of equilibria, relative: far below what a difference of 1e-4 in a logarithm changes."""
 
 
-def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
+class ForceFile(Protocol):
+    """Tells a file of forces: its columns, and how a record is cut."""
+
+    @property
+    def file(self) -> str | None: ...  # noqa: D102
+    @property
+    def columns(self) -> ForceColumns: ...  # noqa: D102
+    @property
+    def record(self) -> RecordOptions | None: ...  # noqa: D102
+
+
+def read(asked: ForceFile, folder: Path) -> tuple[Floats, Floats]:
     """Reads displacements in mm and forces in N from the file of a set.
 
     Raises:
@@ -44,7 +65,13 @@ def read(asked: ForceDisplacement, folder: Path) -> tuple[Floats, Floats]:
     if not (np.abs(displacement) > 0).any():
         remedy = "give a test in which the top row moves"
         raise UserError("the displacement is zero throughout", file=path, remedy=remedy)
-    return displacement, force
+    if asked.record is None:
+        return displacement, force
+    try:
+        return prepare_record(displacement, force, asked.record)
+    except ValueError as error:
+        remedy = "look at the curve, and change branch, drop_first or toe"
+        raise UserError(str(error), file=path, key="record", remedy=remedy) from error
 
 
 @dataclass(frozen=True)
@@ -82,16 +109,18 @@ def pose_force_test(
     sigma = np.full(len(force), 1.0 if asked.noise is None else asked.noise)
     known = asked.noise is not None
     measured = MeasuredValues(asked.name, asked.kind, displacement, force, sigma, known)
-    return ForceTest(measured, pose_simulation(asked, begin, displacement), asked.tare)
+    return ForceTest(
+        measured, pose_simulation(asked.lattice, asked.test, begin, displacement), asked.tare
+    )
 
 
 def pose_simulation(
-    asked: ForceDisplacement, begin: Constants, displacement: Floats
+    specimen: Specimen, test: TestKind, begin: Constants, displacement: Floats
 ) -> SpecimenSimulation:
-    """Poses the specimen at the measured displacements."""
-    lattice, contact = asked.lattice.network(), begin.contact
-    bottom, top = (np.array(asked.lattice.side(name)) for name in ("bottom", "top"))
-    towards = np.array([*DIRECTIONS[asked.test], 0.0])
+    """Poses a specimen at the measured displacements of a test."""
+    lattice, contact = specimen.network(), begin.contact
+    bottom, top = (np.array(specimen.side(name)) for name in ("bottom", "top"))
+    towards = np.array([*DIRECTIONS[test], 0.0])
     steps = np.arange(len(displacement) + 1.0)
     motion = np.concatenate([[0.0], displacement])[:, None] * towards
     fixed = topology(lattice, held_dofs(bottom, top), begin.law)

@@ -36,6 +36,13 @@ WRITTEN: dict[ConstantName, tuple[str, float]] = {
 """Unit in words of each constant, and how many of it a working unit is."""
 
 
+ELASTIC_NAMES: tuple[ConstantName, ...] = (
+    "axial_stiffness",
+    "shear_stiffness",
+    "bending_stiffness",
+)
+
+
 class Constants(NamedTuple):
     """Holds values of all constants of a specimen, wanted or not.
 

@@ -27,6 +27,7 @@ ConstantName = Literal[
     "contact_cutoff",
 ]
 
+TestKind = Literal["tension", "compression", "shear"]
 File = Annotated[str, Field(min_length=1)]
 Label = Annotated[str, StringConstraints(pattern=r"^\w+$")]
 
@@ -43,6 +44,23 @@ class ForceColumns(Section):
     force: str = "force"
 
 
+class RecordOptions(Section):
+    """Tells how a machine's record is cut before the fit.
+
+    Attributes:
+        branch: of each cycle that is taken.
+        drop_first: leaves out the first cycle.
+        zero: of displacement and force: as they are, or where each branch starts.
+        toe: force by which the slack is taken up; the displacement then counts from where the line
+            through that force and twice as much meets zero, and what is below is left out.
+    """
+
+    branch: Literal["all", "loading", "unloading"] = "loading"
+    drop_first: bool = False
+    zero: Literal["file", "start"] = "file"
+    toe: Force | None = None
+
+
 class ForceDisplacement(Section):
     """Force over displacement of a lattice whose bottom row is clamped and whose top row moves.
 
@@ -53,6 +71,7 @@ class ForceDisplacement(Section):
         lattice: the specimen.
         test: where the top row moves to; displacement and force count positive that way.
         columns: of the file.
+        record: where the file is a machine's record: how it is cut; without it all lines count.
         noise: standard deviation of the forces; estimated where it is not given.
         tare: whether the load cell's zero is unknown.
     """
@@ -62,8 +81,9 @@ class ForceDisplacement(Section):
     file: File | None = None
     virtual: VirtualForces | None = None
     lattice: Lattice
-    test: Literal["tension", "compression", "shear"]
+    test: TestKind
     columns: ForceColumns = ForceColumns()
+    record: RecordOptions | None = None
     noise: Force | None = None
     tare: bool = False
 

@@ -6,6 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from sim.core import Floats
 
 _LARGEST = 512 << 20
+_UNIT = re.compile(r"[\[(][^\])]+[\])]")
 _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
 
 
@@ -88,7 +90,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
 
     Args:
         path: a CSV whose heading names every column as `NAME (UNIT)`; lines above it are comments.
-        wanted: names and what they are.
+        wanted: names and what they are; the units may stand in the line below the names.
         least: number of lines below the heading that are needed.
 
     Raises:
@@ -98,6 +100,7 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
     import numpy as np
 
     cells = read_cells(path)
+    cells = cells._replace(rows=_with_units_below(cells.rows))
     heading, named = _heading(cells.rows, list(wanted), path)
     titles = {name: cells.rows[heading - 1][named[name]] for name in wanted}
     factors = [_factor(titles[name], wanted[name], name, path) for name in wanted]
@@ -108,14 +111,32 @@ def read_quantities(path: Path, wanted: Mapping[str, units.Dimension], least: in
         raise UserError(f"only {len(lines)} lines of numbers", file=path, remedy=remedy)
     found = np.empty((len(lines), len(wanted)))
     for place, (number, row) in enumerate(lines):
-        for column, at in enumerate(named[name] for name in wanted):
+        for column, (name, at) in enumerate((name, named[name]) for name in wanted):
             if (value := cells.number(row, at)) is None:
-                remedy = "mend or delete the line: all wanted columns need finite numbers"
-                text = row[at] if at < len(row) else ""
-                what = "not a finite number"
-                raise UserError(what, file=path, line=number, value=text, remedy=remedy)
+                raise UserError(
+                    "not a finite number",
+                    file=path,
+                    line=number,
+                    key=name,
+                    value=row[at] if at < len(row) else "",
+                    remedy="mend or delete the line: all wanted columns need finite numbers",
+                )
             found[place, column] = value
     return np.asarray(found * factors)
+
+
+def _with_units_below(rows: list[list[str]]) -> list[list[str]]:
+    """Joins names and the units that some testing machines write in the line below them."""
+    found = list(rows)
+    for line, (names, below) in enumerate(pairwise(rows)):
+        told = [_UNIT.fullmatch(cell) for cell in below if cell]
+        if told and all(told) and len(names) >= len(below):
+            blanks = [""] * (len(names) - len(below))
+            found[line] = [
+                f"{name} {unit}".strip() for name, unit in zip(names, below + blanks, strict=True)
+            ]
+            found[line + 1] = []
+    return found
 
 
 def _heading(rows: list[list[str]], wanted: list[str], path: Path) -> tuple[int, dict[str, int]]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from pipeline.calibration.inputs import Calibration
+from pipeline.calibration.inputs import Calibration, LoadCycles, Population
 from pipeline.problem import Problem
 from pipeline.problem.fields import Section, units
 from pipeline.problem.reading import JointFigure
@@ -51,7 +51,11 @@ def pages() -> dict[str, str]:
         File("A recording", Recording, "`experiments/STUDY/recordings/NAME.yaml`"),
         File("Points", DicExport, "In place of a video, for `python -m pipeline track points`"),
     )
-    calibrations = (File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),)
+    calibrations = (
+        File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),
+        File("Several samples", Population, "For `python -m pipeline validate samples`"),
+        File("Load cycles", LoadCycles, "For `python -m pipeline validate cycles`"),
+    )
     return {
         "keys.md": _page("problem files", studies),
         "keys_recordings.md": _page("recordings", recordings),

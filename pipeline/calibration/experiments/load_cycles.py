@@ -1,0 +1,158 @@
+"""Splits the record of a testing machine into branches, and measures loops and snaps."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from pipeline.calibration.inputs import RecordOptions
+from sim.core import Floats
+
+TURN = 0.2
+"""Part of the whole range by which the displacement goes back where a branch ends."""
+WHOLE = 0.5
+"""Part of the whole range that a branch at least goes over: others are approaches to a start."""
+PROMINENT = 0.2
+"""Height of a peak of the force over its whole range."""
+SUDDEN = 0.2
+"""Way of a snap over the branch's, at most."""
+
+
+class LoadBranch(NamedTuple):
+    """Holds one way of a cycle.
+
+    Attributes:
+        loading: whether the displacement rises.
+        displacement, force: (n,) in the order of time, mm and N.
+    """
+
+    loading: bool
+    displacement: Floats
+    force: Floats
+
+    @property
+    def work(self) -> float:
+        """Integrates the force over the displacement, N mm."""
+        return float(np.trapezoid(self.force, self.displacement))
+
+    def at(self, displacement: Floats) -> Floats:
+        """Interpolates the force (n,); NaN where the branch does not go."""
+        order = np.argsort(self.displacement, kind="stable")
+        known = self.displacement[order], self.force[order]
+        return np.interp(displacement, *known, left=np.nan, right=np.nan)
+
+
+class Snap(NamedTuple):
+    """Holds where a force falls off suddenly: displacement in mm and force in N of both ends."""
+
+    start: float
+    peak: float
+    end: float
+    rest: float
+
+
+def split_branches(displacement: Floats, force: Floats) -> list[LoadBranch]:
+    """Splits a record where the displacement turns by a good part of its range.
+
+    A shorter approach to the start, and a shorter way back at the end, are left out.
+    """
+    turns, reach = [0], TURN * float(np.ptp(displacement))
+    rising = None
+    for k, here in enumerate(displacement):
+        last = displacement[turns[-1]]
+        if rising is None:
+            if abs(here - last) > reach:
+                rising = here > last
+                way = displacement[: k + 1]
+                turns = [int(way.argmin() if rising else way.argmax()), k]
+        elif (here > last) == rising:
+            turns[-1] = k
+        elif abs(here - last) > reach:
+            turns.append(k)
+            rising = not rising
+    parts = [
+        (displacement[first : last + 1], force[first : last + 1]) for first, last in pairwise(turns)
+    ]
+    return [LoadBranch(bool(way[-1] > way[0]), way, load) for way, load in parts if len(way) > 1]
+
+
+def mean_branch(branches: Sequence[LoadBranch], points: int = 200) -> tuple[LoadBranch, Floats]:
+    """Averages branches of one direction over the range that all have; and their scatter (n,).
+
+    Raises:
+        ValueError: there is none.
+    """
+    low = max(float(each.displacement.min()) for each in branches)
+    high = min(float(each.displacement.max()) for each in branches)
+    at = np.linspace(low, high, points)
+    forces = np.array([each.at(at) for each in branches])
+    scatter = forces.std(axis=0, ddof=1) if len(forces) > 1 else np.full(points, np.nan)
+    return LoadBranch(branches[0].loading, at, forces.mean(axis=0)), scatter
+
+
+def loop_areas(branches: Sequence[LoadBranch]) -> Floats:
+    """Computes what each pair of a branch and the next one takes up (n_branches - 1,), N mm."""
+    pairs = pairwise(branches)
+    return np.array([abs(first.work + second.work) for first, second in pairs])
+
+
+def find_snaps(branch: LoadBranch) -> list[Snap]:
+    """Finds where the force's magnitude falls off suddenly, in the direction of the branch."""
+    turn = slice(None) if branch.loading else slice(None, None, -1)
+    way, force = branch.displacement[turn], branch.force[turn]
+    height = PROMINENT * float(np.ptp(force))
+    found = []
+    for sign in (1.0, -1.0):
+        peaks, _ = find_peaks(sign * force, prominence=height)
+        turns, _ = find_peaks(-sign * force)
+        for peak in peaks:
+            fallen = (turns > peak) & (sign * (force[peak] - force[turns]) > height)
+            end = turns[fallen][0] if fallen.any() else peak
+            if sign * force[peak] > 0 and 0 < abs(way[end] - way[peak]) < SUDDEN * np.ptp(way):
+                found.append(Snap(*map(float, (way[peak], force[peak], way[end], force[end]))))
+    return found
+
+
+def prepare_record(
+    displacement: Floats, force: Floats, options: RecordOptions
+) -> tuple[Floats, Floats]:
+    """Takes the wanted branches of a record, from the zero and the toe that are wanted.
+
+    Raises:
+        ValueError: nothing is left.
+    """
+    branches = split_branches(displacement, force)
+    if options.drop_first:
+        branches = branches[2:]
+    branches = [
+        each
+        for each in branches
+        if options.branch == "all" or each.loading == (options.branch == "loading")
+    ]
+    if not branches:
+        raise ValueError("no such branch is in the record")
+    parts = [_from_start(each, options) for each in branches]
+    way, load = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return way, load
+
+
+def _from_start(branch: LoadBranch, options: RecordOptions) -> tuple[Floats, Floats]:
+    way, load = branch.displacement, branch.force
+    turn = slice(None) if branch.loading else slice(None, None, -1)
+    way, load = way[turn], load[turn]
+    if options.zero == "start":
+        load = load - load[0]
+        way = way - way[0]
+    if options.toe is None:
+        return way, load
+    # the straight line between the toe's force and twice as much meets the axis at the start
+    felt = np.flatnonzero(load >= options.toe)
+    twice = np.flatnonzero(load >= 2 * options.toe)
+    if not len(twice) or felt[0] == twice[0]:
+        raise ValueError("the force does not rise to twice the toe's")
+    first, second = felt[0], twice[0]
+    rise = (load[second] - load[first]) / (way[second] - way[first])
+    start = way[first] - load[first] / rise
+    return (way - start)[first:], load[first:]

@@ -1,0 +1,71 @@
+"""Describes records of load cycles, and the path that a simulated unit is driven along."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from pipeline.calibration.inputs.description import File, ForceColumns, Label
+from pipeline.calibration.inputs.population import MeasurementSource
+from pipeline.problem.fields import Gap, Section
+from pipeline.problem.sections import Contact, Lattice, MaterialConstants
+
+Unit = Annotated[int, Field(ge=0, strict=True)]
+
+
+class PathDrive(Section):
+    """Moves one unit along a path without turning it, while another one is held.
+
+    Attributes:
+        held: number of the unit that is clamped.
+        driven: number of the one that moves.
+        file: a CSV with columns ux, uy (of the driven unit, from rest) and approach (of the
+            machine's clamps), each with its unit.
+    """
+
+    held: Unit
+    driven: Unit
+    file: File
+
+
+class CycleRecord(Section):
+    """The record of a testing machine over several cycles.
+
+    Attributes:
+        name: of the record.
+        title: in words.
+        file: a CSV with a heading.
+        columns: of the file.
+        first: whether the first cycle counts as well; by default it is left out.
+        material: of the simulation by the drive; without it there is none.
+        contact: likewise.
+        play: of the clamps: by so much they move while they transmit no force.
+    """
+
+    name: Label
+    title: str
+    file: File
+    columns: ForceColumns = ForceColumns()
+    first: Literal["dropped", "kept"] = "dropped"
+    material: MaterialConstants | None = None
+    contact: Contact | None = None
+    play: Gap = 0.0
+
+
+class LoadCycles(Section):
+    """Load cycles of one make of specimen.
+
+    Attributes:
+        title: one line about them.
+        doc: more lines.
+        source: who measured.
+        lattice: of the specimens.
+        drive: of those that are simulated.
+        records: all of them.
+    """
+
+    title: str = ""
+    doc: str = ""
+    source: MeasurementSource
+    lattice: Lattice
+    drive: PathDrive
+    records: Annotated[tuple[CycleRecord, ...], Field(min_length=1)]

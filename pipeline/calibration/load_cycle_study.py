@@ -1,0 +1,179 @@
+"""Finds snaps and loops of measured load cycles, beside equilibria along a drive's path."""
+
+from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
+import xarray as xr
+
+from pipeline.calibration.experiments import LoadBranch, Snap, load_cycles
+from pipeline.calibration.inputs import Constants, CycleRecord, LoadCycles
+from pipeline.problem.fields import csv_columns, units
+from pipeline.runtime import UserError
+from sim.core import Floats
+from sim.energy import observe, topology
+from sim.quasistatics import StaticSolver
+from sim.solvers import PrescribedMotion, TimeSeries, held_dofs, solve_case
+from sim.structure import ConcreteParameters, Material, Parameters, parameters, shape
+
+
+class CyclePath(NamedTuple):
+    """Holds equilibria over a whole cycle.
+
+    Attributes:
+        approach: (n,) of the clamps, mm, there and back.
+        tension: (n,) N: the slope of the energy over the approach, negative in compression.
+        turn: number of the farthest equilibrium.
+        jumps: number of times that the structure jumped.
+    """
+
+    approach: Floats
+    tension: Floats
+    turn: int
+    jumps: int
+
+    def with_play(self, play: float) -> Self:
+        """Shifts the clamps by half their play, against the force that they transmit."""
+        return self._replace(approach=self.approach - np.sign(self.tension) * play / 2)
+
+
+def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CyclePath:
+    """Follows the equilibria of a specimen as its driven unit goes along the path and back.
+
+    Raises:
+        UserError: the path cannot be used.
+        SimulationError: there is no equilibrium.
+    """
+    assert record.material is not None
+    lattice = asked.lattice.network()
+    wanted = {"ux": units.LENGTH, "uy": units.LENGTH, "approach": units.LENGTH}
+    path = csv_columns.read_quantities(folder / asked.drive.file, wanted, 3)
+    if not (np.diff(path[:, 2]) > 0).all():
+        remedy = "give a path along which the clamps come nearer with every line"
+        raise UserError(
+            "the approach does not rise", file=folder / asked.drive.file, key="approach",
+            remedy=remedy,
+        )  # fmt: skip
+    begin = Constants(record.material, record.contact, asked.lattice.spacing)
+    axial, shear, bending, translation, rotation = begin.numbers
+    stiffness = 0.0 if record.contact is None else record.contact.stiffness
+    made = Material(
+        record.material.density, axial, shear, bending, stiffness, translation, rotation
+    )
+    values: ConcreteParameters = Parameters(
+        *map(np.asarray, parameters(lattice, shape(lattice, lattice.vertices), made))
+    )
+    units_held = (np.array([asked.drive.held]), np.array([asked.drive.driven]))
+    fixed = topology(lattice, held_dofs(*units_held), begin.law)
+    there_and_back = np.concatenate([path[1:], path[-2::-1]])
+    motion = np.concatenate([path[:1], there_and_back])
+    motion = np.column_stack([motion[:, :2], np.zeros(len(motion))])
+    steps = np.arange(len(motion), dtype=float)
+    drive = PrescribedMotion(units_held[1], TimeSeries(steps, motion))
+    state, _, found = solve_case(StaticSolver(fixed, steps[1:]), values, drive)
+    force = observe(fixed, values, state.reshape(len(state), -1, 3)).force_on(units_held[1])
+    direction = np.gradient(path[:, :2], path[:, 2], axis=0, edge_order=2)
+    along = np.concatenate([direction[1:], direction[-2::-1]])
+    tension = -(force * along).sum(axis=1)
+    return CyclePath(there_and_back[:, 2], tension, len(path) - 2, int(found.jumped.sum()))
+
+
+class MeasuredCycle(NamedTuple):
+    """Holds the mean ways of a record's cycles, and what they tell."""
+
+    closing: LoadBranch
+    opening: LoadBranch
+    scatter: tuple[Floats, Floats]
+    snaps: tuple[list[Snap], list[Snap]]
+    loops: Floats
+
+
+def measure_cycle(record: CycleRecord, folder: Path) -> MeasuredCycle:
+    """Finds snaps and loops in a record.
+
+    Raises:
+        UserError: the file cannot be used, or holds no whole cycle.
+    """
+    path = folder / record.file
+    wanted = {record.columns.displacement: units.LENGTH, record.columns.force: units.FORCE}
+    branches = load_cycles.split_branches(*csv_columns.read_quantities(path, wanted, 10).T)
+    reach = max((np.ptp(each.displacement) for each in branches), default=0.0)
+    full = [each for each in branches if np.ptp(each.displacement) > load_cycles.WHOLE * reach]
+    kept = full[2:] if record.first == "dropped" and len(full) > 3 else full
+    ways = [[each for each in kept if each.loading == rises] for rises in (True, False)]
+    if not all(ways):
+        remedy = "give a record that goes there and back at least once"
+        raise UserError(
+            "no whole cycle is in the record",
+            file=path,
+            key=record.columns.displacement,
+            remedy=remedy,
+        )
+    (closing, scatter), (opening, other) = (load_cycles.mean_branch(each) for each in ways)
+    snaps = load_cycles.find_snaps(closing), load_cycles.find_snaps(opening)
+    return MeasuredCycle(closing, opening, (scatter, other), snaps, load_cycles.loop_areas(full))
+
+
+def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
+    """Assembles the dataset of all records and of the equilibria beside them.
+
+    Raises:
+        UserError: a file cannot be used.
+        SimulationError: there is no equilibrium.
+    """
+    curves: list[tuple[int, int, Floats, Floats, Floats]] = []
+    snaps: list[tuple[int, int, Snap]] = []
+    loops: list[tuple[int, float]] = []
+    misfit, jumps = np.full((2, len(asked.records)), np.nan)
+    for k, record in enumerate(asked.records):
+        seen = measure_cycle(record, folder)
+        for role, branch in enumerate((seen.closing, seen.opening)):
+            curves.append((k, role, branch.displacement, branch.force, seen.scatter[role]))
+            snaps += [(k, role, each) for each in seen.snaps[role]]
+        loops += [(k, float(area)) for area in seen.loops]
+        if record.material is None:
+            continue
+        cycle = follow_cycle(asked, record, folder)
+        shown, jumps[k] = cycle.with_play(record.play), cycle.jumps
+        misfit[k] = _misfit(shown, seen)
+        for role, part in ((2, slice(cycle.turn + 1)), (3, slice(cycle.turn, None))):
+            none = np.full(len(shown.tension[part]), np.nan)
+            curves.append((k, role, shown.approach[part], shown.tension[part], none))
+    lengths = [len(each[2]) for each in curves]
+    points = {
+        "record_of_point": np.repeat([each[0] for each in curves], lengths),
+        "role": np.repeat([each[1] for each in curves], lengths).astype(np.int8),
+        "displacement": np.concatenate([each[2] for each in curves]),
+        "force": np.concatenate([each[3] for each in curves]),
+        "scatter": np.concatenate([each[4] for each in curves]),
+    }
+    ends = np.array([each[2] for each in snaps]).reshape(-1, 4)
+    variables = {
+        **{name: ("point", values) for name, values in points.items()},
+        "record_of_snap": ("snap", np.array([each[0] for each in snaps], int)),
+        "snap_role": ("snap", np.array([each[1] for each in snaps], np.int8)),
+        "snap_start": ("snap", ends[:, 0]),
+        "snap_peak": ("snap", ends[:, 1]),
+        "snap_end": ("snap", ends[:, 2]),
+        "snap_rest": ("snap", ends[:, 3]),
+        "record_of_loop": ("loop", np.array([each[0] for each in loops], int)),
+        "loop_area": ("loop", np.array([each[1] for each in loops])),
+        "misfit": ("record", misfit),
+        "jumps": ("record", jumps),
+        "play": ("record", np.array([record.play for record in asked.records])),
+    }
+    labels = {
+        "record": [record.name for record in asked.records],
+        "title": ("record", [record.title for record in asked.records]),
+    }
+    return xr.Dataset(variables, labels)
+
+
+def _misfit(cycle: CyclePath, seen: MeasuredCycle) -> float:
+    """Computes the root mean square, N, of the simulated less the measured ways, both averaged."""
+    there = LoadBranch(True, cycle.approach[: cycle.turn + 1], cycle.tension[: cycle.turn + 1])
+    back = LoadBranch(False, cycle.approach[cycle.turn :], cycle.tension[cycle.turn :])
+    at = seen.closing.displacement
+    ours = (there.at(at) + back.at(at)) / 2
+    rest = ours - (seen.closing.force + seen.opening.at(at)) / 2
+    return float(np.sqrt(np.nanmean(rest**2)))

@@ -1,0 +1,1 @@
+from .validation_study import validate_population as validate_population

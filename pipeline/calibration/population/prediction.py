@@ -1,0 +1,128 @@
+"""Predicts a curve with the band that holds 95 % of new curves as a whole."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from pipeline.calibration.population.curve_emulator import CurveEmulator, log_force
+from pipeline.calibration.population.hierarchical_model import Draws, correlation
+from sim.core import Floats
+
+LEVEL = 0.95
+REPEATS = 8
+"""New samples for every draw from the posterior."""
+_JITTER = 1e-10
+
+
+class PredictionBand(NamedTuple):
+    """Holds the logarithms of forces (n,): median, and ends between which 95 % of curves lie.
+
+    The ends are so far from the median, in units of the pointwise spread, that 95 % of all curves
+    lie between them over their whole length: points of a curve go together, so curves count.
+    """
+
+    median: Floats
+    low: Floats
+    high: Floats
+
+    @property
+    def half_width(self) -> float:
+        """Averages half the distance of the ends."""
+        return float((self.high - self.low).mean() / 2)
+
+    def holds(self, log_force: Floats) -> Floats:
+        """Tells of curves (..., n) whether each lies inside as a whole."""
+        return np.asarray(((log_force >= self.low) & (log_force <= self.high)).all(axis=-1))
+
+
+class PosedCurve(NamedTuple):
+    """Holds where a curve is to be predicted, and its emulator there.
+
+    Attributes:
+        displacement: (n,) mm.
+        place: (n,) over the largest one.
+        weights: (n, ...) of the emulator.
+        ratios: (2,) its centre.
+        kind: number of its kind of test among those fitted.
+    """
+
+    displacement: Floats
+    place: Floats
+    weights: Floats
+    ratios: Floats
+    kind: int
+
+    def predict(self, logs: Floats) -> Floats:
+        """Predicts (..., n) logarithms of forces at the constants (..., 3)."""
+        base = np.log(self.displacement)
+        return np.asarray(log_force(self.weights, self.ratios, base, logs))
+
+
+def pose_curve(emulator: CurveEmulator, displacement: Floats, kind: int) -> PosedCurve:
+    """Poses a curve at displacements in mm."""
+    place = displacement / emulator.displacement[-1]
+    return PosedCurve(displacement, place, emulator.weights(displacement), emulator.centre, kind)
+
+
+def new_curves(
+    curve: PosedCurve,
+    draws: Draws,
+    random: np.random.Generator,
+    *,
+    sample: int | None = None,
+    repeats: int = REPEATS,
+) -> Floats:
+    """Draws curves of a new sample, or of a known one, as they would be read.
+
+    Args:
+        curve: the curve.
+        draws: from one posterior, each (n, ...).
+        random: where the rest is drawn from.
+        sample: a sample of the fit, in place of a new one.
+        repeats: curves for every draw.
+
+    Returns:
+        (n * repeats, n_points) logarithms of forces.
+    """
+    repeated = {name: np.repeat(draws[name], repeats, axis=0) for name in _DRAWN}
+    logs = repeated["mean"] + repeated["spread"] * random.normal(size=repeated["mean"].shape)
+    if sample is not None:
+        logs = repeated["constants"][:, sample]
+    root = np.linalg.cholesky(correlation(curve.place) + _JITTER * np.eye(len(curve.place)))
+    count = len(logs)
+    missed, mounted, read = random.normal(size=(3, count, len(curve.place)))
+    scale = repeated["discrepancy"][:, None], repeated["mounting"], repeated["reading"]
+    common = scale[0] * (missed @ root.T) + scale[1][:, [curve.kind]] * (mounted @ root.T)
+    return np.asarray(curve.predict(logs) + common + scale[2][:, [curve.kind]] * read)
+
+
+_DRAWN = ("mean", "spread", "constants", "discrepancy", "mounting", "reading")
+
+
+def find_band(curves: Floats) -> PredictionBand:
+    """Finds the band of drawn curves (n, n_points)."""
+    below, median, above = np.quantile(curves, [0.16, 0.5, 0.84], axis=0)
+    unit = (above - below) / 2
+    reach = np.quantile((np.abs(curves - median) / unit).max(axis=1), LEVEL)
+    return PredictionBand(median, median - reach * unit, median + reach * unit)
+
+
+def student_band(curve: PosedCurve, constants: Floats) -> PredictionBand:
+    """Finds Student's interval of a new sample from so many samples' own predictions.
+
+    Args:
+        curve: the curve.
+        constants: (n_samples, 3) logarithms.
+    """
+    each = curve.predict(constants)
+    count = len(each)
+    quantile = student.ppf((1 + LEVEL) / 2, count - 1) * np.sqrt(1 + 1 / count)
+    middle, reach = each.mean(axis=0), quantile * each.std(axis=0, ddof=1)
+    return PredictionBand(middle, middle - reach, middle + reach)
+
+
+def medians(draws: Draws) -> Mapping[str, Floats]:
+    """Takes medians over the draws of one posterior."""
+    return {name: np.median(draws[name], axis=0) for name in _DRAWN}

@@ -1,0 +1,51 @@
+"""Stage: predicts a measured test from tests of other samples; measures load cycles."""
+
+import argparse
+import logging
+
+from pipeline import datasets
+from pipeline.calibration import simulation_fault, study_cycles
+from pipeline.calibration.inputs import LoadCycles, Population
+from pipeline.calibration.population import validate_population
+from pipeline.datasets import provenance
+from pipeline.problem.reading import load_section
+from sim.core import SimulationError
+
+LOG = logging.getLogger(__name__)
+
+
+def work(args: argparse.Namespace) -> None:
+    """Makes the part that a command line names: samples or cycles.
+
+    Raises:
+        UserError: a fault of the files.
+    """
+    try:
+        {"samples": _samples, "cycles": _cycles}[args.command](args)
+    except SimulationError as error:
+        raise simulation_fault(error, args.file) from error
+
+
+def _samples(args: argparse.Namespace) -> None:
+    asked, folder = load_section(args.file, Population), args.file.parent
+    made = validate_population(asked, folder)
+    parents = {each.name: folder / each.file for each in (*asked.data, asked.predict)}
+    origin = provenance.of_recording(
+        asked.model_dump_json(), parents, synthetic=False, role="population"
+    )
+    datasets.write(made, args.out, "population", origin)
+    LOG.info(
+        "the measured curve lies %s the band of a new sample",
+        "inside" if made["inside"].item() else "outside",
+    )
+
+
+def _cycles(args: argparse.Namespace) -> None:
+    asked, folder = load_section(args.file, LoadCycles), args.file.parent
+    made = study_cycles(asked, folder)
+    parents = {each.name: folder / each.file for each in asked.records}
+    origin = provenance.of_recording(
+        asked.model_dump_json(), parents, synthetic=False, role="load_cycles"
+    )
+    datasets.write(made, args.out, "load_cycles", origin)
+    LOG.info("%d snaps in %d records", made.sizes["snap"], made.sizes["record"])

@@ -1,0 +1,1 @@
+"""Draws measured specimens beside their prediction."""

@@ -1,0 +1,139 @@
+"""Records of a testing machine are split into branches; snaps, loops and equilibria are found."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.calibration import study_cycles
+from pipeline.calibration.experiments import force_displacement, load_cycles
+from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions
+from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
+from pipeline.problem.reading import load_section
+from pipeline.runtime import ROOT, UserError
+from tests.pipeline.calibration.specimens import LATTICE
+
+FOLDER = ROOT / "experiments/validation"
+INSTRON = FOLDER.parents[1] / "tests/data/calibration/instron.csv"
+
+
+def cycles(count: int = 3, slack: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Goes to 2 mm and back, at 3 N/mm and 2 N/mm, the first cycle 10 % stiffer, after a slack."""
+    way = np.concatenate([np.linspace(0, 2, 41), np.linspace(2, 0, 41)[1:]] * count)
+    rises = np.tile(np.r_[np.ones(41, bool), np.zeros(40, bool)], count)
+    stiff = np.where(rises, 3.0, 2.0)
+    stiff[:81] *= 1.1
+    return way, stiff * np.maximum(way - slack, 0.0)
+
+
+def test_branches_and_loops_of_a_record() -> None:
+    branches = load_cycles.split_branches(*cycles())
+    assert [each.loading for each in branches] == [True, False] * 3
+    np.testing.assert_allclose(branches[2].work, 6.0, rtol=0.02)
+    np.testing.assert_allclose(load_cycles.loop_areas(branches)[2::2], 2.0, rtol=0.05)
+
+
+def test_small_turns_of_a_noisy_displacement_end_no_branch() -> None:
+    way, force = cycles(2)
+    shaken = way + np.random.default_rng(0).normal(0, 0.02, len(way))
+    assert len(load_cycles.split_branches(shaken, force)) == 4
+
+
+@pytest.mark.parametrize(("branch", "stiffness"), [("loading", 3.0), ("unloading", 2.0)])
+def test_a_record_is_cut_as_wanted(branch: str, stiffness: float) -> None:
+    options = RecordOptions(branch=branch, drop_first=True)  # type: ignore[arg-type]
+    way, force = load_cycles.prepare_record(*cycles(), options)
+    inner = (way > 0.1) & (way < 1.9)  # a turn belongs to both branches
+    np.testing.assert_allclose(force[inner], stiffness * way[inner], rtol=1e-9)
+
+
+def test_slack_is_taken_up_by_the_toe() -> None:
+    options = RecordOptions.model_validate({"drop_first": True, "toe": "0.6 N"})
+    way, force = load_cycles.prepare_record(*cycles(slack=0.3), options)
+    np.testing.assert_allclose(force, 3.0 * way, atol=1e-9)
+
+
+def test_zeros_of_the_machine_are_taken_from_the_start() -> None:
+    way, force = cycles(2)
+    options = RecordOptions(zero="start", drop_first=True)
+    found = load_cycles.prepare_record(way + 0.7, force - 0.2, options)
+    np.testing.assert_allclose(found[1], 3.0 * found[0], atol=1e-9)
+
+
+def test_a_machines_file_is_read_with_its_units_below_the_names() -> None:
+    record = {"drop_first": True, "zero": "start"}
+    asked = {"columns": {"displacement": "Extension", "force": "Load"}, "record": record}
+    given = {"kind": "force_displacement", "name": "c", "test": "compression", "lattice": LATTICE}
+    read = ForceDisplacement.model_validate(given | asked | {"file": INSTRON.name})
+    way, force = force_displacement.read(read, INSTRON.parent)
+    np.testing.assert_allclose(force, 3.0 * way, atol=1e-3)
+
+
+def test_a_record_without_the_branch_is_refused(tmp_path: Path) -> None:
+    lines = "\n".join(f"{k},{k}" for k in range(1, 20))
+    (tmp_path / "one.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
+    record = {"branch": "unloading"}
+    given = {"kind": "force_displacement", "name": "c", "test": "compression", "lattice": LATTICE}
+    asked = ForceDisplacement.model_validate(given | {"record": record, "file": "one.csv"})
+    with pytest.raises(UserError, match="no such branch") as caught:
+        force_displacement.read(asked, tmp_path)
+    assert caught.value.file == str(tmp_path / "one.csv")
+    assert caught.value.key == "record"
+
+
+@pytest.fixture(scope="module")
+def morpher() -> LoadCycles:
+    return load_section(FOLDER / "morpher.yaml", LoadCycles)
+
+
+def test_snaps_and_loops_of_the_morpher(morpher: LoadCycles) -> None:
+    """By the table that came with the files, which was made by other code."""
+    seen = measure_cycle(morpher.records[0], FOLDER)
+    (nearing,), (parting,) = seen.snaps
+    np.testing.assert_allclose(nearing, (4.381, -6.683, 5.047, -0.07), atol=0.06)
+    np.testing.assert_allclose(parting, (1.85, 6.72, 1.32, -0.01), atol=0.06)
+    np.testing.assert_allclose((seen.loops[0], seen.loops[-1]), (47.47, 42.95), rtol=0.01)
+    assert measure_cycle(morpher.records[1], FOLDER).snaps == ([], [])
+
+
+@pytest.mark.parametrize(
+    ("number", "approach", "force"),
+    [(0, (1, 3, 5, 7, 8), (8.16, 2.71, -4.68, -2.91, -0.89)), (1, (1, 3, 5), (1.33, 1.85, 2.37))],
+)
+def test_equilibria_along_the_arc(
+    morpher: LoadCycles, number: int, approach: tuple[float, ...], force: tuple[float, ...]
+) -> None:
+    """Within 1 % of the largest force of those that came with the files."""
+    found = follow_cycle(morpher, morpher.records[number], FOLDER)
+    way = slice(found.turn + 1)
+    np.testing.assert_allclose(
+        -np.interp(approach, found.approach[way], found.tension[way]),
+        force,
+        atol=0.01 * max(force),
+    )
+
+
+def test_play_opens_a_gap_without_force(morpher: LoadCycles) -> None:
+    found = follow_cycle(morpher, morpher.records[0], FOLDER)
+    moved = found.with_play(0.4)
+    np.testing.assert_allclose(np.abs(moved.approach - found.approach), 0.2)
+    assert (np.sign(moved.approach - found.approach) == -np.sign(found.tension)).all()
+
+
+def test_a_path_that_goes_back_is_refused(morpher: LoadCycles, tmp_path: Path) -> None:
+    lines = ["ux (mm),uy (mm),approach (mm)", "0,0,0", "1,0,1", "2,0,0.5", "3,0,2"]
+    (tmp_path / "arc.csv").write_text("\n".join(lines))
+    drive = morpher.drive.model_copy(update={"file": "arc.csv"})
+    wrong = morpher.model_copy(update={"drive": drive})
+    with pytest.raises(UserError, match="the approach does not rise") as caught:
+        follow_cycle(wrong, morpher.records[0], tmp_path)
+    assert caught.value.key == "approach"
+
+
+def test_a_record_without_a_cycle_is_refused(morpher: LoadCycles, tmp_path: Path) -> None:
+    lines = "\n".join(f"{k},{k}" for k in range(1, 30))
+    (tmp_path / "one.csv").write_text(f"approach (mm),tension (N)\n{lines}\n")
+    single = morpher.records[2].model_copy(update={"file": "one.csv"})
+    with pytest.raises(UserError, match="no whole cycle") as caught:
+        study_cycles(morpher.model_copy(update={"records": (single,)}), tmp_path)
+    assert caught.value.file == str(tmp_path / "one.csv")

@@ -1,0 +1,178 @@
+"""Several samples are fitted as a population, and the band of a new one is honest."""
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from pipeline.calibration.experiments import force_displacement
+from pipeline.calibration.inputs import ELASTIC_NAMES, Constants, Population
+from pipeline.calibration.population import (
+    curve_emulator,
+    hierarchical_model,
+    missing_physics,
+    prediction,
+    sample_readings,
+)
+from pipeline.calibration.population.curve_emulator import CurveEmulator
+from pipeline.calibration.population.sample_readings import SampleCurve
+from pipeline.problem.reading import load_section
+from pipeline.runtime import ROOT, UserError
+
+FILE = ROOT / "experiments/validation/hinges.yaml"
+SAMPLES = ("s1", "s2")
+
+
+@pytest.fixture(scope="module")
+def asked() -> Population:
+    return load_section(FILE, Population)
+
+
+@pytest.fixture(scope="module")
+def centre(asked: Population) -> Constants:
+    return Constants(asked.material, None, asked.spacing)
+
+
+@pytest.fixture(scope="module")
+def emulator(asked: Population, centre: Constants) -> CurveEmulator:
+    return curve_emulator.emulate(asked.lattice, "compression", centre, 3.75)
+
+
+def curves(*factors: float) -> list[SampleCurve]:
+    """Made of a square root, times a factor each, and their mean."""
+    way = np.linspace(0.0, 3.75, 76)
+    own = [
+        SampleCurve(f"compression_{name}", "compression", (name,), way, factor * np.sqrt(way))
+        for name, factor in zip(SAMPLES, factors, strict=True)
+    ]
+    mean = np.mean(factors) * np.sqrt(way)
+    return [*own, SampleCurve("compression_s1_s2", "compression", SAMPLES, way, mean)]
+
+
+def test_curves_are_those_of_the_simulator(
+    asked: Population, centre: Constants, emulator: CurveEmulator
+) -> None:
+    assert emulator.error < 5e-4
+    at = np.array([0.4, 1.7, 3.6])
+    logs = centre.logs(ELASTIC_NAMES) + np.array([0.6, -0.2, 0.3])
+    constants = centre.at(ELASTIC_NAMES, logs)
+    posed = force_displacement.pose_simulation(asked.lattice, "compression", centre, at)
+    weights, base = emulator.weights(at), np.log(at)
+
+    def total(place: jax.Array) -> jax.Array:
+        return jnp.exp(curve_emulator.log_force(weights, emulator.centre, base, place)).sum()
+
+    np.testing.assert_allclose(total(jnp.asarray(logs)), posed.predict(constants).sum(), rtol=5e-4)
+    by_adjoint = posed.pulled_back(constants, np.ones(3))[:3] * np.exp(logs)
+    np.testing.assert_allclose(jax.grad(total)(jnp.asarray(logs)), by_adjoint, atol=2e-3)
+
+
+def test_readings_are_thinned_and_shared(emulator: CurveEmulator) -> None:
+    found, names = sample_readings.stack_readings(
+        curves(1.0, 1.2), {"compression": emulator}, SAMPLES, 5
+    )
+    assert found.used.shape == (1, 15)
+    assert names[0][::5] == ["compression_s1", "compression_s2", "compression_s1_s2"]
+    np.testing.assert_allclose(
+        np.asarray(found.shares)[0, ::5], np.array([[1, 0], [0, 1], [0.5, 0.5]])
+    )
+    np.testing.assert_allclose(found.place[0, :5], np.linspace(0.2, 1, 5), atol=0.05)
+    ratio = np.exp(np.asarray(found.log_force)[0, 5:10] - np.asarray(found.log_force)[0, :5])
+    np.testing.assert_allclose(ratio, 1.2)
+
+
+def test_a_reading_that_is_left_out_tells_nothing(emulator: CurveEmulator) -> None:
+    found, _ = sample_readings.stack_readings(
+        curves(1.0, 1.2), {"compression": emulator}, SAMPLES, 5
+    )
+    some = found._replace(used=found.used * (np.arange(15) < 10))
+    made = np.asarray(some.covariance(0.1, np.array([0.05]), np.array([0.01])))[0]
+    np.testing.assert_allclose(made[10:], np.eye(15)[10:], atol=1e-6)
+    # d of all samples goes together, and with it what a mounting changes in one
+    np.testing.assert_allclose(made[0, 0], 0.1**2 + 0.05**2 + 0.01**2, rtol=1e-3)
+    np.testing.assert_allclose(made[0, 5], 0.1**2, rtol=1e-3)
+
+
+def test_the_band_holds_whole_curves() -> None:
+    random = np.random.default_rng(0)
+    drawn = 0.1 * random.standard_t(3, size=(20_000, 1)) + 0.02 * random.normal(size=(20_000, 12))
+    band = prediction.find_band(drawn)
+    assert abs(band.holds(drawn).mean() - 0.95) < 1e-3
+    assert ((drawn >= band.low) & (drawn <= band.high)).mean() > 0.955
+
+
+def test_students_interval_of_a_few_samples(emulator: CurveEmulator) -> None:
+    curve = prediction.pose_curve(emulator, np.array([1.0, 2.0]), 0)
+    logs = np.log([120.0, 1.2, 1.5]) + np.array([-0.1, 0.0, 0.1])[:, None]
+    band = prediction.student_band(curve, logs)
+    reach = student.ppf(0.975, 2) * 0.1 * np.sqrt(4 / 3)
+    np.testing.assert_allclose(band.half_width, reach)
+    np.testing.assert_allclose(band.median, curve.predict(logs[1]))
+
+
+def test_a_known_sample_is_predicted_better_than_a_new_one(emulator: CurveEmulator) -> None:
+    count = 2000
+    logs = np.log([120.0, 1.2, 1.5])
+    draws = {
+        "mean": np.tile(logs, (count, 1)),
+        "spread": np.full((count, 3), 0.1),
+        "constants": np.tile(logs, (count, 2, 1)),
+        "discrepancy": np.full(count, 0.02),
+        "mounting": np.full((count, 1), 0.01),
+        "reading": np.full((count, 1), 0.001),
+    }
+    curve = prediction.pose_curve(emulator, np.array([1.0, 2.0, 3.0]), 0)
+    random = np.random.default_rng(0)
+    new = prediction.new_curves(curve, draws, random, repeats=1)
+    known = prediction.new_curves(curve, draws, random, sample=0, repeats=1)
+    np.testing.assert_allclose(known.std(axis=0), np.hypot(0.02, 0.01), rtol=0.1)
+    assert (new.std(axis=0) > 3 * known.std(axis=0)).all()
+
+
+def test_what_is_missing_is_found(asked: Population, centre: Constants) -> None:
+    path = missing_physics.follow_test(asked.lattice, "shear", centre, 3.75)
+    late = next(each for each in missing_physics.MECHANISMS if "late" in each.name)
+    at = np.linspace(0.5, 3.75, 10)
+    truth = 2 * np.interp(at, path.displacement[1:], late.change(path)[1:] / path.force[1:])
+    none = missing_physics.FittedSlopes([np.zeros((5, 3))], np.zeros((10, 3)))
+    ranked = missing_physics.rank_mechanisms([path], path, none, np.ones(3), at, truth)
+    assert ranked[0].name == late.name
+    np.testing.assert_allclose((ranked[0].explained, ranked[0].wanted), (0.5, 2.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("samples: [other]", "samples: [s1]", "the sample s1 is part of the fit"),
+        ("samples: [s2], file: hinge_statics/shear_s2", "samples: [s1], file: x", "one test"),
+        ("test: shear, samples: [s1]", "test: torsion, samples: [s1]", "torsion"),
+    ],
+)
+def test_slips_in_the_file(old: str, new: str, told: str, tmp_path: Path) -> None:
+    text = FILE.read_text().replace("hinge_statics/r", f"{FILE.parent}/hinge_statics/r")
+    (tmp_path / "hinges.yaml").write_text(text.replace(old, new))
+    with pytest.raises(UserError) as caught:
+        load_section(tmp_path / "hinges.yaml", Population)
+    assert told in str(caught.value)
+    assert caught.value.remedy
+
+
+def test_a_force_of_the_wrong_sign_is_refused(asked: Population, tmp_path: Path) -> None:
+    lines = "\n".join(f"{k},{-k}" for k in range(20))
+    (tmp_path / "pull.csv").write_text(f"displacement (mm),force (N)\n{lines}\n")
+    wrong = asked.data[0].model_copy(update={"file": "pull.csv"})
+    with pytest.raises(UserError, match="not above zero") as caught:
+        sample_readings.read_curve(wrong, tmp_path)
+    assert caught.value.file == str(tmp_path / "pull.csv")
+    assert caught.value.key == "force"
+
+
+def test_priors_are_doubled_in_their_logarithms(asked: Population) -> None:
+    plain = hierarchical_model.prior_numbers(asked.priors, np.zeros(3))
+    doubled = hierarchical_model.prior_numbers(asked.priors.doubled, np.zeros(3))
+    np.testing.assert_allclose(doubled.constants, 2 * np.asarray(plain.constants))
+    np.testing.assert_allclose(doubled.wide, 2 * np.asarray(plain.wide))
+    np.testing.assert_allclose(doubled.medians, plain.medians)

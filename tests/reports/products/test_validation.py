@@ -1,0 +1,83 @@
+"""The page of the measured specimens tells who measured, and judges in numbers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets
+from pipeline.calibration import study_cycles
+from pipeline.calibration.inputs import LoadCycles, Population
+from pipeline.datasets import provenance
+from pipeline.datasets.tables import TABLES
+from pipeline.problem.reading import load_section
+from pipeline.runtime import ROOT
+from reports.__main__ import main
+from reports.products.validation.validation_report import relative_error
+
+FOLDER = ROOT / "experiments/validation"
+SIZES = {"quantile": 3, "sample": 3, "test": 3, "point": 6, "predicted": 4}
+NAMES = {
+    "constant": ["axial_stiffness", "shear_stiffness", "bending_stiffness"],
+    "with_constant": ["axial_stiffness", "shear_stiffness", "bending_stiffness"],
+    "sample": ["s1", "s2", "s3"],
+    "test": ["tension", "compression", "shear"],
+    "curve": [f"{test}_s{k}" for test in ("tension", "compression", "shear") for k in (1, 2)],
+    "left_out_curve": ["shear_s1", "shear_s2"],
+    "without": ["s1", "shear"],
+}
+
+
+def made_up() -> xr.Dataset:
+    """Numbers of no meaning in the form of a population, but for the prediction."""
+    random = np.random.default_rng(0)
+    variables = {}
+    for name, variable in TABLES["population"].items():
+        shape = [SIZES.get(dim, len(NAMES.get(dim, "ab"))) for dim in variable.dims]
+        values = random.uniform(0.5, 1.5, shape)
+        if variable.dtype == "str":
+            values = np.array(NAMES.get(name, ["one", "two"]))
+        elif variable.dtype != "float64":
+            values = np.ones(shape, variable.dtype)
+        variables[name] = (variable.dims, values)
+    variables["displacement"] = (("predicted",), np.arange(1.0, 5.0))
+    variables["factor"] = (("factor",), np.array([0.5, 2.0]))
+    force = np.array([4.0, 8.0, 12.0, 16.0])
+    for name, factor in (("measured", 1.0), ("median", 0.9), ("low", 0.6), ("high", 1.4)):
+        variables[name] = (("predicted",), factor * force)
+    return xr.Dataset(variables).set_coords(["constant", "sample", "test"])
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> str:
+    folder = tmp_path_factory.mktemp("validation")
+    for name, kind, made, asked in (
+        ("hinges", "population", made_up(), load_section(FOLDER / "hinges.yaml", Population)),
+        ("morpher", "load_cycles", None, load_section(FOLDER / "morpher.yaml", LoadCycles)),
+    ):
+        data = study_cycles(asked, FOLDER) if isinstance(asked, LoadCycles) else made
+        told = asked.model_dump_json()
+        origin = provenance.of_recording(told, {}, synthetic=False, role=kind)
+        datasets.write(data, folder / f"{name}.nc", kind, origin)  # type: ignore[arg-type]
+    words = ["--samples", folder / "hinges.nc", "--cycles", folder / "morpher.nc"]
+    assert main(["validation", *map(str, words), "--out-dir", str(folder), "--quiet"]) == 0
+    assert (Path(folder) / "prediction.pdf").stat().st_size > 10_000
+    return (folder / "index.html").read_text()
+
+
+def test_it_says_who_measured_and_nothing_is_called_synthetic(page: str) -> None:
+    assert page.count("Bertoldi Group, Harvard University") == 2
+    assert page.count("Licence: MIT") == 2
+    assert "SYNTHETIC" not in page
+
+
+def test_it_tells_the_errors_and_their_sign(page: str) -> None:
+    assert "the median is below the measured force everywhere" in page
+    rms = 100 * np.sqrt((relative_error(made_up(), "median") ** 2).mean())
+    assert f"<strong>{rms:.1f} %</strong><span>error of the median" in page
+
+
+def test_it_tells_snaps_and_loops(page: str) -> None:
+    assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
+    assert page.count("not simulated") == 2

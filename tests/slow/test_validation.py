@@ -1,0 +1,59 @@
+"""The prediction of the measured specimen stays where it is, and its band is honest."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.__main__ import run_stage
+from pipeline.runtime import ROOT
+
+FILE = ROOT / "experiments/validation/hinges.yaml"
+AT = (0.5, 1.0, 2.0, 3.0, 4.5)
+PREDICTED = {
+    "median": (5.82, 9.10, 12.84, 14.59, 15.80),
+    "low": (3.70, 5.77, 8.05, 9.04, 9.82),
+    "high": (9.16, 14.35, 20.49, 23.55, 25.43),
+}
+"""Forces in N at these displacements in mm."""
+MOVED = 0.02
+"""Of the largest measured force, by which a force may move."""
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    out = Path(tmp_path_factory.mktemp("validation")) / "hinges.nc"
+    assert run_stage("validate", ["samples", str(FILE), "--out", str(out), "--quiet"]) == 0
+    return xr.open_dataset(out)
+
+
+@pytest.mark.parametrize("name", PREDICTED)
+def test_the_prediction_stays(name: str, found: xr.Dataset) -> None:
+    force = np.interp(AT, found["displacement"], found[name])
+    largest = float(found["measured"].max())
+    assert np.abs(force - PREDICTED[name]).max() < MOVED * largest, f"{name}: {force}"
+
+
+def test_the_measured_curve_lies_inside(found: xr.Dataset) -> None:
+    assert found["inside"] == 1
+
+
+def test_the_band_covers_new_curves_and_is_no_wider_than_needed(found: xr.Dataset) -> None:
+    assert found.sizes["simulated_set"] == 200
+    assert 0.92 <= found["covered"].mean() <= 0.98
+    assert found["width_to_student"] <= 1.2
+    assert found["relative_width"].median() <= 1.2
+
+
+def test_the_axial_constant_is_told_least(found: xr.Dataset) -> None:
+    """A fifth or a quarter of it costs less than of any other."""
+    factor = np.log(found["factor"].values)
+    lost = [np.interp(np.log([0.8, 1.25]), factor, each) for each in found["profile"].values]
+    assert max(lost[0]) < min(*lost[1], *lost[2])
+
+
+def test_the_sampler_has_settled(found: xr.Dataset) -> None:
+    assert found["r_hat"] < 1.05
+    assert found["diverging"] < 0.02
+    assert found["emulator_error_predicted"] < 0.005
