@@ -243,8 +243,7 @@ def test_a_stage_depends_on_every_section_that_it_may_read(
     assert read_to_pose > {"lattice", "material", "contact", "supports", "drive", "solver", "void"}
     problem = load(fig2)
     found = {key for key in Problem.model_fields if changes(problem, stage.name, key)}
-    needed = read_to_pose - ({"solver"} if stage.name == "fabricate" else set())
-    assert found >= needed | {"optimiser", "designs"} | {OWN.get(stage.name, "optimiser")}
+    assert found >= read_to_pose | {"optimiser", "designs"} | {OWN.get(stage.name, "optimiser")}
     assert not found & {"doc", "report"}
 
 
