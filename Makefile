@@ -40,7 +40,7 @@ help:
 	@echo "make pythons   run a quick part of the tests on the other Pythons that pyenv has installed"
 	@echo "make benchmark run time against error of every solver, and more: results/benchmark (an hour)"
 	@echo "make bench     measure speed against the baselines"
-	@echo "make bench-tracking VIDEOS=folder   measure tracking on videos with exact truth"
+	@echo "make bench-tracking   measure tracking: rendered clips, known pictures, VIDEOS=folder"
 	@echo "make stress    try to break the numbers: results/stress/index.html; fails if any is wrong"
 	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs kills places)"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
@@ -129,7 +129,7 @@ bench: dev
 	$(BIN)/python -m benchmarks
 
 bench-tracking: dev
-	$(BIN)/python -m benchmarks tracking --videos "$(VIDEOS)"
+	$(BIN)/python -m benchmarks tracking $(if $(VIDEOS),--videos "$(VIDEOS)")
 
 stress: dev
 	@$(BIN)/python -m benchmarks.stress; code=$$?; \

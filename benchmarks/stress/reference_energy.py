@@ -62,13 +62,15 @@ def _ligament(motions: Array, values: ConcreteParameters, angles: Array) -> Arra
     """Computes the energy of one ligament, whose units move by (2, 3), and of its voids."""
     law = LigamentLaw(values.law[0], values.law[1], values.law[2])
     arms, vector = jnp.asarray(values.arm), jnp.asarray(values.vector)
-    strain = ligament_energy(motions[0], motions[1], arms[0], arms[1], vector, law)
+    strain = ligament_energy(
+        motions[0], motions[1], arms[0], arms[1], vector, law, jnp.asarray(values.natural)
+    )
     contact = ContactLaw(jnp.asarray(values.contact), angles[0], angles[1])
     voids = contact_void_angles(jnp.asarray(values.void), motions[0, 2], motions[1, 2])
     return strain + contact_energy(voids[0], contact) + contact_energy(voids[1], contact)
 
 
-_LAYOUT = (0, ConcreteParameters(0, 0, 0, 0, 0, None, None, None, None), None)
+_LAYOUT = (0, ConcreteParameters(0, 0, 0, 0, 0, 0, None, None, None, None), None)
 _ligaments = jax.jit(jax.vmap(jax.value_and_grad(_ligament), _LAYOUT))
 _ligament_blocks = jax.jit(jax.vmap(jax.hessian(_ligament), _LAYOUT))
 

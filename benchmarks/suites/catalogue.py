@@ -18,6 +18,7 @@ from benchmarks.methods import selection
 from benchmarks.scenes import load_cases
 from benchmarks.suites import (
     ablation,
+    accuracy,
     fig2,
     fig4,
     optimiser_contest,
@@ -60,6 +61,7 @@ def _makers(videos: Path) -> dict[str, Callable[[str], Suite]]:
         **{name: lambda _, make=make: make() for name, make in IN_TURN.items()},  # type: ignore[misc]
         **{f"precision_{scene}": partial(_precision, scene) for scene in load_cases.TITLES},
         **{f"optimisers_{scene}": partial(_contest, scene) for scene in DESIGNED},
+        "accuracy": _accuracy,
         "tracking": partial(_tracking, videos),
         "ablation": partial(_ablation, "fig2", "fig4"),
         "small_ablation": partial(_ablation, "small_wave", "small_push"),
@@ -104,6 +106,11 @@ def _tracking(videos: Path, name: str) -> Suite:
         partial(frame_rates.measure, videos),
         "tracking",
     )
+
+
+def _accuracy(name: str) -> Suite:
+    subject = "Errors of loss and motion under all kinds of drives, true and stated"
+    return Suite(name, subject, accuracy.REFERENCE, accuracy.measure)
 
 
 def _ablation(wave: str, push: str, name: str) -> Suite:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.harness import MeasuringLimits, Tell
-from benchmarks.tracking import plain_opencv
+from benchmarks.tracking import known_patches, plain_opencv, wild_clips
 from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
@@ -55,6 +56,9 @@ class TruthVideo(NamedTuple):
 def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
     """Returns the dataset ``tracking`` of the videos in a folder, without its attributes.
 
+    Tells of them line by line; then come tables of clips as labs film them, rendered here, and of
+    patches whose motions are known.
+
     Raises:
         UserError: there are none.
     """
@@ -78,6 +82,9 @@ def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
         lost[place] = 1 - known.mean()
         if thinning == 1:
             tell(f"{one.name:<24}{method:<14}{line()}")
+    with tempfile.TemporaryDirectory() as made:
+        tell(wild_clips.table(Path(made)))
+    tell(known_patches.table())
     rate = np.array([[one.rate / thinning for thinning in THINNINGS] for one in clips])
     dims = ("video", "tracker", "thinning")
     return xr.Dataset(

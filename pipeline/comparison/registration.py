@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.tracking.geometry import Camera
+from pipeline.tracking.geometry import camera_of
 from sim.core import Floats
 
 _LEAST = 3  # units
@@ -79,7 +79,7 @@ def measure_places(track: xr.Dataset, design: Floats) -> Floats:
         design: (units, 2) where they should be, NaN for those that are absent.
     """
     measured = np.full_like(design, np.nan)
-    camera, missed = _camera(track), track["camera_residual"].values
+    camera, missed = camera_of(track), track["camera_residual"].values
     if camera is not None:
         there = np.isfinite(design + missed).all(axis=1)
         measured[there] = camera.unproject(camera.project(design[there]) + missed[there])
@@ -88,19 +88,9 @@ def measure_places(track: xr.Dataset, design: Floats) -> Floats:
 
 def pixel_size(track: xr.Dataset, middle: Floats) -> float:
     """Computes the size of a pixel at a place (2,) by the camera, mm; NaN without one."""
-    if (camera := _camera(track)) is None:
+    if (camera := camera_of(track)) is None:
         return np.nan
     return float(1 / np.sqrt(abs(np.linalg.det(camera.jacobian(middle)))))
-
-
-def _camera(track: xr.Dataset) -> Camera | None:
-    """Reads the camera that a track was made with; points of another system come without."""
-    homography = track["camera_homography"].values
-    if np.isnan(homography).any():
-        return None
-    width, height = track["image_size"].values.tolist()
-    centre, radial = track["camera_centre"].values, track["camera_radial"].values
-    return Camera(homography, centre, radial, (width, height))
 
 
 def _complex(points: Floats) -> np.ndarray:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.problem import Problem, canonical_json, section_hash
 from pipeline.runtime import INSTALLED, ROOT, UserError, version
+from sim.core import instruction_set
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,8 +107,8 @@ def file_hash(path: Path) -> str:
 
 @lru_cache(maxsize=1)
 def package_versions() -> Mapping[str, str]:
-    """Versions of Python and of the packages that results depend on."""
-    found = {"python": platform.python_version()}
+    """Versions of Python and of the packages that results depend on, and the instructions used."""
+    found = {"python": platform.python_version(), "instructions": instruction_set.level()}
     for name in PACKAGES:
         try:
             found[name] = metadata.version(name)

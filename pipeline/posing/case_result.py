@@ -21,7 +21,7 @@ from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver
-from sim.scene import mimicking, sample_times, scales, strain_energies
+from sim.scene import estimated_errors, mimicking, sample_times, scales, strain_energies
 from sim.solvers import solve_case
 from sim.structure import clearance
 
@@ -115,6 +115,10 @@ def measure(
             each[times.integrated][:, scene.objective.region] / scales(scene.lattice.spacing)
             for each in (motion, refined)
         )
+        size = 1.0 if scene.objective.reference else fine_loss
+        displacement_error, loss_error = estimated_errors(
+            (region, fine_region), (loss, fine_loss), size
+        )
         shown, path = motion[times.shown], _path(solved, times.shown)
         seen = observe(scene.topology, case.values, shown)
         found = clearance(scene.lattice, vertices, shown[::stride])
@@ -133,10 +137,8 @@ def measure(
             loss=loss,
             loss_other_branch=other_loss(solved),
             loss_samples=loss_of(motion, case, times.sampled, mean),
-            loss_error=abs(loss - fine_loss) / (1.0 if scene.objective.reference else fine_loss),
-            displacement_error=float(
-                np.linalg.norm(region - fine_region) / np.linalg.norm(fine_region)
-            ),
+            loss_error=loss_error,
+            displacement_error=displacement_error,
         )
 
     return reduce

@@ -1,4 +1,4 @@
-"""Sets how a process of this project runs: one thread, fixed seeds, own caches.
+"""Sets how a process of this project runs: one thread, fixed seeds and instructions, own caches.
 
 Small systems lose up to thirty times their speed to threads of BLAS and XLA, and results are only
 byte-reproducible without them; work is spread over cores as processes instead. The libraries read
@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 
 from pipeline.runtime.locations import CACHE
+from sim.core import instruction_set
 
 RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
 
@@ -17,7 +18,7 @@ ONE_THREAD = {
     "MKL_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1",
+    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
 }
 REPRODUCIBLE = {
     "JAX_PLATFORMS": "cpu",
@@ -39,5 +40,8 @@ CACHES = {
 def pin() -> None:
     """Sets the variables here and for child processes; caches asked for elsewhere stay there."""
     os.environ.update(ONE_THREAD | REPRODUCIBLE | BOUNDED)
+    if instruction_set.can_pin():
+        os.environ.update(instruction_set.LIBRARIES)
+        os.environ["XLA_FLAGS"] += f" {instruction_set.XLA_FLAG}"
     for name, value in CACHES.items():
         os.environ.setdefault(name, value)

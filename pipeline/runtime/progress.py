@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 import os
 import sys
-import time
 from collections.abc import Callable
 from datetime import timedelta
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from pipeline.runtime.environment import RUN_MARK
+from sim.core import working_time
 
 if TYPE_CHECKING:
     from tqdm import tqdm
@@ -30,7 +30,7 @@ class Progress:
         label: what is going on, in a few words.
         initial: steps done before this start, when a job is resumed.
         bar: whether to draw a bar; by default on a terminal, if `pipeline.runtime.cli` may talk to
-        it. clock: the time in seconds.
+        it. clock: the time in seconds; by default it stands still while loops are compiled.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Progress:
         *,
         initial: int = 0,
         bar: bool | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = working_time,
     ) -> None:
         self._total, self._label, self._done, self._initial = total, label, initial, initial
         self._clock = clock

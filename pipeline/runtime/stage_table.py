@@ -189,7 +189,7 @@ _ROWS = (
         extra="fabrication",
         inputs=("design",),
         unused=(
-            *("doc", "report", "solver", "prediction", "spectrum"),
+            *("doc", "report", "prediction", "spectrum"),
             *("response", "sweep", "robustness"),
         ),
         options=(

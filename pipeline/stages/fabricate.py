@@ -7,14 +7,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from pipeline import datasets, problem
 from pipeline.fabrication.checks import STEPS, check_package
 from pipeline.fabrication.files import PackageFolder
 from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_manifest
-from pipeline.fabrication.parts import THIN_WALL, UnbuildableUnitError
+from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
+from pipeline.posing import read_design, scene_of, structures_of
+from pipeline.problem import Problem
 from pipeline.runtime import cli, write_folder_atomically
+from sim.core import SimulationError
+from sim.scene import as_built
 
 LOG = logging.getLogger(__name__)
 
@@ -41,13 +47,40 @@ def work(args: argparse.Namespace) -> None:
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)
         density = posed.material.density
         write_bill(room / "bom.csv", specimen, settings, density, package.contents)
-        write_manifest(room, specimen, posed, args.design)
+        built = _as_built(specimen, posed, args)
+        write_manifest(room, specimen, posed, args.design, built)
         check_package(room, design, args.structure, settings, pictures, bar.update)
     LOG.info("%s: %s", args.out_dir, summary(specimen))
     if specimen.thin:
         thinnest = min(specimen.thin, key=lambda label: specimen.thin[label])
         thin = (args.out_dir, len(specimen.thin), THIN_WALL, specimen.thin[thinnest], thinnest)
         LOG.warning("%s: %d units have walls under %g mm (from %.2f mm, unit %s)", *thin)
+
+
+def _as_built(
+    specimen: BuiltSpecimen, posed: Problem, args: argparse.Namespace
+) -> dict[str, float | str] | None:
+    """Simulates the structure with its shims as drawn; None of one that the study does not load.
+
+    A motion that cannot be followed is told in the place of its numbers: the files are right.
+    """
+    scene = scene_of(posed, args.problem.parent)
+    structure = structures_of(scene, read_design(posed, args.design)).get(args.structure)
+    if structure is None:
+        return None
+    angles = np.array([ligament.angles for ligament in specimen.ligaments]).reshape(-1, 2)
+    try:
+        found = as_built(*structure, angles)
+    except SimulationError as error:
+        LOG.warning("%s: the structure as built cannot be simulated: %s", args.out_dir, error)
+        return {"failure": str(error)}
+    turn = np.degrees(np.abs(found.turn))
+    return {
+        "turn_mean_deg": round(float(turn.mean()), 3),
+        "turn_max_deg": round(float(turn.max()), 3),
+        "loss_as_designed": float(f"{found.loss_as_designed:.5g}"),
+        "loss_as_built": float(f"{found.loss_as_built:.5g}"),
+    }
 
 
 @contextmanager

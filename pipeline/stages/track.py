@@ -27,7 +27,7 @@ from pipeline.tracking.frames import (
     rendered,
 )
 from pipeline.tracking.frames import recording as recordings
-from pipeline.tracking.geometry import as_built, outlines_of_design
+from pipeline.tracking.geometry import as_built, clamped_units, outlines_of_design
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.output import assemble_track, dic_points, driven_units, write_track_table
 from pipeline.tracking.reference_frame import RecordingSetup, proposal
@@ -194,12 +194,19 @@ def followed(asked: Recording, design: xr.Dataset, video: Path, source: Path) ->
     end = np.inf if asked.window.end is None else asked.window.end
     shown = read_frames(video, asked.window.start, end, asked.frame_rate)
     scale = None if asked.pixel_size is None else 1 / asked.pixel_size
-    with found_in(source):
-        setup = RecordingSetup(
-            asked.thickness, asked.camera_distance, asked.specimen, asked.turned, asked.mirrored
-        )
-        with cli.progress(frame_count(video), "tracking") as bar:
-            track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
+    setup = RecordingSetup(
+        asked.thickness,
+        asked.camera_distance,
+        asked.specimen,
+        asked.turned,
+        asked.mirrored,
+        asked.exposure,
+        asked.readout,
+        clamped_units(design),
+        asked.camera == "follows supports",
+    )
+    with found_in(source), cli.progress(frame_count(video), "tracking") as bar:
+        track = track_video(shown, outlines_of_design(design), scale, bar.update, setup)
     if has_uneven_intervals(track.time):
         LOG.warning("warning: the frame rate varies; times are the file's own stamps")
     lost = float(np.mean(track.quality != 0))

@@ -1,4 +1,5 @@
 from . import compiling as compiling
+from . import instruction_set as instruction_set
 from .arrays import Floats as Floats
 from .arrays import Image as Image
 from .arrays import Ints as Ints
@@ -6,6 +7,7 @@ from .arrays import Mask as Mask
 from .arrays import Numbers as Numbers
 from .arrays import Reals as Reals
 from .arrays import Singles as Singles
+from .compile_time import working_time as working_time
 from .compiling import compiled as compiled
 from .compiling import inlined as inlined
 from .errors import NewContactPairs as NewContactPairs

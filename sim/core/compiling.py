@@ -3,23 +3,53 @@
 from __future__ import annotations
 
 import fcntl
+import logging
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from threading import RLock
 from typing import Any, TypeVar, cast
 
 from numba import njit
+from numba.core import event
 
-from sim.core import loop_cache
+from sim.core import compile_time, loop_cache
 
 F = TypeVar("F", bound=Callable[..., Any])
 
+LOG = logging.getLogger(__name__)
+
+_SECONDS_BETWEEN_LINES = 10.0
 _HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 loop_cache.install()
 
 _WITHIN = RLock()
 _mine: set[str] = set()
 """Loops that this process compiles now: one, what it calls, what that calls."""
+
+
+class _Announcement(event.Listener):
+    """Tells of loops that are compiled, as opposed to found in the cache."""
+
+    def __init__(self) -> None:
+        self._count, self._began, self._told = 0, 0.0, 0.0
+
+    def on_start(self, _: event.Event) -> None:
+        """Tells at the first loop, and from then on every ten seconds."""
+        now = time.monotonic()
+        if not self._count:
+            self._began = self._told = now
+            LOG.info("compiling loops, once on this machine: up to a minute or two")
+        elif now - self._told >= _SECONDS_BETWEEN_LINES:
+            self._told = now
+            LOG.info("compiling: %d loops in %.0f s", self._count, now - self._began)
+        self._count += 1
+
+    def on_end(self, _: event.Event) -> None:
+        """Says nothing: the work that follows does."""
+
+
+event.register("numba:compile", _Announcement())  # type: ignore[no-untyped-call]
 
 
 def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
@@ -49,7 +79,7 @@ def _turn(loop: str) -> Iterator[None]:
 
     They cannot wait for one another: who waits for a loop holds only loops that call it.
     """
-    with _WITHIN, ExitStack() as taken:
+    with _WITHIN, compile_time.counted(), ExitStack() as taken:
         if loop not in _mine:
             _mine.add(loop)
             taken.callback(_mine.discard, loop)

@@ -20,6 +20,7 @@ import platformdirs
 from numba.core.caching import _CacheLocator
 
 from sim.core.import_graph import import_closure
+from sim.core.instruction_set import LEVEL, can_pin
 
 ROOT = Path(__file__).resolve().parents[2]
 _NUMBA_OWN = (
@@ -80,7 +81,9 @@ def cache_folder() -> Path:
 
 
 def install() -> None:
-    """Makes Numba ask this locator first, unless the user named others."""
+    """Makes Numba ask this locator and keep to the level, unless the user named others."""
     config: Any = numba.core.config
+    if config.CPU_NAME is None and can_pin():
+        config.CPU_NAME, config.CPU_FEATURES = LEVEL, ""  # the level's own
     if not config.CACHE_LOCATOR_CLASSES:
         config.CACHE_LOCATOR_CLASSES = f"{__name__}.SourceHashLocator,{_NUMBA_OWN}"

@@ -96,6 +96,7 @@ class Topology:
             vector=np.array(values.vector, dtype=float, order="C"),
             void=np.array(values.void, dtype=float, order="C"),
             law=np.array(values.law, dtype=float, order="C"),
+            natural=np.array(values.natural, dtype=float, order="C"),
             contact=contact,
             touching=np.arange(n) if touching is None else touching,
         )

@@ -6,6 +6,7 @@ derivatives of these functions.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -63,13 +64,22 @@ def ligament_strain(
 
 
 def ligament_energy(
-    motion_a: Array, motion_b: Array, arm_a: Array, arm_b: Array, vector: Array, law: LigamentLaw
+    motion_a: Array,
+    motion_b: Array,
+    arm_a: Array,
+    arm_b: Array,
+    vector: Array,
+    law: LigamentLaw,
+    natural: Array | Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Array:
-    """Strain energy of one ligament of the given law, N mm; see ``ligament_strain``."""
+    """Strain energy of one ligament of the given law, N mm; see ``ligament_strain``.
+
+    It is zero at the ``natural`` (3,) stretch (mm), shear angle and relative rotation (rad).
+    """
     strain = ligament_strain(motion_a, motion_b, arm_a, arm_b, vector)
-    rest_length = jnp.linalg.norm(vector)
+    reference_length = jnp.linalg.norm(vector)
     return 0.5 * (
-        law.axial * strain.stretch**2
-        + law.shear * (rest_length * strain.shear) ** 2
-        + law.bending * strain.bend**2
+        law.axial * (strain.stretch - natural[0]) ** 2
+        + law.shear * (reference_length * (strain.shear - natural[1])) ** 2
+        + law.bending * (strain.bend - natural[2]) ** 2
     )

@@ -7,6 +7,8 @@ ligament vector, n and t its unit tangent and normal, L its length and gamma its
     dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta
     kappa,
 
+each strain taken from its natural value (zero but where a ligament is not free of stress at rest),
+
 and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a -
 r_a).
 """
@@ -37,8 +39,11 @@ def _trigonometry(motion: Floats, turn: Floats) -> None:
 @compiled
 def _kinematics(
     motion: Floats, turn: Floats, net: NetworkArrays, k: int
-) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """Rotated arms of ligament k, its current vector, length, rest length and shear angle."""
+) -> tuple[float, float, float, float, float, float, float, float, tuple[float, float, float]]:
+    """Rotated arms of ligament k, its current vector and length, the reference length, its strain.
+
+    That is stretch, shear angle and relative rotation, from their natural values.
+    """
     a, b = net.unit[k, 0], net.unit[k, 1]
     ca, sa, cb, sb = turn[a, 0], turn[a, 1], turn[b, 0], turn[b, 1]
     pax = ca * net.arm[k, 0, 0] - sa * net.arm[k, 0, 1]
@@ -56,9 +61,11 @@ def _kinematics(
     sh = turn[a, 3] * turn[b, 2] + turn[a, 2] * turn[b, 3]
     ex, ey = ch * vx - sh * vy, sh * vx + ch * vy
     # gamma: angle from the reference vector, turned by the mean of both rotations, to d
-    shear = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
-    length = math.sqrt(dx * dx + dy * dy)
-    return pax, pay, pbx, pby, dx, dy, length, math.sqrt(vx * vx + vy * vy), shear
+    shear = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy) - net.natural[k, 1]
+    length, reference = math.sqrt(dx * dx + dy * dy), math.sqrt(vx * vx + vy * vy)
+    stretch = length - reference - net.natural[k, 0]
+    bend = motion[3 * b + 2] - motion[3 * a + 2] - net.natural[k, 2]
+    return pax, pay, pbx, pby, dx, dy, length, reference, (stretch, shear, bend)
 
 
 @compiled
@@ -69,13 +76,13 @@ def _forces(
     dy: float,
     length: float,
     rest: float,
-    shear: float,
-    bend: float,
+    strain: tuple[float, float, float],
 ) -> tuple[float, float, float, float]:
     """dW/dd (2) and dW/dtheta of either unit at fixed d."""
+    stretch, shear, bend = strain
     # dW/dd = k_l (l - l0) n + k_s l0^2 gamma t / l, with n along d and t across; M = k_b bend
     nx, ny = dx / length, dy / length
-    tension = net.law[k, 0] * (length - rest)
+    tension = net.law[k, 0] * stretch
     torque = net.law[k, 1] * rest * rest * shear
     gx = tension * nx - torque * ny / length
     gy = tension * ny + torque * nx / length
@@ -91,12 +98,12 @@ def gradient(motion: Floats, net: NetworkArrays, turn: Floats, out: Floats) -> f
     strain_energy = 0.0
     for k in range(net.unit.shape[0]):
         a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
-        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
-        bend = motion[b + 2] - motion[a + 2]
-        gx, gy, wa, wb = _forces(net, k, dx, dy, length, rest, shear, bend)
+        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        gx, gy, wa, wb = _forces(net, k, dx, dy, length, rest, strain)
+        stretch, shear, bend = strain
         # W = k_l (l - l0)^2 / 2 + k_s (l0 gamma)^2 / 2 + k_b bend^2 / 2
         strain_energy += 0.5 * (
-            net.law[k, 0] * (length - rest) ** 2
+            net.law[k, 0] * stretch**2
             + net.law[k, 1] * (rest * shear) ** 2
             + net.law[k, 2] * bend * bend
         )
@@ -111,14 +118,21 @@ def gradient(motion: Floats, net: NetworkArrays, turn: Floats, out: Floats) -> f
 
 @compiled
 def _second(
-    net: NetworkArrays, k: int, dx: float, dy: float, length: float, rest: float, shear: float
+    net: NetworkArrays,
+    k: int,
+    dx: float,
+    dy: float,
+    length: float,
+    rest: float,
+    strain: tuple[float, float, float],
 ) -> tuple[float, float, float, float, float]:
     """Second derivatives of W: d d (xx, xy, yy) and d theta (x, y); theta theta is constant."""
     # d2W = k_l n n' + (k_l (l - l0) / l + k_s l0^2 / l^2) t t' - k_s l0^2 gamma / l^2 (n t' + t n')
     nx, ny = dx / length, dy / length
+    stretch, shear, _ = strain
     axial, torsion = net.law[k, 0], net.law[k, 1] * rest * rest
     along = axial
-    across = axial * (length - rest) / length + torsion / (length * length)
+    across = axial * stretch / length + torsion / (length * length)
     mixed = -torsion * shear / (length * length)
     hxx = along * nx * nx + across * ny * ny - 2.0 * mixed * nx * ny
     hyy = along * ny * ny + across * nx * nx + 2.0 * mixed * nx * ny
@@ -131,11 +145,9 @@ def _ligament_block(
     k: int, motion: Floats, turn: Floats, net: NetworkArrays, block: Floats
 ) -> None:
     """Fills the lower half of the Hessian (6, 6) of ligament ``k`` in the dofs of its two units."""
-    a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
-    pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
-    bend = motion[b + 2] - motion[a + 2]
-    gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
-    hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+    pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+    gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
+    hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
     torsion, bending = 0.25 * net.law[k, 1] * rest * rest, net.law[k, 2]
     # dd/dtheta_a = (pay, -pax), dd/dtheta_b = (-pby, pbx)
     hax, hay = hxx * pay - hxy * pax, hxy * pay - hyy * pax
@@ -194,10 +206,9 @@ def hessian_product(
     for k in range(net.unit.shape[0]):
         a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
         la, lb = direction[a + 2], direction[b + 2]
-        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
-        bend = motion[b + 2] - motion[a + 2]
-        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
-        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
+        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
         torsion = 0.25 * net.law[k, 1] * rest * rest
         bending = net.law[k, 2]
         ex = direction[b] - direction[a] - pby * lb + pay * la
@@ -232,10 +243,9 @@ def mixed(
         ua, ub = net.unit[k, 0], net.unit[k, 1]
         a, b = 3 * ua, 3 * ub
         la, lb = direction[a + 2], direction[b + 2]
-        pax, pay, pbx, pby, dx, dy, length, rest, shear = _kinematics(motion, turn, net, k)
-        bend = motion[b + 2] - motion[a + 2]
-        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, shear, bend)
-        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, shear)
+        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
+        hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
         ex = direction[b] - direction[a] - pby * lb + pay * la
         ey = direction[b + 1] - direction[a + 1] + pbx * lb - pax * la
         fx = hxx * ex + hxy * ey + mx * (la + lb)
@@ -250,6 +260,7 @@ def mixed(
         out.arm[k, 1, 1] += -sb * hx + cb * hy - fy
 
         nx, ny = dx / length, dy / length
+        stretch, shear, bend = strain
         stretching = nx * ex + ny * ey
         shearing = (nx * ey - ny * ex) / length - 0.5 * (la + lb)
         vx, vy = net.vector[k, 0], net.vector[k, 1]
@@ -257,6 +268,9 @@ def mixed(
         by_direction = -net.law[k, 1] * shearing
         out.vector[k, 0] += fx + by_rest * vx / rest - by_direction * vy
         out.vector[k, 1] += fy + by_rest * vy / rest + by_direction * vx
-        out.law[k, 0] += (length - rest) * stretching
+        out.law[k, 0] += stretch * stretching
         out.law[k, 1] += rest * rest * shear * shearing
         out.law[k, 2] += bend * (lb - la)
+        out.natural[k, 0] -= net.law[k, 0] * stretching
+        out.natural[k, 1] -= net.law[k, 1] * rest * rest * shearing
+        out.natural[k, 2] -= net.law[k, 2] * (lb - la)

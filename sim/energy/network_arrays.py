@@ -16,6 +16,8 @@ class NetworkArrays(NamedTuple):
         vector: (n_ligaments, 2) reference ligament vector, mm.
         void: (n_ligaments, 2) reference void angles, rad.
         law: (n_ligaments, 3) axial, shear, bending stiffness.
+        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, free of
+            stress.
         contact: (n_ligaments, 3) contact stiffness, barrier and cutoff angle.
         touching: (n_touching,) ligaments whose voids may close to the cutoff; empty to skip
             contact.
@@ -26,6 +28,7 @@ class NetworkArrays(NamedTuple):
     vector: Floats
     void: Floats
     law: Floats
+    natural: Floats
     contact: Floats
     touching: Ints
 
@@ -34,7 +37,7 @@ class Sensitivity(NamedTuple):
     """Derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``.
 
     Attributes:
-        arm, vector, void, law: as there.
+        arm, vector, void, law, natural: as there.
         contact: (n_ligaments,) of the contact stiffness alone.
         corner: (n_vertices, 2) by the arms of all vertices.
         centroid: (n_units, 2) by the centroids.
@@ -44,6 +47,7 @@ class Sensitivity(NamedTuple):
     vector: Floats
     void: Floats
     law: Floats
+    natural: Floats
     contact: Floats
     corner: Floats
     centroid: Floats

@@ -118,6 +118,7 @@ def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
         vector=np.zeros_like(net.vector),
         void=np.zeros_like(net.void),
         law=np.zeros_like(net.law),
+        natural=np.zeros_like(net.natural),
         contact=np.zeros(len(net.contact)),
         corner=np.zeros_like(system.contacts.corner),
         centroid=np.zeros_like(system.contacts.centroid),

@@ -6,14 +6,17 @@ from .evaluation import minimise as minimise
 from .objectives import DisplacementMimicking as DisplacementMimicking
 from .objectives import StrainEnergyMimicking as StrainEnergyMimicking
 from .objectives import combined as combined
+from .objectives import estimated_errors as estimated_errors
 from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
-from .plan import STIFFENING as STIFFENING
-from .plan import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .plan import Plan as Plan
 from .plan import concrete_parameters as concrete_parameters
 from .plan import make_plan as make_plan
 from .plan import sample_times as sample_times
+from .relaxation import AsBuilt as AsBuilt
+from .relaxation import Relaxed as Relaxed
+from .relaxation import as_built as as_built
+from .relaxation import relaxed as relaxed
 from .scene import DOFS as DOFS
 from .scene import Accuracy as Accuracy
 from .scene import Clamp as Clamp
@@ -33,4 +36,7 @@ from .simulation import target_motion as target_motion
 from .snap_margin import SnapMargin as SnapMargin
 from .soundness import SceneError as SceneError
 from .soundness import check_scene as check_scene
+from .time_solver import NEWTON as NEWTON
+from .time_solver import STIFFENING as STIFFENING
+from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .warm_starts import Paths as Paths

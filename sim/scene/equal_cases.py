@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.core import Floats, Ints
-from sim.scene.scene import Scene
-from sim.solvers import Harmonic, LinearRamp, PrescribedMotion, Pulse, TanhRamp
+from sim.scene.scene import DIRECTED, Scene
+from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters, Lattice
 
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -18,8 +18,6 @@ VERTEX_TOLERANCE = 1e-9
 """Distance of a vertex from the image of another, mm."""
 SAME = 1e-9
 """Relative difference of equal constants, and of equal directions in rad."""
-
-_DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
 
 
 @dataclass(frozen=True)
@@ -51,7 +49,7 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
     """
     loads = scene.loads
     every = np.arange(len(loads.cases))
-    directed = all(isinstance(motion, _DIRECTED) for motion in loads.motions)
+    directed = all(isinstance(motion, DIRECTED) for motion in loads.motions)
     if len(every) == 1 or not directed or scene.objective.reference is not None:
         return every
     image = quarter_turn(scene.lattice, vertices)
@@ -128,8 +126,8 @@ def _is_kept(image: Ints, units: Ints) -> bool:
 def _is_turned(one: PrescribedMotion, other: PrescribedMotion, image: NetworkImage) -> bool:
     """Checks if some quarter turns take a load case to another."""
     a, b = one.motion, other.motion
-    assert isinstance(a, _DIRECTED)
-    assert isinstance(b, _DIRECTED)
+    assert isinstance(a, DIRECTED)
+    assert isinstance(b, DIRECTED)
     if type(a) is not type(b) or a._replace(direction=0.0) != b._replace(direction=0.0):
         return False
     units = np.sort(one.units)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, Protocol
@@ -13,7 +15,7 @@ import numpy as np
 from jax import Array
 
 from sim.constraints import ConstraintVector, Limits
-from sim.core import Floats, Ints
+from sim.core import Floats, Ints, SimulationError
 from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
@@ -22,9 +24,12 @@ from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking, parameters_of_design
 from sim.scene.snap_margin import SnapMargin
+from sim.scene.time_solver import RULES, twice_as_fine
 from sim.scene.warm_starts import Paths
 from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
 from sim.structure import Parameters
+
+LOG = logging.getLogger(__name__)
 
 CONFIRMING = 4
 """Loads passed for each of the loss when a design's loss is confirmed."""
@@ -229,7 +234,7 @@ def minimise(
         if callback is not None:
             callback(evaluation)
 
-    return minimise_loss(
+    result = minimise_loss(
         "mma" if isinstance(options, MmaOptions) else "sqp",
         computed if journal is None else journal.wrap(computed),
         constraints_of(scene, made, limits),
@@ -238,6 +243,38 @@ def minimise(
         callback=record,
         confirm=_from_rest(scene, made),
     )
+    _check_steps(computed, result)
+    return result
+
+
+def _check_steps(evaluate: Evaluator, result: Result) -> None:
+    """Warns if the loss at the start or the end changes with half the steps by more than allowed.
+
+    The steps were chosen for the initial structure and kept. What is allowed is that share of the
+    loss at the start.
+    """
+    solver: Any = evaluate.plan.solver
+    if isinstance(solver, StaticSolver):
+        return
+    first = result.evaluations[0]
+    finer = copy(evaluate)
+    finer.plan = replace(evaluate.plan, solver=twice_as_fine(solver))
+    allowed = RULES[evaluate.scene.numerics.accuracy].loss
+    for name, design, loss in (("start", first.x, first.loss), ("end", result.x, result.loss)):
+        try:
+            change = abs(finer(design)[0] - loss) / abs(first.loss)
+        except SimulationError as failure:
+            LOG.warning("half the steps fail at the %s: %s", name, failure)
+            continue
+        LOG.info("half the steps change the loss at the %s by %.2g of the first", name, change)
+        if change > allowed:
+            LOG.warning(
+                "half the steps change the loss at the %s by %.2g of the first, the accuracy asked"
+                " for allows %g; ask for solver.accuracy: tight",
+                name,
+                change,
+                allowed,
+            )
 
 
 def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector | SnapMargin:

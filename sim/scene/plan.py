@@ -10,48 +10,12 @@ import numpy as np
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
-from sim.scene.scene import Accuracy, Scene
+from sim.scene.scene import Scene
 from sim.scene.soundness import check_scene
+from sim.scene.time_solver import time_solver
 from sim.solvers import Solver, check_free_dofs, concrete
 from sim.structure import ConcreteParameters, parameters, shape
-from sim.time_integration import BLANES_MOAN, ExplicitSolver, ImplicitSolver, adapted, time_grid
-from sim.vibration import highest_frequency, lowest_frequency
-
-TURN_ALLOWANCE = np.deg2rad(30.0)
-"""Relative rotation that a ligament's units may make before its contact is no longer skipped."""
-
-SLOW = 0.75
-"""Drives below this fraction of the lowest eigenfrequency excite no waves worth resolving."""
-
-STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
-STIFFENING = 1.7
-"""Highest eigenfrequency in motion over that at rest (4.6 -> 7 kHz for the paper's lattices)."""
-
-
-@dataclass(frozen=True)
-class GridRule:
-    """Holds how the implicit grid is made.
-
-    Attributes:
-        first: first step of a graded grid, s.
-        growth: of its steps.
-        per_period: its longest steps, as parts of the drive's period.
-        per_step: error allowed in each step of an adapted grid, mm.
-        newton: tolerance of the stage velocities, mm/s.
-    """
-
-    first: float
-    growth: float
-    per_period: int
-    per_step: float
-    newton: float
-
-
-GRIDS: dict[Accuracy, GridRule] = {
-    "draft": GridRule(1e-3, 1.3, 16, 1e-2, 1e-2),
-    "default": GridRule(5e-4, 1.2, 20, 1e-3, 5e-3),
-    "tight": GridRule(1e-4, 1.05, 80, 1e-5, 1e-5),
-}
+from sim.time_integration import ImplicitSolver
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +83,7 @@ def make_plan(
     """
     structure = scene.lattice.vertices if vertices is None else vertices
     times = sample_times(scene) if times is None else times
-    warnings = check_scene(scene, structure, times)
+    warnings = list(check_scene(scene, structure, times))
     check_free_dofs(scene.topology)
     values = concrete_parameters(scene, structure)
     decisions: list[str] = []
@@ -146,24 +110,15 @@ def make_plan(
         decisions.append(f"tangent: {scene.topology.numbering[1].describe()}")
         skipped.append("inertia and damping: the scene is static")
     else:
-        integrator = _choose(scene, values, decisions)
-        end = float(times[-1])
-        if integrator == "implicit":
-            implicit = _implicit(scene, values, end, times, threads)
-            kind = "adapted" if scene.loads.drive_frequency is None else "graded"
-            n_steps = len(implicit.times) - 1
-            decisions.append(f"grid: {n_steps} {kind} steps over {end:.6g} s, frozen")
-            skipped.append(_contact_line(values, implicit))
-            solver = implicit
-        else:
-            explicit = _explicit(scene, values, end, times, threads)
-            decisions.append(f"grid: {explicit.n_steps} equal steps over {end:.6g} s")
-            if vertices is None:
-                megabytes = explicit.adjoint_memory() / 1e6
-                decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
-            solver = explicit
+        solver = time_solver(scene, values, times, threads, decisions, warnings)
+        integrator = "implicit" if isinstance(solver, ImplicitSolver) else "explicit"
+        if isinstance(solver, ImplicitSolver):
+            skipped.append(_contact_line(values, solver))
+        elif vertices is None:
+            megabytes = solver.adjoint_memory() / 1e6
+            decisions.append(f"adjoint: checkpoints, {megabytes:.0f} MB a case")
     decisions.insert(0, f"integrator: {integrator}")
-    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), warnings)
+    return Plan(integrator, solver, case_of, tuple(decisions), tuple(skipped), tuple(warnings))
 
 
 def _reference_line(scene: Scene) -> str:
@@ -187,66 +142,9 @@ def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
     return concrete(made)
 
 
-def _choose(
-    scene: Scene, values: ConcreteParameters, decisions: list[str]
-) -> Literal["implicit", "explicit"]:
-    if scene.numerics.integrator != "auto":
-        decisions.append("integrator as asked for")
-        return scene.numerics.integrator
-    if scene.numerics.accuracy == "tight":
-        decisions.append("explicit: a tight tolerance needs every frequency resolved")
-        return "explicit"
-    if (driven := scene.loads.drive_frequency) is None:
-        decisions.append("implicit: the drive has no frequency of its own")
-        return "implicit"
-    lowest = lowest_frequency(scene.topology, values) / (2 * np.pi)
-    slow = driven < SLOW * lowest
-    decisions.append(
-        f"{'implicit' if slow else 'explicit'}: drive at {driven:.4g} Hz, lowest"
-        f" eigenfrequency {lowest:.4g} Hz"
-    )
-    return "implicit" if slow else "explicit"
-
-
-def _implicit(
-    scene: Scene, values: ConcreteParameters, end: float, times: Floats, threads: int
-) -> ImplicitSolver:
-    """Solver on a graded grid, or adapted to the hardest case if the drive has no frequency."""
-    rule = GRIDS[scene.numerics.accuracy]
-    period = end if scene.loads.drive_frequency is None else 1 / scene.loads.drive_frequency
-    largest = period / rule.per_period
-    steps = time_grid.graded(end, min(rule.first, largest), rule.growth, largest)
-    solver = ImplicitSolver(
-        scene.topology, steps, times, rule.newton, threads, turn_allowance=TURN_ALLOWANCE
-    )
-    if scene.loads.drive_frequency is not None:
-        return solver
-    adapted_to_each = (
-        adapted(solver, values, drive, rule.per_step, rule.first, largest)
-        for drive in scene.loads.cases
-    )
-    return max(adapted_to_each, key=lambda made: len(made.times))
-
-
 def _contact_line(values: ConcreteParameters, solver: ImplicitSolver) -> str:
     n_touching = len(solver.touching(values))
     return (
         f"contact of {len(values.void) - n_touching} of {len(values.void)} ligaments at the start:"
         " their voids are wide open (checked after each solve)"
     )
-
-
-def _explicit(
-    scene: Scene, values: ConcreteParameters, end: float, times: Floats, threads: int
-) -> ExplicitSolver:
-    highest = STIFFENING * highest_frequency(scene.topology, values)
-    largest = (
-        STABLE_FRACTION[scene.numerics.accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)
-    )
-    if (
-        scene.loads.drive_frequency is not None
-    ):  # a heavy or soft structure is stable with steps far too long
-        largest = min(
-            largest, 1 / (scene.loads.drive_frequency * GRIDS[scene.numerics.accuracy].per_period)
-        )
-    return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)

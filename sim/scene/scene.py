@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.core import Floats, Ints
 from sim.energy import Topology, topology
-from sim.solvers import Harmonic, MotionLaw, PrescribedMotion
+from sim.solvers import Harmonic, LinearRamp, MotionLaw, PrescribedMotion, Pulse, TanhRamp
 from sim.structure import (
     ContactModel,
     DesignSpace,
@@ -25,6 +25,8 @@ Accuracy = Literal["draft", "default", "tight"]
 Integrator = Literal["auto", "implicit", "explicit"]
 Dof = Literal["ux", "uy", "theta"]
 DOFS: tuple[Dof, ...] = ("ux", "uy", "theta")
+DIRECTED = Harmonic | Pulse | LinearRamp | TanhRamp
+"""Motions along a direction."""
 
 
 AUTHORS_CONTACT = VoidAngleContact(float(np.deg2rad(-15.0)), float(np.deg2rad(-10.0)))

@@ -19,6 +19,7 @@ from .loads import MotionLaw as MotionLaw
 from .loads import Pulse as Pulse
 from .loads import TanhRamp as TanhRamp
 from .loads import TimeSeries as TimeSeries
+from .loads import breakpoints as breakpoints
 from .loads import held_dofs as held_dofs
 from .loads import held_values as held_values
 from .validation import check_connected as check_connected

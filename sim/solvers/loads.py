@@ -8,7 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.core import Ints, Numbers
+from sim.core import Floats, Ints, Numbers
+
+NOTICED = 1e-3
+"""Least kink of a series that steps stop at: how far its point lies off its neighbours' line, over
+the series's range."""
 
 
 class MotionLaw(Protocol):
@@ -110,6 +114,34 @@ class TimeSeries(NamedTuple):
         flat = jnp.reshape(self.motion, (len(self.times), -1))
         columns = [jnp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
         return jnp.stack(columns, axis=-1).reshape(len(times), *jnp.shape(self.motion)[1:])
+
+
+def breakpoints(motion: MotionLaw, end: float) -> Floats:
+    """Finds the times (n,) up to ``end`` that no step may pass over, s: kinks, starts and ends.
+
+    A bell or a switch, whose extent is infinite, counts as eight widths long.
+    """
+    match motion:
+        case Pulse():
+            found = motion.delay + motion.width * np.arange(-4.0, 5.0)
+        case Harmonic(rise=float(rise)):
+            found = motion.delay + rise * np.arange(-4.0, 5.0)
+        case TimeSeries():
+            found = _kinks(np.asarray(motion.times, dtype=float), np.asarray(motion.motion))
+        case _:
+            found = np.zeros(0)
+    return np.unique(found[(found > 0.0) & (found < end)])
+
+
+def _kinks(times: Floats, motion: Floats) -> Floats:
+    """Times of the points that lie noticeably off the line through their neighbours."""
+    flat = motion.reshape(len(times), -1)
+    gaps = np.diff(times)[:, None]
+    turned = np.abs(np.diff(np.diff(flat, axis=0) / gaps, axis=0))
+    off = turned * gaps[1:] * gaps[:-1] / (gaps[1:] + gaps[:-1])
+    noticed = np.ones(len(times), dtype=bool)
+    noticed[1:-1] = (off > NOTICED * np.ptp(flat, axis=0)).any(axis=1)
+    return np.asarray(times[noticed])
 
 
 def held_dofs(clamped: Ints, driven: Ints) -> Ints:

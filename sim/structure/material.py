@@ -18,6 +18,10 @@ class Material(NamedTuple):
         contact: contact stiffness, N mm/rad^2.
         damping_translation: to ground, per unit, tonne/s.
         damping_rotation: to ground, per unit, tonne mm^2/s.
+        end_angles: (n_ligaments, 2) at which a ligament, straight by itself, is held at its first
+            and its second end, against its vector, counter-clockwise, rad; it is bent where they
+            are not zero.
+        elongation: by which a ligament is longer by itself than its vector, mm.
     """
 
     density: float | Numbers
@@ -27,6 +31,8 @@ class Material(NamedTuple):
     contact: float | Numbers
     damping_translation: float | Numbers
     damping_rotation: float | Numbers
+    end_angles: float | Numbers = 0.0
+    elongation: float | Numbers = 0.0
 
 
 def unrotated_inertia(density: float, spacing: float) -> tuple[float, float]:

@@ -23,6 +23,8 @@ class Parameters(NamedTuple, Generic[A]):
         vector: (n_ligaments, 2) reference ligament vectors, mm.
         void: (n_ligaments, 2) reference void angles, rad.
         law: (n_ligaments, 3) axial, shear, bending stiffness.
+        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, at which the
+            ligaments are free of stress.
         contact: (n_ligaments,) contact stiffness, N mm/rad^2.
         corner: (n_vertices, 2) arms of all vertices, mm.
         centroid: (n_units, 2) mm.
@@ -34,6 +36,7 @@ class Parameters(NamedTuple, Generic[A]):
     vector: A
     void: A
     law: A
+    natural: A
     contact: A
     corner: A
     centroid: A
@@ -49,6 +52,10 @@ def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters
     """Derives the parameters of a network; differentiable in shape and material."""
     n = lattice.n_ligaments
     stiffness = (material.axial, material.shear, material.bending)
+    angles = jnp.broadcast_to(jnp.asarray(material.end_angles, dtype=float), (n, 2))
+    # a strip straight by itself, clamped at angles a and b to its chord, is so if the units turn by
+    # -a and -b about its ends: gamma = -(mean rotation) = (a + b) / 2, kappa = a - b
+    natural = (material.elongation, angles.mean(axis=1), angles[:, 0] - angles[:, 1])
     mass, inertia = material.density * shape.area, material.density * shape.polar_moment
     damping = (
         material.damping_translation,
@@ -60,6 +67,7 @@ def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters
         vector=jnp.asarray(lattice.ligament_vectors),
         void=shape.void_angle,
         law=jnp.stack([jnp.broadcast_to(k, (n,)) for k in stiffness], axis=1),
+        natural=jnp.stack([jnp.broadcast_to(strain, (n,)) for strain in natural], axis=1),
         contact=jnp.broadcast_to(jnp.asarray(material.contact, dtype=float), (n,)),
         corner=shape.arm,
         centroid=shape.centroid,

@@ -17,6 +17,7 @@ from sim.time_integration.esdirk_stage import CONVERGED
 from sim.time_integration.implicit import ImplicitSolver
 
 SAFETY, SHRINK, GROW = 0.85, 0.2, 3.0
+NOWHERE = np.zeros(0)
 
 
 def adapted(
@@ -26,6 +27,8 @@ def adapted(
     tolerance: float,
     first: float = 1e-4,
     largest: float = np.inf,
+    stops: Floats = NOWHERE,
+    most: float = np.inf,
 ) -> ImplicitSolver:
     """Adapts the grid until every step's error estimate stays below ``tolerance``.
 
@@ -39,15 +42,17 @@ def adapted(
         tolerance: mm per step.
         first: first step to try, s.
         largest: no step is longer, s.
+        stops: (n,) times that steps end at, ascending within the grid, s.
+        most: number of steps.
 
     Raises:
-        SimulationError: the step became too short to go on.
+        SimulationError: the step became too short to go on, or there are too many.
     """
     try:
-        return _adapted(solver, values, drive, tolerance, first, largest)
+        return _adapted(solver, values, drive, tolerance, first, largest, stops, most)
     except NewContactPairs as met:
         known = solver.coupling(met.pairs)
-        return adapted(known, values, drive, tolerance, first, largest)
+        return adapted(known, values, drive, tolerance, first, largest, stops, most)
 
 
 def _adapted(
@@ -57,16 +62,25 @@ def _adapted(
     tolerance: float,
     first: float,
     largest: float,
+    stops: Floats,
+    most: float,
 ) -> ImplicitSolver:
     end = float(solver.times[-1])
+    ends = np.append(stops, end)
     times, state = [0.0], (np.zeros(solver.topology.n_dofs), np.zeros(solver.topology.n_dofs))
     step = min(first, end)
     while times[-1] < end * (1 - 1e-12):
-        step = min(step, largest, end - times[-1])
+        step, left = min(step, largest), ends[np.searchsorted(ends, times[-1], "right")] - times[-1]
+        step = left if step >= left else min(step, left / 2)
         reached, error = _attempt(solver, values, drive, times[-1], step, state)
         if reached is not None and error <= tolerance:
             times.append(times[-1] + step)
             state = reached
+        if len(times) > most:
+            raise SimulationError(
+                f"the step control has taken {len(times) - 1} steps by t = {times[-1]:.6g} s;"
+                " try integrator: explicit, or a looser accuracy"
+            )
         if step < 1e-9 * end:
             raise SimulationError(
                 f"the step control stalled at t = {times[-1]:.6g} s;"

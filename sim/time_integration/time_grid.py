@@ -7,6 +7,9 @@ import scipy.sparse as sp
 
 from sim.core import Floats, Ints
 
+NEAR = 1e-7
+"""Shortest step that is left between times to be met, over the whole."""
+
 
 def graded(duration: float, first: float, growth: float, largest: float) -> Floats:
     """Grid from 0 to ``duration`` (s) whose steps grow geometrically up to ``largest``.
@@ -26,8 +29,21 @@ def graded(duration: float, first: float, growth: float, largest: float) -> Floa
 
 def halved(times: Floats) -> Floats:
     """Cuts every step of a grid in two."""
-    middles = (times[1:] + times[:-1]) / 2
-    return np.sort(np.concatenate([times, middles]))
+    return divided(times, 2)
+
+
+def divided(times: Floats, parts: int) -> Floats:
+    """Cuts every step of a grid into equal parts."""
+    steps = np.arange(len(times))
+    return np.interp(np.arange(parts * (len(times) - 1) + 1) / parts, steps, times)
+
+
+def through(times: Floats, stops: Floats) -> Floats:
+    """Adds times (n,) that a grid has to meet; points NEAR to the one before are left out."""
+    every = np.union1d(times, stops)
+    kept = every[np.append(True, np.diff(every) > NEAR * every[-1])]
+    kept[-1] = every[-1]
+    return kept
 
 
 def split_steps(times: Floats, steps: Ints) -> Floats:

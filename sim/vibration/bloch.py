@@ -42,6 +42,7 @@ class UnitCell(NamedTuple):
         vector: (n_ligaments, 2) reference ligament vectors, mm.
         void: (n_ligaments, 2) reference void angles, rad.
         law: (n_ligaments, 3) axial, shear and bending stiffness.
+        natural: (n_ligaments, 3) strains free of stress.
         contact: (n_ligaments, 3) stiffness, barrier and cutoff.
         mass: (n_units, 3) tonne, tonne, tonne mm^2.
         period: (2, 2) lattice vectors, rows, mm.
@@ -54,9 +55,15 @@ class UnitCell(NamedTuple):
     vector: Floats
     void: Floats
     law: Floats
+    natural: Floats
     contact: Floats
     mass: Floats
     period: Floats
+
+    @property
+    def ligaments(self) -> tuple[Floats, ...]:
+        """Arms, vectors, voids and laws of the ligaments, as their energy takes them."""
+        return self.arm, self.vector, self.void, self.law, self.natural, self.contact
 
     @property
     def n_units(self) -> int:
@@ -116,6 +123,7 @@ def cell_of(
         vector=values.vector[mine],
         void=values.void[mine],
         law=values.law[mine],
+        natural=values.natural[mine],
         contact=np.column_stack([values.contact[mine], limits]),
         mass=values.mass[unit],
         period=vectors,
@@ -217,20 +225,25 @@ def _cell_energy(cell: UnitCell, loose: Ints, state: Array, gradient: Array) -> 
     shift = jnp.pad(cell.image @ stretch.T, ((0, 0), (0, 1)))
     ends = motion[cell.joined[:, 0]], motion[cell.joined[:, 1]] + shift
     pairs = jnp.stack(ends, axis=1)
-    ligaments = (cell.arm, cell.vector, cell.void, cell.law, cell.contact)
-    each = jax.vmap(_pair_energy)(pairs, *(jnp.asarray(part) for part in ligaments))
+    each = jax.vmap(_pair_energy)(pairs, *(jnp.asarray(part) for part in cell.ligaments))
     return each.sum()
 
 
 def _pair_energy(
-    pair: Array, arm: Array, vector: Array, void: Array, law: Array, contact: Array
+    pair: Array,
+    arm: Array,
+    vector: Array,
+    void: Array,
+    law: Array,
+    natural: Array,
+    contact: Array,
 ) -> Array:
     """Energy of a ligament and its two voids in terms of both units' motion (2, 3)."""
     voids = contact_void_angles(void, pair[0, 2], pair[1, 2])
     closed = jax.vmap(lambda angle: contact_energy(angle, ContactLaw(*contact)))(voids)
-    return (
-        ligament_energy(pair[0], pair[1], arm[0], arm[1], vector, LigamentLaw(*law)) + closed.sum()
-    )
+    stiffness = LigamentLaw(*law)
+    strained = ligament_energy(pair[0], pair[1], arm[0], arm[1], vector, stiffness, natural)
+    return strained + closed.sum()
 
 
 _pair_hessians = jax.jit(jax.vmap(jax.hessian(_pair_energy)))
@@ -246,7 +259,7 @@ def bands(cell: UnitCell, wave_vectors: Floats, at: StrainedCell | None = None) 
     """
     state = StrainedCell(np.zeros((cell.n_units, 3)), np.zeros((2, 2))) if at is None else at
     pairs = _pairs(cell, state)
-    blocks = _pair_hessians(pairs, cell.arm, cell.vector, cell.void, cell.law, cell.contact)
+    blocks = _pair_hessians(pairs, *cell.ligaments)
     return np.array([_squares(cell, np.asarray(blocks), wave) for wave in wave_vectors])
 
 

@@ -36,10 +36,8 @@ NONE = np.array([], dtype=np.int64)
 
 def some_ligaments(net: NetworkArrays, which: Ints) -> NetworkArrays:
     """A network's ligaments ``which`` alone, without contact."""
-    unit, arm, vector, void, law, contact, _ = net
-    return NetworkArrays(
-        unit[which], arm[which], vector[which], void[which], law[which], contact[which], NONE
-    )
+    chosen = {name: part[which] for name, part in net._asdict().items() if name != "touching"}
+    return NetworkArrays(**chosen, touching=NONE)
 
 
 def dense(of: Matrix) -> Floats:

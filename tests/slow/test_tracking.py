@@ -56,10 +56,10 @@ def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:
     fitted: list[TrackedFrame] = []
     step, count = Tracker.step, iter(range(length))
 
-    def once(self: Tracker, image: np.ndarray) -> TrackedFrame:
+    def once(self: Tracker, image: np.ndarray, time: float) -> TrackedFrame:
         place = next(count) % len(images)
         if place == len(fitted):
-            fitted.append(step(self, image))
+            fitted.append(step(self, image, time))
         return fitted[place]
 
     monkeypatch.setattr(Tracker, "step", once)

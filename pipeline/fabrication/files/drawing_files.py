@@ -39,7 +39,10 @@ def write_dxf(sheet: LaserSheet, path: Path, version: Literal["R2010", "R12"] = 
     document = _new_document(version)
     space = document.modelspace()
     width, height = sheet.size
-    document.header["$EXTMIN"], document.header["$EXTMAX"] = (0.0, 0.0, 0.0), (width, height, 0.0)
+    low, high = (0.0, 0.0, 0.0), (width, height, 0.0)
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high
+    # or ezdxf writes those of the layout over them, unless the lower one is the origin
+    space.reset_extents(low, high)
     rim = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
     _add_line(space, rim, "REFERENCE", closed=True)
     for part in sheet.parts:

@@ -21,10 +21,14 @@ BORDER = 9.0
 TONES = ("#6f3fa0", "#1d7f78", "#c25e00", "#17427f", "#a3195b", "#4b7a1c", "#7a3b00", "#3b6b8f")
 """Colours of the shims, by length; over again where there are more lengths."""
 
+WORST = 10
+"""Number of the shims, bent most before any load, that are marked."""
+
 _CROSS = 3.0
 _ID, _SMALLEST = 6.5, 3.0  # points
 _ASPECT = 0.75  # a letter's width to its size, with some room
 _NUMBER = 4.5
+_RING = 2.5  # mm
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ class AssemblyPlan:
             for number, shim in enumerate(specimen.shims)
             for ligament in shim.ligaments
         }
+        self._worst = {ligament.number for ligament in specimen.bent[:WORST]}
 
     @property
     def box(self) -> Box:
@@ -156,7 +161,10 @@ class AssemblyPlan:
         tone = TONES[kind % len(TONES)]
         path = np.array([first.end, first.mouth, second.mouth, second.end])
         self._sheet.line(path + origin, 0.3, tone)
-        x, y = (first.mouth + second.mouth) / 2 + origin
+        x, y = np.array(ligament.middle) + origin
+        if ligament.number in self._worst:
+            ring = np.asarray(shapely.Point(x, y).buffer(_RING).exterior.coords)
+            self._sheet.line(ring, 0.4, SIGNAL)
         self._sheet.text(x + 0.4, y + 0.4, str(kind + 1), _NUMBER, colour=tone)
 
     def _headings(self, origin: Floats) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.fabrication.papers.assembly_plan import TONES, AssemblyPlan, Tile, tiles
+from pipeline.fabrication.papers.assembly_plan import TONES, WORST, AssemblyPlan, Tile, tiles
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, PdfDocument
 from pipeline.fabrication.parts import BuiltSpecimen
 from pipeline.problem.sections import Fabrication
@@ -33,6 +34,7 @@ def write_assembly_sheet(path: Path, specimen: BuiltSpecimen, settings: Fabricat
     for tile in pages:
         _plan_page(sheet, plan, tile)
     _ligament_pages(sheet, specimen)
+    _bent_pages(sheet, specimen)
     canvas.save()
 
 
@@ -105,6 +107,25 @@ def _ligament_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
         _table(sheet, title, ("units", "on plan", "id"), rows, (26, 16, 18))
 
 
+def _bent_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
+    """Lists the shims that are bent before any load, the worst first; these are marked."""
+    rows = [
+        (
+            f"worst {rank}" if rank <= WORST else "",
+            ligament.name,
+            " / ".join(f"{math.degrees(angle):.0f}" for angle in ligament.angles),
+            f"{100 * ligament.strain:.1f} %",
+            f"{ligament.moment:.1f} N mm",
+        )
+        for rank, ligament in enumerate(specimen.bent, 1)
+    ]
+    if rows:
+        title = f"{len(rows)} of {len(specimen.ligaments)} shims are bent before any load"
+        heading = ("", "units", "ends, deg", "strain", "moment")
+        tones = [SIGNAL if row[0] else INK for row in rows]
+        _table(sheet, title, heading, rows, (16, 26, 22, 16, 20), tones)
+
+
 def _table(
     sheet: PdfDocument,
     title: str,
@@ -162,6 +183,9 @@ def assembly_steps(
     steps = [
         "Measure the bar at the foot of each page: 100 mm, or the print is not to scale.",
         joining,
+        "Tolerances: vertices within 0.1 mm of the plan, slots "
+        f"{settings.slot_width:.2f} mm wide within 0.05 mm, shims no longer than listed and at "
+        "most 0.2 mm shorter.",
         f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
@@ -176,6 +200,7 @@ def assembly_steps(
         "ids and arrows as on the plan, row by row from the bottom left.",
         "Push the shims in from above, column by column and then row by row, until they stand "
         "level with the units. Each must reach the inner end of both slots.",
+        *_bent_step(specimen),
         "Check every gap with the comb, then glue (if at all) from the underside only.",
     ]
     if specimen.clamped:
@@ -186,3 +211,15 @@ def assembly_steps(
         room = "Where neighbours leave an adapter no room for fingers, glue it on."
         steps.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
+
+
+def _bent_step(specimen: BuiltSpecimen) -> list[str]:
+    """Writes the step on shims that are bent before any load; none if there are none."""
+    bent = specimen.bent
+    if not bent:
+        return []
+    return [
+        f"{len(bent)} shims stand in slots at an angle and are bent before any load, to a strain "
+        f"of {100 * bent[0].strain:.1f} % at most (last pages). The {min(WORST, len(bent))} worst "
+        "have a ring on the plan: bend them over a rod first, or they crease or push their units."
+    ]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
-from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, Shim, Unit
+from pipeline.fabrication.parts import STRAIGHT, THIN_WALL, BuiltSpecimen, Ligament, Shim, Unit
 from pipeline.fabrication.readback import unreadable
 from pipeline.problem.sections import Fabrication
 
@@ -39,8 +40,8 @@ class BillRow:
     """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g.
 
     Attributes:
-        item: unit, shim, sheet, plate, fixture or total.
-        id: of the part, or path of the file in the package.
+        item: unit, shim, ligament, sheet, plate, fixture or total.
+        id: of the part, the units that a ligament joins, or path of the file in the package.
         count: pieces.
         area, volume: of one piece; the volume as if it were solid.
         mass: of one piece at the problem's areal density (units) or solid (shims).
@@ -105,7 +106,7 @@ def bill(
     density: float,
     contents: Mapping[str, Sequence[str]],
 ) -> Iterator[BillRow]:
-    """Yields rows: each unit, each kind of shim, each file to cut or print, the totals."""
+    """Yields rows: each unit, kind of shim, ligament, file to cut or print, the totals."""
     holders: dict[str, list[str]] = {}
     for file, parts in contents.items():
         for part in dict.fromkeys(parts):
@@ -114,6 +115,10 @@ def bill(
     shims = [_shim(shim, settings, holders) for shim in specimen.shims]
     yield from units
     yield from shims
+    kinds = {number: shim.id for shim in specimen.shims for number in shim.ligaments}
+    for ligament in specimen.ligaments:
+        note = f"shim {kinds[ligament.number]}; {prebend_words(ligament)}"
+        yield BillRow("ligament", ligament.name, 1, length=ligament.length, note=note)
     for file, parts in contents.items():
         yield BillRow(_KINDS[file.partition("/")[0]], file, 1, note=_counted(len(parts), "part"))
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
@@ -168,6 +173,17 @@ def _shim(shim: Shim, settings: Fabrication, holders: Mapping[str, Sequence[str]
         height=thickness,
         files=" ".join(holders.get(shim.id, ())),
         note=f"{_counted(len(shim.ligaments), 'ligament')}, {_counted(shim.spares, 'spare')}",
+    )
+
+
+def prebend_words(ligament: Ligament) -> str:
+    """Tells how a shim is bent before any load."""
+    if ligament.strain <= STRAIGHT:
+        return "straight"
+    ends = " and ".join(f"{math.degrees(angle):.1f}" for angle in ligament.angles)
+    return (
+        f"ends turned {ends} deg; strain {100 * ligament.strain:.2f} %,"
+        f" moment {ligament.moment:.2f} N mm before any load"
     )
 
 

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from pipeline.datasets import file_hash, git_commit, package_versions
-from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.parts import BuiltSpecimen, Ligament
 from pipeline.problem import Problem, section_hash
 from pipeline.runtime import UserError
 
 MANIFEST = "manifest.json"
 _AGAIN = "make the package again: python -m pipeline fabricate, or snakemake --forcerun fabricate"
-_READ = ("units", "letters_for_ids", "shims", "thin_walls_mm", "files")
+_READ = ("units", "letters_for_ids", "shims", "prebend", "as_built", "thin_walls_mm", "files")
+
+
+PREBEND_NOTE = (
+    "each shim before any load: middle of its ligament; angles of its slots against the ligament,"
+    " counter-clockwise; largest strain and largest moment, of a strip clamped where the walls of"
+    " its slots begin (small slopes)"
+)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -34,7 +43,13 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return content
 
 
-def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, design: Path) -> None:
+def write_manifest(
+    folder: Path,
+    specimen: BuiltSpecimen,
+    problem: Problem,
+    design: Path,
+    as_built: Mapping[str, float | str] | None = None,
+) -> None:
     """Writes the manifest of all other files in a package's folder.
 
     Args:
@@ -42,6 +57,7 @@ def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, desi
         specimen: what is built.
         problem: the problem whose section `fabrication` holds.
         design: the design dataset.
+        as_built: what the simulation makes of the shims as drawn, if it was asked.
     """
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != MANIFEST)
     content = {
@@ -54,6 +70,9 @@ def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, desi
         "units": [unit.label for unit in specimen.units],
         "letters_for_ids": specimen.letters,
         "shims": {shim.id: shim.count for shim in specimen.shims},
+        "prebend": {ligament.name: _prebend(ligament) for ligament in specimen.ligaments},
+        "prebend_note": PREBEND_NOTE,
+        "as_built": as_built,
         "thin_walls_mm": {label: round(wall, 3) for label, wall in specimen.thin.items()},
         "packages": dict(package_versions()),
         "git_commit": git_commit(),
@@ -61,3 +80,12 @@ def write_manifest(folder: Path, specimen: BuiltSpecimen, problem: Problem, desi
     }
     text = json.dumps(content, indent=1, sort_keys=True, ensure_ascii=False, allow_nan=False)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _prebend(ligament: Ligament) -> dict[str, float | list[float]]:
+    return {
+        "middle_mm": [round(x, 3) for x in ligament.middle],
+        "end_angles_deg": [round(math.degrees(angle), 2) for angle in ligament.angles],
+        "strain": round(ligament.strain, 5),
+        "moment_N_mm": round(ligament.moment, 3),
+    }

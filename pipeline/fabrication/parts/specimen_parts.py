@@ -21,6 +21,9 @@ from sim.core import Floats
 THIN_WALL = 1.2
 """Walls below this print, but break easily: they are warned of, mm."""
 
+STRAIGHT = 1e-4
+"""Strain below which a shim counts as straight."""
+
 LETTERS = "ABCDEFGHJKLMNPRSTUVXY4"
 """What small units carry instead of their ids; none looks like another one that is turned."""
 
@@ -129,6 +132,11 @@ class Slot:
         """(2,) the middle of the inner end."""
         return self.mouth + self.depth * self.direction
 
+    @property
+    def held(self) -> Floats:
+        """(2,) where its walls begin to hold the shim."""
+        return self.mouth + self.truncation * self.direction
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -185,14 +193,25 @@ class Ligament:
         labels: the units that it joins.
         length: of the shim: distance of the vertices and both depths.
         free: of the shim between the truncated mouths.
-        bend: between the slots at its two ends, rad; zero for a straight shim.
+        middle: (2,) of the ligament as designed.
+        angles: of the slots at its two ends against the ligament, counter-clockwise, rad.
+        strain: largest one of the shim before any load.
+        moment: largest one in the shim before any load, N mm.
     """
 
     number: int
     labels: tuple[str, str]
     length: float
     free: float
-    bend: float
+    middle: tuple[float, float]
+    angles: tuple[float, float] = (0.0, 0.0)
+    strain: float = 0.0
+    moment: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The units that it joins, "A1 - B1"."""
+        return " - ".join(self.labels)
 
 
 @dataclass(frozen=True)
@@ -248,6 +267,12 @@ class BuiltSpecimen:
     def by_label(self) -> dict[str, Unit]:
         """Units by label."""
         return {unit.label: unit for unit in self.units}
+
+    @property
+    def bent(self) -> list[Ligament]:
+        """Ligaments whose shims are bent before any load, the most strained first."""
+        bent = [ligament for ligament in self.ligaments if ligament.strain > STRAIGHT]
+        return sorted(bent, key=lambda ligament: (-ligament.strain, ligament.number))
 
     @property
     def thin(self) -> dict[str, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from pipeline.fabrication.parts import Slot
+from pipeline.fabrication.units.prebend import peak_curvature, signed_angle
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats, Ints
 
@@ -17,7 +18,8 @@ _TURNS = np.deg2rad(np.arange(-85.0, 86.0, 5.0))
 _DEPTH_STEP = 0.25  # mm; few different lengths of shims
 _HAIR = 1e-6  # mm
 _COST_OF_TURN = 1 / np.deg2rad(30.0)  # as dear as 1 mm less depth
-_COST_OF_KINK = 1 / np.deg2rad(60.0)  # where the shim leaves the slot, against the ligament
+_DEAR_STRAIN = 0.02  # of the shim before any load: as dear as 1 mm less depth; its square counts
+_STRAIGHT = np.deg2rad(0.01)
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,21 @@ class Corner:
         vertex: number of the unit's vertex.
         ligament: id of the ligament there.
         along: (2,) unit vector of the ligament, pointing into the unit.
+        length: of the ligament, mm.
+        other: the slot at the ligament's other end; None as long as there is none.
     """
 
     vertex: int
     ligament: int
     along: Floats
+    length: float
+    other: Slot | None = None
+
+    @property
+    def straight(self) -> bool:
+        """Tests that a slot along the ligament leaves the shim straight, as far as is known."""
+        other = self.other
+        return other is None or abs(signed_angle(-self.along, other.direction)) < _STRAIGHT
 
 
 @dataclass(frozen=True)
@@ -79,22 +91,28 @@ def preferred_slot(
 
 def all_slots(polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication) -> Candidates:
     """Offers slots of all directions and depths with thick enough walls, the cheapest first."""
-    offered = _candidates(polygon, room, corner, settings, *_turns_and_depths(settings))
+    turns_and_depths = _turns_and_depths(polygon, corner, settings)
+    offered = _candidates(polygon, room, corner, settings, *turns_and_depths)
     return offered.pick(np.argsort(offered.cost, kind="stable"))
 
 
 def best_wall(polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication) -> float:
     """Measures the thickest walls of any slot at a corner, mm; negative if none stays inside."""
-    turns, depths = _turns_and_depths(settings)
+    turns, depths = _turns_and_depths(polygon, corner, settings)
     mouth, directions = _directions(polygon, corner, settings, turns)
     return float(_walls(room, mouth, directions, depths, settings.slot_width).max())
 
 
-def _turns_and_depths(settings: Fabrication) -> tuple[Floats, Floats]:
+def _turns_and_depths(
+    polygon: Polygon, corner: Corner, settings: Fabrication
+) -> tuple[Floats, Floats]:
+    """Lists turns and depths to try, also along the ways that slots may be asked to point."""
     slots = settings.slots
     steps = np.arange(slots.depth_min, slots.depth_max + _HAIR, _DEPTH_STEP)
     depths = np.unique(np.append(steps, slots.depth))
-    turns, depths = np.meshgrid(_TURNS, depths)
+    _, ways = _ways(polygon, corner)
+    exact = [signed_angle(ways[slots.direction], way) for way in ways.values()]
+    turns, depths = np.meshgrid(np.unique(np.round([*_TURNS, *exact], 6)), depths)
     return turns.ravel(), depths.ravel()
 
 
@@ -112,24 +130,44 @@ def _candidates(
     thick = walls >= settings.minimum_wall - _HAIR
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
     truncation = truncations(room, mouth, directions, depths, settings).max(axis=0)
-    kink = np.arccos(np.clip(directions @ corner.along, -1.0, 1.0))
-    cost = np.abs(depths - settings.slots.depth) + np.abs(turns) * _COST_OF_TURN
-    cost = cost + kink * _COST_OF_KINK + truncation
+    cost = np.abs(depths - settings.slots.depth) + truncation
+    cost += (_strains(mouth, directions, truncation, corner, settings) / _DEAR_STRAIN) ** 2
+    if settings.slots.direction != "ligament":
+        cost += np.abs(turns) * _COST_OF_TURN
     held = depths - truncation >= settings.slots.depth_min - _HAIR
     return Candidates(mouth, directions, depths, truncation, walls, cost).pick(held)
+
+
+def _strains(
+    mouth: Floats, directions: Floats, truncation: Floats, corner: Corner, settings: Fabrication
+) -> Floats:
+    """Computes the strains (n,) of the shim in slots, before any load.
+
+    As long as there is no slot at the other end, the shim is taken to leave along the ligament.
+    """
+    other = corner.other
+    end = mouth - corner.length * corner.along if other is None else other.held
+    enters = -corner.along if other is None else other.direction
+    start = mouth + truncation[:, None] * directions
+    return settings.shims.thickness / 2.0 * peak_curvature(start, -directions, end, enters)
+
+
+def _ways(polygon: Polygon, corner: Corner) -> tuple[Floats, dict[str, Floats]]:
+    """Finds the vertex, and vectors along which a slot may be asked to point."""
+    points = np.asarray(polygon.exterior.coords)[:-1]
+    mouth = points[corner.vertex]
+    return mouth, {
+        "centroid": np.array([polygon.centroid.x, polygon.centroid.y]) - mouth,
+        "ligament": corner.along,
+        "bisector": _bisector(points, corner.vertex),
+    }
 
 
 def _directions(
     polygon: Polygon, corner: Corner, settings: Fabrication, turns: Floats
 ) -> tuple[Floats, Floats]:
     """Finds the vertex, and unit vectors (n, 2) turned from the preferred direction."""
-    points = np.asarray(polygon.exterior.coords)[:-1]
-    mouth = points[corner.vertex]
-    ways = {
-        "centroid": np.array([polygon.centroid.x, polygon.centroid.y]) - mouth,
-        "ligament": corner.along,
-        "bisector": _bisector(points, corner.vertex),
-    }
+    mouth, ways = _ways(polygon, corner)
     x, y = ways[settings.slots.direction] / np.linalg.norm(ways[settings.slots.direction])
     cosine, sine = np.cos(turns), np.sin(turns)
     return mouth, np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)

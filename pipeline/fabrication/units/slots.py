@@ -1,8 +1,9 @@
 """Places the slots of a unit: direction and depth of each, so that all walls are thick enough.
 
-A slot starts out in the preferred direction at the preferred depth. Where walls would be too thin
-or slots would meet, all slots of the unit are chosen together: the cheapest set of turns and depths
-that leaves the walls. Only if there is none, the unit may grow a little beside its slots.
+A slot starts out in the preferred direction at the preferred depth. Where walls would be too thin,
+slots would meet, or the shim comes out of its other slot at an angle, all slots of the unit are
+chosen together: the cheapest set of turns and depths that leaves the walls, where a shim that is
+bent before any load is dear. Only if there is none, the unit may grow a little beside its slots.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pipeline.fabrication.units.slot_candidates import (
 )
 from pipeline.problem.sections import Fabrication
 
-_KEPT = 600  # candidates per slot that are combined
+_FEW, _KEPT = 60, 600  # candidates per slot that are combined at first, and at most
 _VISITS = 50_000  # choices looked at before the best so far is taken
 _HAIR = 1e-6  # mm
 
@@ -57,16 +58,16 @@ def place_slots(
     Raises:
         NoRoomError: there are no slots with thick enough walls.
     """
-    direct = [preferred_slot(polygon, room, corner, settings) for corner in corners]
-    chosen = _cheapest_choice(direct, settings) if all(map(len, direct)) else None
+    chosen = None
+    if settings.slots.direction != "ligament" or all(corner.straight for corner in corners):
+        direct = [preferred_slot(polygon, room, corner, settings) for corner in corners]
+        chosen = _cheapest_choice(direct, settings) if all(map(len, direct)) else None
     if chosen is None:
         offered = [all_slots(polygon, room, corner, settings) for corner in corners]
         for corner, candidates in zip(corners, offered, strict=True):
             if not len(candidates):
                 raise NoRoomError(corner.vertex, best_wall(polygon, room, corner, settings))
-        chosen = _cheapest_choice(
-            [candidates.pick(slice(_KEPT)) for candidates in offered], settings
-        )
+        chosen = _cheapest_of_many(offered, settings)
     if chosen is None:
         raise NoRoomError(None, 0.0)
     lines = [candidates.lines[0] for candidates in chosen]
@@ -89,6 +90,24 @@ def _clearance(lines: Sequence[LineString], at: int) -> float:
     """Measures the distance from one centre line to the nearest other one, mm."""
     others = shapely.MultiLineString([*lines[:at], *lines[at + 1 :]])
     return float(others.distance(lines[at])) if len(lines) > 1 else np.inf
+
+
+def _cheapest_of_many(
+    offered: Sequence[Candidates], settings: Fabrication
+) -> list[Candidates] | None:
+    """Chooses as `_cheapest_choice`, first among the cheapest few of each corner.
+
+    What is dearer than a choice of these less the cheapest of all other corners cannot improve it.
+    """
+    few = _cheapest_choice([one.pick(slice(_FEW)) for one in offered], settings)
+    kept = [one.pick(slice(_KEPT)) for one in offered]
+    if few is not None:
+        least = [float(one.cost[0]) for one in offered]
+        margin = sum(float(one.cost[0]) for one in few) - sum(least)
+        kept = [one.pick(one.cost <= low + margin) for one, low in zip(kept, least, strict=True)]
+        if max(map(len, kept), default=0) <= _FEW:
+            return few
+    return _cheapest_choice(kept, settings)
 
 
 def _cheapest_choice(

@@ -88,9 +88,14 @@ def corners(net: UnitNetwork) -> dict[int, list[Corner]]:
     """Lists the vertices that take a slot, by id of the unit."""
     slotted: dict[int, list[Corner]] = defaultdict(list)
     for number, (a, p), (b, q), along in net.ligaments:
-        slotted[a].append(Corner(p, number, -along))
-        slotted[b].append(Corner(q, number, along))
+        length = float(shapely.distance(*(_vertex(net, *end) for end in ((a, p), (b, q)))))
+        slotted[a].append(Corner(p, number, -along, length))
+        slotted[b].append(Corner(q, number, along, length))
     return slotted
+
+
+def _vertex(net: UnitNetwork, unit: int, vertex: int) -> shapely.Point:
+    return shapely.Point(net.polygons[unit].exterior.coords[vertex])
 
 
 def refuse_overlaps(net: UnitNetwork, file: Path) -> None:

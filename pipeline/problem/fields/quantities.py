@@ -71,6 +71,7 @@ Stiffness = Annotated[float, _reader(units.STIFFNESS, 0.0, True), _schema(units.
 BendingStiffness = Annotated[
     float, _reader(units.BENDING_STIFFNESS, 0.0, True), _schema(units.BENDING_STIFFNESS)
 ]
+Modulus = Annotated[float, _reader(units.MODULUS, 0.0, True), _schema(units.MODULUS)]
 ContactStiffness = Annotated[
     float, _reader(units.CONTACT_STIFFNESS, 0.0, True), _schema(units.CONTACT_STIFFNESS)
 ]

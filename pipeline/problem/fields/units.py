@@ -64,6 +64,7 @@ FORCE = Dimension("a force", "N", "0.02 N")
 STIFFNESS = Dimension("a stiffness", "N/mm", "120 N/mm")
 BENDING_STIFFNESS = Dimension("a bending stiffness", "N mm/rad", "1.5 N mm/rad", ("N mm",))
 CONTACT_STIFFNESS = Dimension("a contact stiffness", "N mm/rad^2", "1.5 N mm/rad^2", ("N mm",))
+MODULUS = Dimension("a modulus of elasticity", "N/mm^2", "4500 MPa")
 DAMPING = Dimension("a damping", "tonne/s", "2.876e-2 kg/s")
 ROTARY_DAMPING = Dimension(
     "a rotary damping", "tonne mm^2/s/rad", "1.2e-7 kg m^2/s", ("tonne mm^2/s",)

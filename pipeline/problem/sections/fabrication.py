@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Gap, Length, Ratio, Section, fault
+from pipeline.problem.fields import Gap, Length, Modulus, Ratio, Section, fault
 
 _LEAST_LABEL = 2.0  # mm; smaller letters can neither be engraved nor printed
 _LEAST_RIM = 2.0  # mm around a bolt's hole
@@ -20,8 +20,9 @@ class Slots(Section):
     """Slots at the vertices that hold the shims.
 
     Attributes:
-        direction: where a slot points: the unit's centroid, along its ligament, or along the
-            bisector of its corner. Where the walls would be too thin, it turns as far as it must.
+        direction: where a slot points: along its ligament, which leaves the shim straight, to the
+            unit's centroid, or along the bisector of its corner. Where the walls would be too thin,
+            it turns; then both ends of a shim are chosen together, so that it is bent least.
         depth: wanted depth from the vertex.
         depth_min: least length in which the shim is held, where there is no more room.
         depth_max: largest depth, where only a deeper slot has thick enough walls.
@@ -30,7 +31,7 @@ class Slots(Section):
         tip: the tips beside the mouth are cut back to walls of this thickness.
     """
 
-    direction: Literal["centroid", "ligament", "bisector"] = "centroid"
+    direction: Literal["centroid", "ligament", "bisector"] = "ligament"
     depth: Length = 3.0
     depth_min: Length = 1.0
     depth_max: Length = 5.0
@@ -52,11 +53,15 @@ class Shims(Section):
 
     Attributes:
         thickness: of the foil.
+        young_modulus: of the foil, for its moment before any load; that of polyester.
+        prebend_strain: largest strain of a shim before any load; beyond it nothing is drawn.
         spares: extra pieces of each length, as a ratio; at least one.
         strips: also draw the authors' continuous paths, one per row and one per column.
     """
 
     thickness: Length = 0.25
+    young_modulus: Modulus = 4500.0
+    prebend_strain: Ratio = 0.3
     spares: Ratio = 0.1
     strips: bool = False
 

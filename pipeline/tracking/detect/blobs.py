@@ -6,29 +6,28 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from scipy.optimize import linear_sum_assignment
-from scipy.spatial.distance import cdist
 
 from pipeline.runtime import Picture
-from pipeline.tracking.geometry import Camera, SpecimenOutlines, rotation_matrix
+from pipeline.tracking.detect.lattice_votes import locate_lattice
+from pipeline.tracking.geometry import Camera, SpecimenOutlines
 from pipeline.tracking.geometry import camera as cameras
-from sim.core import Floats, Image, Ints
+from sim.core import Floats, Image, Ints, Mask
 
-_ROUNDS = 8
-_AFFINE_ROUNDS = 4
-_LEAST = 6
 _UPRIGHT = 10  # deg
-_NEARLY = 0.95
-_GATE = 0.25
-"""How far a blob may be from where a unit is expected, at last, pitches."""
+_NEARLY, _MOST = 0.95, 0.75
+"""Scores, over the number of units: of ways to see it that are as good; after which to look no
+further."""
 _AREA = 3.0
 """A camera that makes units so many times larger or smaller than told sees something else."""
 _BLOB_SIGMA = 0.2
 _DOT = 0.25
 """Width of a median that a mark on a face does not survive, pitches."""
-_TURNS = [np.array([[c, -s], [s, c]], float) for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))]
-_FLAT = 0.5
-"""Sides of the box, of the lattice or of the blobs, may differ by so much between the two."""
+_OTHER = 0.35
+"""Orientations that differ by so much are others, rad."""
+_SMALLEST = 0.25
+"""Least area of a patch, over that of a unit: at the rim of a wide picture they are small."""
+_MARGIN = 1.0
+"""A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
 _BLANK = 0.25  # of the contrast: what differs more from a face's own shade is a mark
 _MARKED = 0.02  # of a face
 _DOTS = 4
@@ -44,6 +43,8 @@ class LatticeDetection:
         blob: (matches, 2) its centroid, px.
         blobs: number of blobs of a unit's size.
         bright: whether the units are brighter than what is behind them.
+        missing: number of units without one that should be in the picture.
+        surplus: number of blobs without a unit that go on with the lattice.
     """
 
     camera: Camera
@@ -51,6 +52,13 @@ class LatticeDetection:
     blob: Floats
     blobs: int
     bright: bool
+    missing: int
+    surplus: int = 0
+
+    @property
+    def score(self) -> int:
+        """Returns matches less what should be there and is not, and the reverse."""
+        return len(self.unit) - self.missing - self.surplus
 
 
 def specimen_orientation(camera: Camera) -> tuple[float, bool]:
@@ -95,17 +103,22 @@ def detect_lattice(
     most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
     shares = (0.95, 0.8, 0.67, 0.56)
     scales = [px_per_mm] if px_per_mm else [float(most * share) for share in shares]
-    pairs = [(scale, bright) for scale in scales for bright in (True, False)]
-    found = max((_detections(image, specimen, *pair) for pair in pairs), key=_matches)
-    if _matches(found) < _NEARLY * specimen.count:
-        plain = {scale: _unmarked(image, specimen.pitch * scale) for scale in scales}
-        tried = [_detections(plain[pair[0]], specimen, *pair) for pair in pairs]
-        found = max(found, *tried, key=_matches)
-    return [one for one in found if len(one.unit) >= _NEARLY * _matches(found)]
+    found: list[LatticeDetection] = []
+    for marked in (True, False):
+        for scale in scales:
+            shown = image if marked else _unmarked(image, specimen.pitch * scale)
+            for bright in (True, False):
+                found = max(found, _detections(shown, specimen, scale, bright), key=_score)
+            if _score(found) > _MOST * specimen.count:
+                break
+        if _score(found) > _MOST * specimen.count:
+            break
+    least = _score(found) - (1 - _NEARLY) * specimen.count
+    return [one for one in found if one.score >= least]
 
 
-def _matches(ways: list[LatticeDetection]) -> int:
-    return max(len(one.unit) for one in ways)
+def _score(ways: list[LatticeDetection]) -> int:
+    return max((one.score for one in ways), default=-(10**9))
 
 
 def _unmarked(image: Picture, pitch: float) -> Image:
@@ -117,15 +130,45 @@ def _unmarked(image: Picture, pitch: float) -> Image:
 def _detections(
     image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool
 ) -> list[LatticeDetection]:
-    centroids = find_blobs(image, specimen, scale, bright)
+    """Returns the best match of each orientation, at least one; upright first, mirrored last."""
+    patches = find_blobs(image, specimen, scale, bright)
     size = (image.shape[1], image.shape[0])
     camera = Camera(np.eye(3), (np.array(size) - 1) / 2, np.zeros(2), size)
-    nothing = LatticeDetection(camera, np.empty(0, int), np.empty((0, 2)), len(centroids), bright)
-    found = [
-        _matched(specimen, centroids, matrix, scale, nothing)
-        for matrix in _initial_homographies(specimen.centre, centroids)
-    ]
-    return found or [nothing]
+    nothing = LatticeDetection(
+        camera, np.empty(0, int), np.empty((0, 2)), len(patches), bright, specimen.count
+    )
+    margin = _MARGIN * specimen.radius.mean() * scale
+
+    def inside(place: Floats) -> Mask:
+        return np.asarray(((place > margin) & (place < np.array(size) - 1 - margin)).all(axis=-1))
+
+    found: list[tuple[bool, float, LatticeDetection]] = []
+    for side in (1.0, -1.0):
+        points = specimen.centre * [side, -1.0]
+        turns: list[float] = []
+        for one in locate_lattice(points, specimen.joint, patches, scale, inside):
+            if any(abs(np.angle(np.exp(1j * (one.turn - turn)))) < _OTHER for turn in turns):
+                continue
+            turns.append(one.turn)
+            matrix = cameras.fit_homography(specimen.centre[one.unit], patches[one.patch])
+            seen = replace(camera, homography=matrix)
+            areas = np.abs(np.linalg.det(seen.jacobian(specimen.centre[one.unit]))) / scale**2
+            if areas.min() > 1 / _AREA and areas.max() < _AREA:
+                found.append(
+                    (
+                        side < 0,
+                        abs(one.turn),
+                        replace(
+                            nothing,
+                            camera=seen,
+                            unit=one.unit,
+                            blob=patches[one.patch],
+                            missing=one.missing,
+                            surplus=one.surplus,
+                        ),
+                    )
+                )
+    return [one for *_, one in sorted(found, key=lambda way: way[:2])] or [nothing]
 
 
 def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> LatticeDetection:
@@ -136,7 +179,7 @@ def with_distortion(specimen: SpecimenOutlines, detection: LatticeDetection) -> 
 
 
 def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright: bool) -> Floats:
-    """Returns centroids (n, 2) in px of patches of a unit's size."""
+    """Returns centroids (n, 2) in px of patches of a unit's size that the rim does not cut."""
     pitch = specimen.pitch * scale
     window = int(pitch * 2) | 1
     signed = image.astype(np.float32) * (1 if bright else -1)
@@ -152,7 +195,10 @@ def find_blobs(image: Picture, specimen: SpecimenOutlines, scale: float, bright:
     opened = cv2.morphologyEx(filled, cv2.MORPH_OPEN, kernel)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(opened, connectivity=4)
     areas = stats[1:, cv2.CC_STAT_AREA] / scale**2
-    good = (areas > 0.4 * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
+    good = (areas > _SMALLEST * specimen.area.min()) & (areas < 1.8 * specimen.area.max())
+    left, top, wide, high = stats[1:, :4].T
+    rows, columns = opened.shape
+    good &= (left > 0) & (top > 0) & (left + wide < columns) & (top + high < rows)
     return np.asarray(centroids[1:][good], np.float64)
 
 
@@ -162,73 +208,6 @@ def _filled(mask: Image, largest: float) -> Image:
     small = stats[:, cv2.CC_STAT_AREA] < largest
     small[0] = False
     return np.where(small[labels], np.uint8(1), mask)
-
-
-def _initial_homographies(points: Floats, pixels: Floats) -> list[Floats]:
-    """Lays the points' box over that of the pixels, without perspective.
-
-    The upright one comes first, then turned, then mirrored; lists none if there are few pixels.
-    """
-    if len(pixels) < _LEAST:
-        return []
-    angle = np.deg2rad(cv2.minAreaRect(pixels.astype(np.float32))[2])
-    lean = rotation_matrix(angle - np.round(angle / (np.pi / 2)) * np.pi / 2)
-    aligned = pixels @ lean
-    low, high = aligned.min(axis=0), aligned.max(axis=0)
-    out = []
-    for side in (1.0, -1.0):
-        for quarter in _TURNS:
-            turn = quarter @ np.diag([side, -1.0])
-            turned = points @ turn.T
-            first = turned.min(axis=0)
-            gain = (high - low) / (turned.max(axis=0) - first)
-            if abs(np.log(gain[0] / gain[1])) < _FLAT:
-                matrix = np.eye(3)
-                matrix[:2, :2] = gain[:, None] * turn
-                matrix[:2, 2] = low - gain * first
-                matrix[:2] = lean @ matrix[:2]
-                out.append(matrix)
-    return out
-
-
-def _matched(
-    specimen: SpecimenOutlines,
-    centroids: Floats,
-    matrix: Floats,
-    scale: float,
-    nothing: LatticeDetection,
-) -> LatticeDetection:
-    """Alternates one-to-one matching and a better homography, from a first guess of it."""
-    pitch = specimen.pitch * scale
-    for turn in range(_ROUNDS):
-        gate = pitch * (0.5 if turn else 0.8)
-        expected = cameras.apply_homography(matrix, specimen.centre)
-        unit, place = match_one_to_one(expected, centroids, gate)
-        if len(unit) < _LEAST:
-            return nothing
-        fit = _fit_affine if turn < _AFFINE_ROUNDS else cameras.fit_homography
-        matrix = fit(specimen.centre[unit], centroids[place])
-    expected = cameras.apply_homography(matrix, specimen.centre)
-    unit, place = match_one_to_one(expected, centroids, _GATE * pitch)
-    camera = replace(nothing.camera, homography=matrix / matrix[2, 2])
-    areas = np.abs(np.linalg.det(camera.jacobian(specimen.centre))) / scale**2
-    if not (areas.min() > 1 / _AREA and areas.max() < _AREA):
-        return nothing
-    return replace(nothing, camera=camera, unit=unit, blob=centroids[place])
-
-
-def _fit_affine(points: Floats, pixels: Floats) -> Floats:
-    rows = np.column_stack([points, np.ones(len(points))])
-    found = np.linalg.lstsq(rows, pixels, rcond=None)[0].T
-    return np.vstack([found, [0, 0, 1.0]])
-
-
-def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
-    """Assigns with least total distance (capped at ``gate``), pairs beyond it left out."""
-    distance = cdist(expected, found)
-    rows, columns = linear_sum_assignment(np.minimum(distance, gate))
-    near = distance[rows, columns] < gate
-    return rows[near], columns[near]
 
 
 def classify_markings(

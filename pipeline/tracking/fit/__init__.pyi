@@ -1,3 +1,4 @@
+from .exposure_blur import ExposureBlur as ExposureBlur
 from .frame_fit import PoseFitter as PoseFitter
 from .patch_correlation import PoseFits as PoseFits
 from .patch_correlation import Templates as Templates

@@ -42,6 +42,7 @@ class PoseFitter:
         chosen: Mask | None = None,
         tight: Floats | None = None,
         noise: Floats | None = None,
+        drift: Floats | None = None,
     ) -> PoseFits:
         """Fits the chosen units; NaN for the others and for those that cannot be fitted.
 
@@ -53,6 +54,7 @@ class PoseFitter:
             tight: (units,) scale of the residuals, where photometry and pose are nearly known and
                 part of the unit may be hidden.
             noise: (units,) residuals to expect, over the gain, where the pose is nearly known.
+            drift: (units, 3) change of the poses from row to row; they are those of the middles'.
         """
         units, place = len(pose), self.templates.centre + pose[:, :2]
         j = self.camera.jacobian(place)
@@ -65,6 +67,7 @@ class PoseFitter:
             self.full,
             np.zeros(units) if noise is None else noise,
             np.zeros(units) if tight is None else tight,
+            np.zeros((units, 3)) if drift is None else drift,
         )
         wanted = np.isfinite(start.middle[:, 0]) & np.isfinite(scale)
         wanted = wanted if chosen is None else wanted & chosen

@@ -39,7 +39,8 @@ class FramePixels(NamedTuple):
 class TemplateArrays(NamedTuple):
     """Holds the template of one unit: nodes as `unfold` makes them, cells, place at rest.
 
-    Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it.
+    Blocks whose middle is farther than ``reach`` (mm) from its own hold nothing of it. From row to
+    row of the frame the unit moves by its drift, which is zero in the row of its middle.
     """
 
     nodes: Singles
@@ -49,6 +50,10 @@ class TemplateArrays(NamedTuple):
     x: float
     y: float
     reach: float
+    row: float
+    drift_x: float
+    drift_y: float
+    drift_turn: float
 
 
 class FitBuffers(NamedTuple):
@@ -99,9 +104,12 @@ def _place(
     """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
     plane, x, y = scene.plane, room.x, room.y
     per_step = np.float32(1 / look.step)
-    cos, sin = np.float32(math.cos(state[2])) * per_step, np.float32(math.sin(state[2])) * per_step
-    x_at, y_at = np.float32(look.x + state[0]), np.float32(look.y + state[1])
     for row in range(SIZE):
+        late = top + row - look.row
+        turn = state[2] + late * look.drift_turn
+        cos, sin = np.float32(math.cos(turn)) * per_step, np.float32(math.sin(turn)) * per_step
+        x_at = np.float32(look.x + state[0] + late * look.drift_x)
+        y_at = np.float32(look.y + state[1] + late * look.drift_y)
         for column in range(SIZE):
             vx = plane[top + row, left + column, 0] - x_at
             vy = plane[top + row, left + column, 1] - y_at

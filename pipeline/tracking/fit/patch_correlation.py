@@ -74,6 +74,7 @@ class FitStart(NamedTuple):
         noise: (units,) residuals to expect, over the gain; zero if unknown.
         tight: (units,) scale of the robust weights in the end, whatever the residuals; zero to fit
             the photometry first and to let the residuals decide.
+        drift: (units, 3) change of the pose from row to row of the frame, by a rolling shutter.
     """
 
     state: Floats
@@ -83,6 +84,7 @@ class FitStart(NamedTuple):
     full: Floats
     noise: Floats
     tight: Floats
+    drift: Floats
 
 
 class FitTarget(NamedTuple):
@@ -290,6 +292,10 @@ def fit_patches(
             templates.centre[unit, 0],
             templates.centre[unit, 1],
             templates.reach[unit] + 0.71 * SIZE / start.scale[unit],
+            start.middle[unit, 1],
+            start.drift[unit, 0],
+            start.drift[unit, 1],
+            start.drift[unit, 2],
         )
         state[:] = start.state[unit]
         aim = FitTarget(

@@ -74,7 +74,7 @@ def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
         f"title: {described.get('kind', described['name'])!r}",
         f"video: {str(video)!r}",
         f"design: {design}",
-        "synthetic: true",
+        f"synthetic: {str(described.get('synthetic', True)).lower()}",
     ]
     if scale := described.get("approx_px_per_mm"):
         lines.append(f"pixel_size: {1 / scale:.4g} mm")

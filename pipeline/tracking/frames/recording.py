@@ -79,6 +79,11 @@ class Recording(Section):
             does not tell.
         mirrored: whether it is seen from behind, likewise.
         frame_rate: of a folder of pictures, which have no times of their own.
+        exposure: of a frame, whose blur of quick motions is allowed for; without it, that blur
+            tells it.
+        readout: of a rolling shutter, from the first row of a frame to the last; with it, every
+            unit gets the time of its own row.
+        camera: whether it stands still, or what the clamped units do together is its own motion.
         window: of time, since the file's first frame.
         load_axis: what courses are drawn over; a track holds both.
         load_cell: forces logged beside it.
@@ -100,6 +105,9 @@ class Recording(Section):
     turned: Angle | None = None
     mirrored: bool | None = None
     frame_rate: Frequency | None = None
+    exposure: Delay | None = None
+    readout: Delay = 0.0
+    camera: Literal["fixed", "follows supports"] = "fixed"
     window: Window = Window()
     load_axis: Literal["time", "driven displacement"] = "time"
     load_cell: LoadCellLog | None = None

@@ -33,6 +33,10 @@ _ALONE = {
 
 _SUFFIXES = {".png", ".tif", ".tiff"}
 _WHITE = 255.0
+_LUMA = np.array([0.299, 0.587, 0.114])
+_COLOURFUL = 2.5
+"""Colours that spread so many times more than luma are what tells units from the board."""
+_SPARSE, _RANGE = 4, 200.0
 _LARGEST = 1 << 27
 """Pixels of a frame."""
 
@@ -155,6 +159,46 @@ def _opened(path: Path) -> av.container.InputContainer:
     return av.open(f"file:{path}", options=_ALONE)
 
 
+class _Shades:
+    """Turns frames into brightness: luma, unless colours tell much more apart in the first one."""
+
+    def __init__(self) -> None:
+        self._axis: Floats | None = None
+        self._begun = False
+
+    def __call__(self, frame: av.VideoFrame) -> Picture:
+        """Returns (rows, columns) brightness, from 0 to 255."""
+        if not self._begun:
+            self._begun, self._axis = True, _colour_axis(frame)
+        if self._axis is None:
+            return _brightness(frame)
+        return _projected(frame, self._axis)
+
+
+def _colour_axis(frame: av.VideoFrame) -> Floats | None:
+    """Returns weights (3,) of red, green and blue with an offset last, or nothing for luma's.
+
+    Luma is kept unless the colours' main direction spreads them far more.
+    """
+    if len(frame.format.components) < 3:
+        return None
+    colour = frame.to_ndarray(format="rgb24")[::_SPARSE, ::_SPARSE].reshape(-1, 3).astype(float)
+    spread, axes = np.linalg.eigh(np.cov(colour.T))
+    axis = axes[:, -1] * np.sign(axes[np.abs(axes[:, -1]).argmax(), -1])
+    if np.sqrt(spread[-1]) < _COLOURFUL * float((colour @ _LUMA).std()):
+        return None
+    low, high = np.percentile(colour @ axis, [1, 99])
+    gain = _RANGE / max(float(high - low), 1e-9)
+    return np.append(axis * gain, 0.5 * (_WHITE - gain * (high + low)))
+
+
+def _projected(frame: av.VideoFrame, axis: Floats) -> Picture:
+    deep = max(part.bits for part in frame.format.components) > 8
+    colour = frame.to_ndarray(format="rgb48le" if deep else "rgb24").astype(np.float32)
+    weights = (axis[:3] / (257.0 if deep else 1.0)).astype(np.float32)
+    return np.asarray(np.clip(colour @ weights + np.float32(axis[3]), 0, _WHITE), np.float32)
+
+
 def _decoded(
     container: av.container.InputContainer, path: Path, start: float, end: float
 ) -> Iterator[Frame]:
@@ -167,7 +211,7 @@ def _decoded(
         raise UserError(f"frames of {size} pixels are too large", file=path, remedy=remedy)
     first: float | None = None
     index, time = 0, 0.0
-    decoded = iter(container.decode(stream))
+    decoded, shades = iter(container.decode(stream)), _Shades()
     while time < end:
         try:
             frame = next(decoded, None)
@@ -185,7 +229,7 @@ def _decoded(
         if time > end:
             return
         if time >= start:
-            yield Frame(index, time, _upright(frame))
+            yield Frame(index, time, _upright(shades(frame), frame.rotation))
         index += 1
 
 
@@ -196,9 +240,9 @@ def _promised(container: av.container.InputContainer, stream: av.VideoStream, ra
     return rate * container.duration / av.time_base - 1
 
 
-def _upright(frame: av.VideoFrame) -> Picture:
+def _upright(image: Picture, rotation: float) -> Picture:
     """Turns the brightness as players show it: a phone tells how it was held."""
-    image, quarters = _brightness(frame), round(frame.rotation / 90)
+    quarters = round(rotation / 90)
     return cast("Picture", np.ascontiguousarray(np.rot90(image, quarters))) if quarters else image
 
 

@@ -1,5 +1,6 @@
 from . import camera as camera
 from .camera import Camera as Camera
+from .camera import camera_of as camera_of
 from .camera import fit_camera as fit_camera
 from .depth import Depth as Depth
 from .depth import estimate_depth as estimate_depth
@@ -9,4 +10,5 @@ from .rigid_fit import robust_motion as robust_motion
 from .rigid_fit import rotation_matrix as rotation_matrix
 from .specimen_outlines import SpecimenOutlines as SpecimenOutlines
 from .specimen_outlines import as_built as as_built
+from .specimen_outlines import clamped_units as clamped_units
 from .specimen_outlines import outlines_of_design as outlines_of_design

@@ -88,6 +88,13 @@ def outlines_of_design(design: xr.Dataset) -> SpecimenOutlines:
     )
 
 
+def clamped_units(design: xr.Dataset) -> Mask:
+    """Marks the clamped ones among the units (units,) that are present."""
+    present = np.isfinite(design["vertices"].transpose("unit", "vertex", "xy").values[:, 0, 0])
+    flag = TABLES["design"]["support"].flags["clamped"]
+    return np.asarray(design["support"].values[present] == flag)
+
+
 def _centroid(polygon: Floats) -> Floats:
     cross = _cross(polygon)
     following = np.roll(polygon, -1, axis=0)

@@ -20,10 +20,11 @@ _ABOVE = 3.0
 _EMERGING = 2.858
 """Singular value, over the median, of a shape that is told from white noise (Gavish and Donoho,
 IEEE Trans. Inf. Theory 60 (2014) 5040)."""
-_FILLINGS = 12
-_DIFFERENCES = tuple(
-    np.array(row, float) for row in ([1, -2, 1], [1, -4, 6, -4, 1], [1, -6, 15, -20, 15, -6, 1])
-)
+_COMMON = 8
+_FILLINGS, _FILLED = 80, 0.1
+"""Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
+_REACHES = (1, 2, 3)
+"""Frames to either side of one whose place the polynomial through them tells."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0
 
@@ -54,13 +55,16 @@ def separate_modes(motion: Floats, near: Ints, noise: float) -> MotionModes:
     """
     known = np.isfinite(motion)
     full = _filled(motion)
-    for _ in range(1 if known.all() else _FILLINGS):
+    for _ in range(_FILLINGS):
         left, values, right = np.linalg.svd(full, full_matrices=False)
         floor = max(_EMERGING * float(np.median(values)), noise * np.sqrt(full.shape).sum())
         count = _leading(values / floor, right[: min(_MOST, len(values) // 2)], near)
         amplitude, shape = left[:, :count] * values[:count], right[:count]
         low = amplitude @ shape
+        change = np.sqrt(np.mean((full - low)[~known] ** 2)) if count and not known.all() else 0.0
         full = np.where(known, motion, low)
+        if change < _FILLED * noise:
+            break
     return MotionModes(amplitude, shape, full - low)
 
 
@@ -73,13 +77,25 @@ def _leading(height: Floats, vectors: Floats, near: Ints) -> int:
 
 
 def _filled(motion: Floats) -> Floats:
-    """Fills missing values by those before and after, in time."""
-    out = motion.copy()
-    frames = np.arange(len(motion))
-    for unit in np.nonzero(~np.isfinite(motion).all(axis=0))[0]:
-        known = np.isfinite(motion[:, unit])
-        out[:, unit] = np.interp(frames, frames[known], motion[known, unit]) if known.any() else 0.0
-    return out
+    """Fills missing values by those before and after, in time, about what all units do together."""
+    known = np.isfinite(motion)
+    if known.all():
+        return motion.copy()
+    frames, seen = np.arange(len(motion)), known.any(axis=1)
+    common = np.zeros(len(motion))
+    apart = motion
+    for _ in range(_COMMON):  # units that are seen now and then are no reason for a common step
+        more = np.nansum(apart, axis=1)[seen] / known.sum(axis=1)[seen]
+        common += np.interp(frames, frames[seen], more) if seen.any() else 0.0
+        apart = motion - common[:, None]
+        usual = np.nansum(apart, axis=0) / np.maximum(known.sum(axis=0), 1)
+        apart = apart - usual
+    apart = motion - common[:, None]
+    for unit in np.nonzero(~known.all(axis=0))[0]:
+        here = known[:, unit]
+        rest = np.interp(frames, frames[here], apart[here, unit]) if here.any() else 0.0
+        apart[:, unit] = np.where(here, apart[:, unit], rest)
+    return apart + common[:, None]
 
 
 def _likeness(shape: Floats, near: Ints) -> float:
@@ -100,13 +116,13 @@ def constant_share(amplitude: Floats) -> float:
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
-    """Measures amplitudes (frames, n) against polynomials through those beside, per frame.
+def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
+    """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
     The order is the lowest that leaves little more than the next ones: more is motion. A jolt is
     motion too, so values are held to a few times the usual; frames at the ends are as the next.
     """
-    found = [_differences(amplitude, steady, weights) for weights in _DIFFERENCES]
+    found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
     usual = np.array([np.nanmedian(np.abs(one), axis=0) / 0.6745 for one in found])
     usual = np.nan_to_num(usual)
     out = np.empty_like(amplitude)
@@ -120,10 +136,16 @@ def amplitude_jitter(amplitude: Floats, steady: Mask) -> Floats:
     return out
 
 
-def _differences(amplitude: Floats, steady: Mask, weights: Floats) -> Floats:
+def _differences(amplitude: Floats, steady: Mask, time: Floats, reach: int) -> Floats:
+    """Returns divided differences (frames, n) over so many frames to either side, unit norm."""
     out = np.full_like(amplitude, np.nan)
-    reach = len(weights) // 2
     for frame in range(reach, len(amplitude) - reach):
-        if steady[frame - reach + 1 : frame + reach + 1].all():
-            out[frame] = weights @ amplitude[frame - reach : frame + reach + 1]
-    return out / np.linalg.norm(weights)
+        window = slice(frame - reach, frame + reach + 1)
+        if (
+            steady[frame - reach + 1 : frame + reach + 1].all()
+            and (np.diff(time[window]) > 0).all()
+        ):
+            apart = time[window, None] - time[None, window] + np.eye(2 * reach + 1)
+            weights = 1 / np.prod(apart / np.abs(apart).max(), axis=1)
+            out[frame] = weights @ amplitude[window] / np.linalg.norm(weights)
+    return out

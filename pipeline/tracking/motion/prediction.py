@@ -20,6 +20,19 @@ class Neighbourhood:
 
     def __init__(self, centre: Floats) -> None:
         self._centre = centre
+        self._apart = cKDTree(centre).query(centre, k=2)[0][:, 1]
+
+    def collisions(self, found: Floats, good: Mask, least: float) -> Mask:
+        """Finds good units that claim one place: nearer than a part of their distance at rest."""
+        out = np.zeros(len(found), dtype=bool)
+        places = np.nonzero(good)[0]
+        if len(places) < 2:
+            return out
+        now = self._centre[places] + found[places, :2]
+        distance, other = (values[:, 1] for values in cKDTree(now).query(now, k=2))
+        usual = np.minimum(self._apart[places], self._apart[places[other]])
+        out[places] = distance < least * usual
+        return out
 
     def predict_rigid(self, known: Floats, found: Floats, good: Mask, wanted: Mask) -> Floats:
         """Predicts poses of the wanted units that move rigidly with the nearest good ones.

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.runtime import Picture
 from pipeline.tracking.detect import Relocaliser
-from pipeline.tracking.fit import PoseFits, PoseFitter, SideWalls
+from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.prediction import Neighbourhood
 from sim.core import Floats, Ints, Mask
@@ -24,17 +24,51 @@ _SHARE = 0.35
 _SHARE_KNOWN = 0.18
 _GAIN = (0.12, 4.0)
 """Gain, against the reference frame's, between which a unit can be seen."""
+_QUICK, _SHARP = 2.0, 0.7
+"""A unit that moves by so many px from frame to frame, and of which less than this part is seen,
+may be blurred by its motion where the exposure is not known."""
+_PARTS = np.linspace(0.0, 1.0, 9)
+"""Exposures that are tried where none is told, over the interval of frames."""
+_TELLING, _FEW_QUICK = 5.0, 3
+"""Motion from frame to frame that tells of the exposure, px; number of units that must make it."""
 _GLARE = 0.4
 _MISFIT = 0.15
 """Residuals of a good fit, in contrasts of the unit; or so many times the reference frame's: """
 _NOISIER = 4.0
 _STRAY = 0.25
 """A unit so far from where its neighbours carry it is another one, or none, pitches."""
+_TURNED = 0.5
+"""Or so far turned from there, rad."""
 _TIGHT = 6.0
-_FEW = 0.9
-"""Where so much less units are found than in the frame before, the specimen may have jumped."""
+_FEW, _HALF = 0.9, 0.5
+"""Where a smaller part of the units is found, the specimen may have jumped; where as many are found
+in another place, it has."""
+_WHOLE = 0.8
+"""Part of the units that must be found for their poses to be those looked for after a loss."""
+_OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])
+"""Tried of every unit, beside the turn of a lattice that is found again; the first that fits. None
+but the first unless nearly all are in view, since a lattice turned so may lie a unit aside."""
+_CLOSE = 0.5
+"""Two units nearer to each other than this part of their least distance at rest are one."""
 _ROUNDS = 40
 _RETRIES = 4
+
+
+class Shutter(NamedTuple):
+    """Holds the shutter of a camera.
+
+    Attributes:
+        exposure: of a row, s; without it, the first quick motion tells.
+        readout: from the first row to the last, s.
+        noise: residuals to expect of the sensor's noise, levels.
+    """
+
+    exposure: float | None = None
+    readout: float = 0.0
+    noise: float = 0.0
+
+
+_GLOBAL = Shutter()
 
 
 class TrackedFrame(NamedTuple):
@@ -57,6 +91,11 @@ class Tracker:
         fitter: the camera and the units' looks; the first frame is its reference.
         relocaliser: finds the lattice where prediction fails.
         walls: of thick units.
+        shutter: of the camera.
+        blur: by the exposure; without it, none is allowed for.
+
+    Attributes:
+        exposure: of a row, s; zero as long as it is not known.
     """
 
     def __init__(
@@ -65,40 +104,101 @@ class Tracker:
         fitter: PoseFitter,
         relocaliser: Relocaliser,
         walls: SideWalls | None = None,
+        shutter: Shutter = _GLOBAL,
+        blur: ExposureBlur | None = None,
     ) -> None:
         self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
+        self._shutter, self._blur = shutter, blur
+        self.exposure = shutter.exposure or 0.0
+        self._open = shutter.exposure is None and blur is not None
+        self._time, self._interval = 0.0, 0.0
         self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre = specimen.centre
+        middle = specimen.centre.mean(axis=0)
+        self._pixel = 1 / float(fitter.camera.px_per_mm(middle))
         self._pose, self._photometry = fitter.start(1.0)
+        self._whole = self._pose
         self._velocity = np.zeros_like(self._pose)
         self._gain = np.empty(0)
         self._limit = np.empty(0)
         self._noise = np.empty(0)
         self._usual = np.zeros(specimen.count)
-        self._seen = 0
 
-    def step(self, image: Picture) -> TrackedFrame:
-        """Finds the units in the next frame."""
-        found = self._fitter.fit(image, self._predicted(), self._photometry, noise=self._usual)
-        fits = found.copy()
+    def step(self, image: Picture, time: float) -> TrackedFrame:
+        """Finds the units in the next frame, at a time in s."""
         first = not len(self._gain)
+        self._interval, self._time = 0.0 if first else time - self._time, time
+        fits = self._fit(image, self._predicted(), self._photometry)
+        if not first and (self._shutter.readout or self._blur is not None):
+            self._improve_velocity(fits.pose)
+            if self._open:
+                self._measure_exposure(image, fits)
+            if self._shutter.readout or self.exposure:
+                fits = self._fit(image, fits.pose, fits.photometry)
         if first:
             self._set_reference(fits)
         good = self._complete(image, fits, self._accepted(fits, _SHARE))
-        jumped = good.sum() < _FEW * self._seen
-        if jumped:
+        jumped = good.mean() < _FEW
+        if jumped and not first:
             fits, good = self._relocalise(image, fits, good)
-        self._seen = int(good.sum())
+        good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
         quality = self._reasons(fits, good)
         for values in fits:
             values[~good] = np.nan
         self._update(fits, good, first or jumped)
         return TrackedFrame(fits, quality)
 
+    def _fit(
+        self,
+        image: Picture,
+        pose: Floats,
+        photometry: Floats,
+        chosen: Mask | None = None,
+        tight: Floats | None = None,
+    ) -> PoseFits:
+        """Fits units as they move while the frame is exposed and read out."""
+        rows = self._fitter.camera.size[1]
+        drift = self._velocity * (self._shutter.readout / rows) if self._shutter.readout else None
+        if self._blur is not None:
+            way = self._velocity * self.exposure
+            cos, sin = np.cos(self._pose[:, 2]), np.sin(self._pose[:, 2])
+            x, y = way[:, 0], way[:, 1]
+            own = np.stack([cos * x + sin * y, cos * y - sin * x, way[:, 2]], axis=1)
+            self._blur.redraw(own)
+        usual = self._usual if chosen is None else None
+        return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
+
+    def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
+        """Takes the exposure that leaves the least residuals of the units that are quick enough."""
+        way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval / self._pixel
+        quick = self._accepted(fits, _SHARE, sharp=False) & (way > _TELLING)
+        if quick.sum() < _FEW_QUICK:
+            return
+        left = []
+        for part in _PARTS:
+            self.exposure = part * self._interval
+            again = self._fit(image, fits.pose, fits.photometry, quick)
+            left.append(float(np.nanmean((again.noise / again.photometry[:, 0])[quick] ** 2)))
+        best = int(np.argmin(left))
+        part = _PARTS[best]
+        if 0 < best < len(left) - 1:  # the lowest point of the parabola through it and those beside
+            before, here, after = left[best - 1 : best + 2]
+            part += 0.5 * (before - after) / (before - 2 * here + after) * _PARTS[1]
+        self.exposure = float(part) * self._interval
+        self._open = False
+
+    def _improve_velocity(self, pose: Floats) -> None:
+        """Takes the velocities from the poses of this frame, where they are found."""
+        if self._interval > 0:
+            now = (pose - self._pose) / self._interval
+            change = now - np.where(self._velocity == 0, now, self._velocity)
+            now = now + 0.5 * change  # at this frame's time, not half an interval before
+            self._velocity = np.where(np.isfinite(now), now, self._velocity)
+
     def _predicted(self) -> Floats:
         """Extrapolates the poses by their velocities, and redraws the walls there."""
-        ahead = self._pose + self._velocity
+        ahead = self._pose + self._velocity * self._interval
         if self._walls is not None:
             self._walls.redraw(ahead)
         return ahead
@@ -110,17 +210,24 @@ class Tracker:
         usual = np.nanmedian(relative)
         self._gain = np.where(np.isfinite(gain), gain, 1.0)
         self._noise = np.fmax(np.where(np.isfinite(relative), relative, usual), usual)
+        self._noise = np.maximum(self._noise, self._shutter.noise / self._gain)
         contrast = self._fitter.templates.contrast
         self._limit = np.maximum(_NOISIER * self._noise, _MISFIT * contrast)
         self._fitter.full = np.nan_to_num(fits.information)
 
-    def _accepted(self, fits: PoseFits, share: float) -> Mask:
+    def _accepted(self, fits: PoseFits, share: float, sharp: bool = True) -> Mask:
+        """Judges fits; one of a unit that is seen in part has to be the better."""
         gain = fits.photometry[:, 0]
         relative = gain / self._gain
+        seen = np.minimum(fits.share, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
-            fitting = fits.noise / np.abs(gain) < self._limit
-        seen = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
-        return np.isfinite(fits.pose[:, 0]) & (fits.last < _SETTLED) & fitting & seen
+            fitting = fits.noise / np.abs(gain) < self._limit * 0.5 * (1 + seen)
+        settled = fits.last < _SETTLED * seen**2
+        if sharp and not self.exposure and self._interval > 0:
+            quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
+            fitting &= ~(quick & (seen < _SHARP))
+        lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
+        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit
 
     def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
@@ -130,23 +237,42 @@ class Tracker:
 
     def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
+        now = np.where(good[:, None], fits.pose, np.nan)
+        placed = self._relocaliser.placed_again(image, self._whole, now)
+        if placed is None:
+            return fits, good
         again, new = fits.copy(), np.zeros_like(good)
-        for guess in self._relocaliser.candidate_poses(image, self._pose):
+        self._pose = placed
+        most = self._relocaliser.in_view(placed).mean() > _WHOLE
+        for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
+            guess = placed + np.array([0.0, 0.0, own])
             new = self._try(image, again, new, (guess, self._photometry, None, _SHARE))
+            if new.sum() > _HALF * len(new):
+                break
         new = self._complete(image, again, new)
         return (again, new) if new.sum() > good.sum() else (fits, good)
+
+    def _reachable(self, guess: Floats) -> Mask:
+        """Tells guesses (units, 3) that are in view, if only in part."""
+        return np.isfinite(guess[:, 0]) & self._relocaliser.in_view(guess, -_HALF)
+
+    def _near(self, fits: PoseFits, guess: Floats) -> Mask:
+        """Tells fits (units,) that ended near where they began, and so are no other unit's."""
+        off = np.linalg.norm(fits.pose[:, :2] - guess[:, :2], axis=1)
+        turned = np.abs(fits.pose[:, 2] - guess[:, 2])
+        return np.asarray((off < self._stray) & (turned < _TURNED))
 
     def _propagate(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Tries the units that were not found where their neighbours would have carried them."""
         for _ in range(_ROUNDS):
             good &= ~self._neighbours.outliers(fits.pose, good, self._stray)
             guess = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
-            wanted = np.isfinite(guess[:, 0])
+            wanted = self._reachable(guess)
             if not wanted.any():
                 break
             photometry = self._photometry * self._gain_change(fits, good)
-            again = self._fitter.fit(image, guess, photometry, wanted)
-            new = self._accepted(again, _SHARE) & wanted
+            again = self._fit(image, guess, photometry, wanted)
+            new = self._accepted(again, _SHARE) & wanted & self._near(again, guess)
             if not new.any():
                 break
             fits.take(again, new)
@@ -177,11 +303,11 @@ class Tracker:
     ) -> Mask:
         """Fits what is not good from a guess and keeps what is accepted and has not strayed."""
         guess, photometry, tight, least = trial
-        wanted = ~good & np.isfinite(guess[:, 0])
+        wanted = ~good & self._reachable(guess)
         if not wanted.any():
             return good
-        again = self._fitter.fit(image, guess, photometry, wanted, tight)
-        new = self._accepted(again, least) & wanted
+        again = self._fit(image, guess, photometry, wanted, tight)
+        new = self._accepted(again, least) & wanted & self._near(again, guess)
         both = fits.copy()
         both.take(again, new)
         new &= ~self._neighbours.outliers(both.pose, good | new, self._stray)
@@ -209,9 +335,7 @@ class Tracker:
         return float(np.median(fits.photometry[good, 0] / self._photometry[good, 0]))
 
     def _reasons(self, fits: PoseFits, good: Mask) -> Ints:
-        middle = self._fitter.camera.project(self._centre + self._pose[:, :2])
-        width, height = self._fitter.camera.size
-        inside = (middle > 0).all(axis=1) & (middle < [width - 1, height - 1]).all(axis=1)
+        inside = self._relocaliser.in_view(self._pose)
         relative = fits.photometry[:, 0] / self._gain
         reasons = np.full(len(good), HIDDEN)
         reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > _SHARE)] = POOR_FIT
@@ -224,7 +348,8 @@ class Tracker:
         carried = self._neighbours.predict_rigid(self._pose, fits.pose, good, ~good)
         lost = np.where(np.isfinite(carried), carried, self._pose)
         pose = np.where(good[:, None], fits.pose, lost)
-        self._velocity = np.where(good[:, None] & (not still), pose - self._pose, 0.0)
+        moving = good[:, None] & (not still and self._interval > 0)
+        self._velocity = np.where(moving, (pose - self._pose) / (self._interval or 1.0), 0.0)
         self._photometry = np.where(
             good[:, None], fits.photometry, self._photometry * self._gain_change(fits, good)
         )
@@ -232,3 +357,5 @@ class Tracker:
         if not still:
             self._usual = np.where(good, relative, self._usual)
         self._pose = pose
+        if good.mean() > _WHOLE:
+            self._whole = pose

@@ -15,6 +15,7 @@ import warnings
 import numpy as np
 from scipy.spatial import cKDTree
 
+from pipeline.tracking.fit import PoseFits
 from pipeline.tracking.motion import motion_modes
 from sim.core import Floats, Ints, Mask, Reals
 
@@ -31,6 +32,8 @@ _USUAL = 6.0
 frames: few frames do not show how their errors drift."""
 _USUAL_FRAMES = 2.0
 _LEAST_FREEDOM = 0.2
+_SEEN = 0.9
+"""Part of the units of the fullest frame that one must show to tell of the shapes' amplitudes."""
 _OWN = 0.3
 
 
@@ -41,26 +44,46 @@ def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
     return np.sqrt(variance)
 
 
-def calibrate_sigma(motion: Reals, sigma: Reals, centre: Floats, steady: Mask) -> Reals:
+def residual_likeness(fits: PoseFits) -> float:
+    """Returns the variance that blocks of residuals tell, over that of white ones: one or more."""
+    white = np.einsum("uii->ui", fits.curvature) * fits.noise[:, None] ** 2
+    ratio = standard_errors(fits.scatter, fits.blocks) ** 2 / white
+    return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan
+
+
+def calibrate_sigma(
+    motion: Reals,
+    sigma: Reals,
+    centre: Floats,
+    steady: Mask,
+    time: Floats | None = None,
+    averaged: int = 1,
+    coded: bool = True,
+) -> Reals:
     """Scales the standard uncertainties so that they tell the scatter of the motions.
 
     Args:
         motion: (frames, units, 3) poses, NaN where missing.
         sigma: (frames, units, 3) their uncertainties by the image.
         centre: (units, 2) places at rest.
-        steady: (frames,) which follow the frame before at the usual distance in time.
+        steady: (frames,) which follow the frame before as their times say.
+        time: (frames,) s; by default even.
+        averaged: number of frames that the reference is the mean of.
+        coded: whether residuals are alike within blocks, as codecs leave them.
 
     Returns:
         (frames, units, 3); with too few frames to tell, a usual multiple of the image's own.
     """
     near = cKDTree(centre).query(centre, k=min(4, len(centre)))[1][:, 1:]
     out = np.empty_like(sigma)
+    time = np.arange(len(motion), dtype=float) if time is None else time
     parts = np.array_split(np.arange(len(motion)), -(-len(motion) // _MOST_FRAMES))
     for part in (slice(frames[0], frames[-1] + 1) for frames in parts):
         for dof in range(motion.shape[2]):
             calm = _calmed(sigma[part, :, dof].astype(float))
-            factor = _factor(motion[part, :, dof].astype(float), calm, near, steady[part])
-            out[part, :, dof] = calm * factor
+            shown = motion[part, :, dof].astype(float)
+            variance, reference = _factors(shown, calm, near, steady[part], time[part], coded)
+            out[part, :, dof] = calm * np.sqrt(variance + reference / averaged)
     return out
 
 
@@ -77,29 +100,41 @@ def _calmed(sigma: Floats) -> Floats:
     return np.exp(frame + unit + _OWN * (told - frame - unit))
 
 
-def _factor(motion: Floats, sigma: Floats, near: Ints, steady: Mask) -> Floats:
-    """Returns factors (frames, units) by which uncertainties of one dof are too small."""
-    usual = np.full(motion.shape, np.sqrt(_USUAL))
+def _factors(
+    motion: Floats, sigma: Floats, near: Ints, steady: Mask, time: Floats, coded: bool
+) -> tuple[Floats, float]:
+    """Returns factors (frames, units) by which variances of one dof are too small.
+
+    Beside, the share of the reference frame's own error that the motion's shapes take up.
+    """
+    told = _USUAL if coded else 1.0
+    usual = np.full(motion.shape, told)
     if len(motion) < _LEAST_FRAMES or not np.isfinite(motion).any():
-        return usual
+        return usual, 0.0
     found = motion_modes.separate_modes(motion, near, float(np.nanmedian(sigma)))
-    ratio = _ratio(np.isfinite(motion), sigma, found, steady)
+    ratio = _ratio(np.isfinite(motion), sigma, found, steady, time)
     if not np.isfinite(ratio).any():
-        return usual
+        return usual, 0.0
     level = float(np.nanmean(ratio))
     by_frame = _shrunk(ratio, level, 1)
     by_unit = _shrunk(ratio / by_frame[:, None], 1.0, 0)
-    belief = (level * len(ratio) + _USUAL * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
-    reference = motion_modes.constant_share(found.amplitude)
-    return np.sqrt(by_frame[:, None] * by_unit[None, :] * belief / level + reference)
+    belief = (level * len(ratio) + told * _USUAL_FRAMES) / (len(ratio) + _USUAL_FRAMES)
+    factors = by_frame[:, None] * by_unit[None, :] * belief / level
+    return factors, motion_modes.constant_share(found.amplitude)
 
 
-def _ratio(known: Mask, sigma: Floats, found: motion_modes.MotionModes, steady: Mask) -> Floats:
+def _ratio(
+    known: Mask, sigma: Floats, found: motion_modes.MotionModes, steady: Mask, time: Floats
+) -> Floats:
     """Returns squared noise over the image's variance (frames, units), NaN if unseen."""
     by_frame, by_unit = motion_modes.leverage(found.amplitude), motion_modes.leverage(found.shape.T)
     freedom = (1 - by_frame)[:, None] * (1 - by_unit)
-    jitter = motion_modes.amplitude_jitter(found.amplitude, steady) @ found.shape
-    spread = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM) + jitter**2
+    followed = steady & (known.sum(axis=1) > _SEEN * known.sum(axis=1).max())  # no made up ones
+    jitter = (motion_modes.amplitude_jitter(found.amplitude, followed, time) @ found.shape) ** 2
+    noise = found.rest**2 / np.maximum(freedom, _LEAST_FREEDOM)
+    if known.any():  # white noise shakes the shapes' amplitudes too, and is counted in the rest
+        jitter = np.maximum(jitter - by_unit * float(np.mean(noise[known])), 0.0)
+    spread = noise + jitter
     ratio = np.where(known & (freedom > _LEAST_FREEDOM), spread / sigma**2, np.nan)
     if not np.isfinite(ratio).any():
         return ratio

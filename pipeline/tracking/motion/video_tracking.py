@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,16 +19,24 @@ from pipeline.tracking.detect import (
     classify_markings,
     orientation_text,
 )
-from pipeline.tracking.fit import PoseFitter, SideWalls, learn_templates
+from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_templates
 from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
-from pipeline.tracking.motion.frame_timing import STEADY, timing_faults
-from pipeline.tracking.motion.tracker import Tracker
+from pipeline.tracking.motion.camera_motion import (
+    at_frame_times,
+    camera_motion,
+    row_times,
+    subtract_motion,
+)
+from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
+from pipeline.tracking.motion.tracker import Shutter, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
+    StillFrames,
     ambiguity_text,
+    average_at_rest,
     calibrate_camera,
     check_outlines,
     recognise,
@@ -38,8 +47,15 @@ LOG = logging.getLogger(__name__)
 
 _USUAL = RecordingSetup()
 _End = BrokenOffError | KeyboardInterrupt
-_Row = tuple[float, int, Singles, Singles, NDArray[np.int8]]
-"""Time, number, poses, sigma and quality: what is kept of a frame."""
+_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float]
+"""Time, number, poses, sigma, quality, whether it is the one before again, likeness of residuals
+within blocks: what is kept of a frame."""
+_CODED = 1.8
+"""Likeness from which on a codec is at work."""
+_CHANGED = 0.005
+"""Part of the pixels that differ in a picture that is shown again, at most."""
+_MOVED = 0.2
+"""Motion of all clamped units that is told of, px."""
 
 
 class Track(NamedTuple):
@@ -87,31 +103,85 @@ def track_video(
     Raises:
         UserError: no frames, or the specimen is not in the first one.
     """
-    first = next(frames, None)
-    if first is None:
+    shown = average_at_rest(frames)
+    if not shown.count:
         raise UserError("the video has no frame in this window", key="window", remedy="widen it")
-    ways = recognise(first.image, specimen, px_per_mm, setup)
+    ways = recognise(shown.image, specimen, px_per_mm, setup)
     if doubt := ambiguity_text(ways):
         LOG.info(doubt)
-    calibration = calibrate_camera(first.image, specimen, ways[0], setup)
+    calibration = calibrate_camera(shown.image, specimen, ways[0], setup)
     check_outlines(specimen, ways[0], calibration)
     if (seen := orientation_text(calibration.camera)) != "upright":
         LOG.warning("warning: the specimen is %s; motions are in the design's own frame", seen)
-    offset = _centre_offset(first.image, specimen, ways[0], calibration, setup.kind)
-    tracker = _tracker(first.image, specimen, calibration, setup.kind)
-    rows, ended = _track_frames(itertools.chain([first], frames), tracker, tell)
-    times, numbers, motion, sigmas, qualities = (
+    offset = _centre_offset(shown.image, specimen, ways[0], calibration, setup.kind)
+    tracker = _tracker(shown, specimen, calibration, setup)
+    rows, ended = _track_frames(shown.frames, tracker, tell)
+    times, numbers, motion, sigmas, qualities, same, likeness = (
         np.array(values) for values in zip(*rows, strict=True)
     )
+    exposure = tracker.exposure
     del rows, tracker
-    motion -= np.where(np.isfinite(motion[0]), motion[0], 0)
-    motion[..., :2] += arm_swing(motion[..., 2], offset)
+    if setup.exposure is None and exposure:
+        LOG.info("exposure, by the blur of quick motions: %.2g ms", 1000 * exposure)
     time = times - times[0]
-    faults = timing_faults(time, motion, sigmas)
-    sigma = uncertainty.calibrate_sigma(motion, sigmas, specimen.centre, faults == STEADY)
+    if setup.readout or exposure:
+        late = row_times(motion, specimen, calibration, setup)
+        motion = at_frame_times(motion, time, late, exposure)
+    motion = _since_rest(motion, shown.count, offset)
+    _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
+    faults = timing_faults(time, motion, sigmas, same)
+    steady = faults != DUPLICATE
+    later = likeness[1:][np.isfinite(likeness[1:])]
+    coded = not len(later) or float(np.median(later)) > _CODED
+    sigma = uncertainty.calibrate_sigma(
+        motion, sigmas, specimen.centre, steady, time, shown.count, coded
+    )
     sigma[~np.isfinite(motion)] = np.nan
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+def _since_rest(motion: Reals, count: int, offset: Singles) -> Reals:
+    """Returns motions (frames, units, 3) from the mean of the first frames on.
+
+    What the middles swing about the design's places, offset (units, 2), is added.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # some units are not seen at rest
+        motion = motion - np.nan_to_num(np.nanmean(motion[:count], axis=0))
+    motion[..., :2] += arm_swing(motion[..., 2], offset)
+    return motion
+
+
+def _remove_camera_motion(
+    motion: Reals, sigma: Reals, specimen: SpecimenOutlines, pixel: float, setup: RecordingSetup
+) -> None:
+    """Takes out, in place, what all clamped units do together, or tells of it.
+
+    Raises:
+        UserError: the camera is to follow supports, and fewer than two are in view.
+    """
+    held = np.zeros(specimen.count, bool) if setup.held is None else setup.held
+    common = camera_motion(motion, sigma, specimen.centre, held)
+    if common is None:
+        if setup.follows_supports:
+            raise UserError(
+                f"{np.count_nonzero(held)} clamped units are in the design, fewer than two in view",
+                key="camera",
+                value="follows supports",
+                remedy="write `camera: fixed`, or film so that clamped units are in view",
+            )
+        return
+    if setup.follows_supports:
+        subtract_motion(motion, specimen.centre, common)
+        return
+    ends = np.abs(common[:, :2]).max() / pixel
+    if ends > _MOVED:
+        LOG.warning(
+            "warning: all clamped units move together, by up to %.2f px: the camera moved, or what"
+            " holds them; `camera: follows supports` takes it out",
+            ends,
+        )
 
 
 def _centre_offset(
@@ -142,12 +212,15 @@ def _track_frames(
 ) -> tuple[list[_Row], _End | None]:
     """Tracks all frames, or those before an end that comes too early."""
     rows: list[_Row] = []
+    before: Picture | None = None
     try:
         for frame in frames:
-            fits, quality = tracker.step(frame.image)
+            fits, quality = tracker.step(frame.image, frame.time)
             sigma = uncertainty.standard_errors(fits.scatter, fits.blocks).astype(np.float32)
             pose = fits.pose.astype(np.float32)
-            rows.append((frame.time, frame.index, pose, sigma, quality.astype(np.int8)))
+            same = before is not None and _same(before, frame.image)
+            before, like = frame.image, uncertainty.residual_likeness(fits)
+            rows.append((frame.time, frame.index, pose, sigma, quality.astype(np.int8), same, like))
             if tell is not None:
                 tell()
     except (BrokenOffError, KeyboardInterrupt) as error:
@@ -157,14 +230,24 @@ def _track_frames(
     return rows, None
 
 
+def _same(before: Picture, image: Picture) -> bool:
+    """Tells a picture that is shown again: a codec changes a few pixels by a level."""
+    return cv2.countNonZero((cv2.absdiff(before, image) > 1).view(np.uint8)) < _CHANGED * image.size
+
+
 def _tracker(
-    image: Picture, specimen: SpecimenOutlines, calibration: CameraCalibration, kind: str
+    shown: StillFrames,
+    specimen: SpecimenOutlines,
+    calibration: CameraCalibration,
+    setup: RecordingSetup,
 ) -> Tracker:
-    """Makes a tracker with templates as a first frame shows the units, at rest."""
-    camera, grid = calibration.camera, calibration.grid
-    blur, pixel, walls = calibration.blur, calibration.pixel, None
-    templates = learn_templates(image, camera, grid, blur, pixel, kind)
-    if calibration.depth is not None:
-        walls = SideWalls(specimen, calibration.depth, grid, templates, blur, pixel, kind)
+    """Makes a tracker with templates as the frames at rest show the units."""
+    camera, grid, depth = calibration.camera, calibration.grid, calibration.depth
+    look = calibration.blur, calibration.pixel, setup.kind
+    templates = learn_templates(shown.image, camera, grid, *look)
+    walls = None if depth is None else SideWalls(specimen, depth, grid, templates, *look)
+    blur = ExposureBlur(templates, calibration.pixel) if walls is None else None
+    noise = shown.noise * float(np.sqrt(1 + 1 / shown.count))
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
-    return Tracker(specimen, PoseFitter(camera, templates), relocaliser, walls)
+    shutter = Shutter(setup.exposure, setup.readout, noise)
+    return Tracker(specimen, PoseFitter(camera, templates), relocaliser, walls, shutter, blur)

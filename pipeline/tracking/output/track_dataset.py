@@ -37,7 +37,7 @@ def assemble_track(design: xr.Dataset, track: Track, force: Floats | None = None
         "load_force": (("time",), np.full(len(track.time), np.nan) if force is None else force),
         "camera_homography": (("row", "column"), camera.homography),
         "camera_centre": (("xy",), camera.centre),
-        "camera_radial": (("power",), camera.radial),
+        "camera_radial": (("power",), camera.coefficients),
         "camera_residual": (("unit", "xy"), residual),
         "image_size": (("xy",), np.array(camera.size)),
         "blur": ((), track.calibration.blur / pixel),

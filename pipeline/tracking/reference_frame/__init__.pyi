@@ -5,3 +5,5 @@ from .camera_calibration import calibrate_camera as calibrate_camera
 from .recognition import ambiguity_text as ambiguity_text
 from .recognition import check_outlines as check_outlines
 from .recognition import recognise as recognise
+from .still_frames import StillFrames as StillFrames
+from .still_frames import average_at_rest as average_at_rest

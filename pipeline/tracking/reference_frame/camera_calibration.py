@@ -23,7 +23,7 @@ from pipeline.tracking.geometry import (
     estimate_depth,
     fit_camera,
 )
-from sim.core import Floats
+from sim.core import Floats, Mask
 
 BLURS = (0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 2.9)
 """Standard deviations that are tried, px."""
@@ -72,6 +72,10 @@ class RecordingSetup(NamedTuple):
         kind: what the units show: auto, dots, speckle or bare.
         turned: how far the specimen is turned in the picture, counter-clockwise, rad.
         mirrored: whether it is seen from behind.
+        exposure: of a frame, s; without it, quick motions tell.
+        readout: from the first row of a frame to its last, s.
+        held: (units,) which are clamped.
+        follows_supports: whether the camera's place is that of the clamped units.
     """
 
     thickness: float = 0.0
@@ -79,6 +83,10 @@ class RecordingSetup(NamedTuple):
     kind: str = "auto"
     turned: float | None = None
     mirrored: bool | None = None
+    exposure: float | None = None
+    readout: float = 0.0
+    held: Mask | None = None
+    follows_supports: bool = False
 
 
 def calibrate_camera(
@@ -143,15 +151,17 @@ def best_orientations(
     pixel = _pixel(specimen, detections[0].camera)
     grid = TemplateGrid(specimen, 1 / pixel, (3 * _USUAL_BLUR + 2) * pixel)
     templates = outline_templates(grid, _USUAL_BLUR * pixel, pixel)
-    wrong = [_unlikeness(image, templates, one) for one in detections]
+    wrong = [_unlikeness(image, specimen, templates, one) for one in detections]
     return [
         one for one, found in zip(detections, wrong, strict=True) if found <= _ALIKE * min(wrong)
     ]
 
 
-def _unlikeness(image: Picture, templates: Templates, detection: LatticeDetection) -> float:
+def _unlikeness(
+    image: Picture, specimen: SpecimenOutlines, templates: Templates, detection: LatticeDetection
+) -> float:
     """Multiplies residuals of outlines by rotations: outlines of others are turned to fit."""
-    fitter = PoseFitter(detection.camera, templates)
+    fitter = PoseFitter(with_distortion(specimen, detection).camera, templates)
     fits = fitter.fit(image, *fitter.start(_gain(image, detection)))
     found = np.isfinite(fits.pose[:, 2])
     if found.mean() < _FOUND:

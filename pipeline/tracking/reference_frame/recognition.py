@@ -28,7 +28,10 @@ LOG = logging.getLogger(__name__)
 _DARK = 8.0
 _SCALE = 0.15
 _ENOUGH = 0.6
-"""Least part of the units that a first look must find."""
+_SURPLUS = 0.06
+"""Patches that go on with the lattice where the design has no unit, at most, over the units."""
+_SOME = 0.3
+"""Least parts that a first look must find: of the units that are in the picture, and of all."""
 _FAR = 0.15
 _TURNED = np.deg2rad(8.0)
 _MISFIT = 4.0
@@ -55,16 +58,23 @@ def recognise(
             key="window.start",
             remedy="start where the specimen is lit",
         )
-    enough = _ENOUGH * specimen.count
     found = detect_lattice(image, specimen, px_per_mm)
-    if px_per_mm is not None and len(found[0].unit) < enough:
+    if px_per_mm is not None and not _enough(found[0], specimen):
         anywhere = detect_lattice(image, specimen, None)
-        if len(anywhere[0].unit) >= enough:
+        if _enough(anywhere[0], specimen):
             _check_scale(anywhere[0], specimen, px_per_mm)
             found = anywhere
-    if len(found[0].unit) < enough:
+    if not _enough(found[0], specimen):
         raise _another_design(detection_summary(found[0], specimen))
     return _as_stated(best_orientations(image, specimen, found), setup)
+
+
+def _enough(found: LatticeDetection, specimen: SpecimenOutlines) -> bool:
+    """Tells whether most of the units in the picture were found, some of all, and few others."""
+    units = len(found.unit)
+    if found.surplus > _SURPLUS * units:
+        return False
+    return units >= max(_ENOUGH * (units + found.missing), _SOME * specimen.count)
 
 
 def ambiguity_text(ways: list[LatticeDetection]) -> str:

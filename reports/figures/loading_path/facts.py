@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.comparison import middle_units
-from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, Lattice, Quads, RampHarmonicDrive, Region
+from pipeline.problem import Problem, selected_units
+from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
 from reports.facts import Fact, checks, grouped, number, recording_facts, share, worded
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
@@ -23,6 +23,9 @@ from reports.figures.loading_path.abscissa import (
 )
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults, from_dataset
+
+_ALONG = np.cos(np.pi / 4)
+"""Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
 
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
@@ -66,7 +69,7 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield from _radii(problem)
     if path.static:
         yield _displacement_fact(path)
-        yield _strain_fact(lattice, path)
+        yield strain_fact(problem, path)
         count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
@@ -112,11 +115,21 @@ def _displacement_fact(path: Abscissa) -> Fact:
     return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
 
 
-def _strain_fact(lattice: Lattice, path: Abscissa) -> Fact:
-    across = [x for _, x, _ in lattice.sites()]
-    span = max(across) - min(across)
-    note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost columns"
-    return share("strain", "Compression", float(path.values[-1]) / span, note=note)
+def strain_fact(problem: Problem, path: Abscissa) -> Fact:
+    """Describes the strain along the line from the middle to the driven side, by its kinds."""
+    sites = {unit: (x, y) for unit, x, y in problem.lattice.sites()}
+    places = np.array(list(sites.values()))
+    driven = [sites[unit] for unit in selected_units(problem.drive.units, problem.lattice)]
+    outward = np.mean(driven, axis=0) - places.mean(axis=0)
+    axis = int(np.argmax(np.abs(outward)))
+    kinds = []
+    for angle in getattr(problem.drive, "directions", ()) or (np.pi,):
+        pull = np.sign(outward[axis]) * (np.cos(angle), np.sin(angle))[axis]
+        kinds.append("compression" if pull < -_ALONG else "extension" if pull > _ALONG else "shear")
+    label, span = ", ".join(dict.fromkeys(kinds)).capitalize(), float(np.ptp(places[:, axis]))
+    ends = ("columns", "rows")[axis]
+    note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost {ends}"
+    return share("strain", label, float(path.values[-1]) / span, note=note)
 
 
 def _drive_facts(problem: Problem) -> Iterator[Fact]:

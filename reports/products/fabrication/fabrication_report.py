@@ -15,7 +15,7 @@ from typing import Any
 
 from pipeline import problem
 from pipeline.fabrication.papers import read_bill, read_manifest
-from pipeline.fabrication.parts import THIN_WALL
+from pipeline.fabrication.parts import STRAIGHT, THIN_WALL
 from pipeline.problem import Problem
 from pipeline.runtime import cli
 from reports.page import write_page
@@ -30,6 +30,12 @@ COLOURS = {"intact": "#8a8f96", "altered": "#f0a042", "cloaked": "#8d62c0"}
 """Of printed units, lighter than a structure's own colour so that edges show."""
 
 FIXTURE = "#c8ccd0"
+YIELD = 0.05
+"""Strain of polyester foil (biaxially drawn) beyond which it stays bent: about where the stress in
+makers' tensile curves leaves the straight line for good."""
+
+_HOWS = ("designed", "built")
+_BENT = "the specimen from the top, with the strain of every shim that is bent by its slots"
 
 
 @dataclass(frozen=True)
@@ -77,14 +83,35 @@ def report(args: argparse.Namespace) -> None:
         for folder in args.packages:
             made.append(package(folder, asked))
             bar.update()
+    packages = list(zip(made, args.packages, strict=True))
     values = {
         "title": f"{asked.title}: what is built",
         "lead": "Drawings for the laser cutter, plates for the printer, fixtures and papers.",
         "pens": [(name, colour) for name, colour in pictures.PENS.items() if name != "REFERENCE"],
         "structures": made,
+        "as_built": list(_as_built({made.name: read_manifest(p) for made, p in packages})),
         "parameters": list(parameters(asked.fabrication.model_dump(mode="json"))),
     }
     write_page(args.out, "fabrication.html.j2", values)
+
+
+def _as_built(told: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
+    """Yields rows of a table by structure: what is told, as designed, as built."""
+    found = {name: each["as_built"] for name, each in told.items() if each["as_built"]}
+    for name, each in found.items():
+        title = TITLES.get(name, name)
+        if "failure" in each:
+            yield title, "", f"cannot be simulated: {each['failure']}"
+            continue
+        turn = f"{each['turn_mean_deg']:.2f}° on average, {each['turn_max_deg']:.2f}° at most"
+        yield f"{title}: units turn before any load by", "0", turn
+        if name != "intact":
+            losses = (f"{each[f'loss_as_{how}']:.4g}" for how in _HOWS)
+            yield f"{title}: loss J", *losses
+    pair = [found.get(name, {}) for name in ("cloaked", "altered")]
+    if all("loss_as_built" in each for each in pair):
+        ratios = (pair[0][f"loss_as_{how}"] / pair[1][f"loss_as_{how}"] for how in _HOWS)
+        yield "Loss J, cloaked over altered", *(f"{100 * ratio:.1f} %" for ratio in ratios)
 
 
 def package(folder: Path, problem: Problem) -> PackageSection:
@@ -122,6 +149,13 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
     if thin := told["thin_walls_mm"]:
         note = f"thinnest {min(thin.values()):.2f} mm; the bill of materials names them"
         yield PackageFact(f"{len(thin)}", f"units with walls under {THIN_WALL:g} mm", note)
+    if strains := sorted(one["strain"] for one in told["prebend"].values()):
+        note = (
+            f"median {100 * strains[len(strains) // 2]:.1f} %;"
+            f" {sum(strain > YIELD for strain in strains)} of {len(strains)} beyond"
+            f" {100 * YIELD:g} %, where polyester begins to yield"
+        )
+        yield PackageFact(f"{100 * strains[-1]:.1f} %", "strain of a shim before any load", note)
     if letters := told["letters_for_ids"]:
         note = ", ".join(f"{letter} is {label}" for label, letter in letters.items())
         yield PackageFact(f"{len(letters)}", "units with a letter for their id", note)
@@ -139,6 +173,10 @@ def _groups(folder: Path, problem: Problem) -> Iterator[tuple[str, Iterator[File
     whole = folder / "print/assembled.stl"
     seen = _picture(whole, "the specimen as it is assembled", pictures.assembled(whole, colour))
     yield "The specimen", iter([seen])
+    prebend = read_manifest(folder)["prebend"]
+    if any(one["strain"] > STRAIGHT for one in prebend.values()):
+        bent = _picture(whole, _BENT, pictures.prebend_map(whole, prebend.values()))
+        yield "Shims before any load", iter([bent])
     yield "Sheets for the laser cutter", _sheets(folder)
     yield "Plates for the printer", _plates(folder, "print", problem, colour)
     yield "Fixtures", _plates(folder, "fixture", problem, FIXTURE)

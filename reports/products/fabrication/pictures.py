@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
 from pipeline.fabrication.readback import Curve, MeshBody, read_3mf, read_drawing, read_stl
-from reports.base import GREY, INTACT, MM_PER_INCH, PALE
+from reports.base import GREY, INTACT, MM_PER_INCH, PALE, style
 from reports.products.fabrication.renderer import Body, picture
 
 WIDTH = 1000
@@ -75,6 +78,33 @@ def plate(path: Path, bed: tuple[float, float], colour: str) -> bytes:
 def assembled(path: Path, colour: str) -> bytes:
     """Returns PNG of the whole specimen."""
     return _png(picture([_body(read_stl(path), colour)], WIDTH))
+
+
+def prebend_map(path: Path, shims: Collection[Mapping[str, Any]]) -> bytes:
+    """Returns PNG of the specimen's outlines, its shims coloured by their strain before any load.
+
+    Args:
+        path: of the assembled specimen.
+        shims: middle and strain of each, as the manifest has them.
+    """
+    solid = read_stl(path)
+    low, high = solid.extent
+    units = shapely.get_parts(solid.section((low[2] + high[2]) / 2))
+    width, height = (high - low)[:2] + 2 * _RIM
+    figure = Figure(figsize=(10.0, 8.5 * height / width), dpi=WIDTH / 10.0)
+    axes = figure.add_axes((0.0, 0.0, 0.85, 1.0))
+    axes.set(xlim=(low[0] - _RIM, high[0] + _RIM), ylim=(low[1] - _RIM, high[1] + _RIM))
+    axes.set_axis_off()
+    rings = [np.asarray(unit.exterior.coords) for unit in units]
+    axes.add_collection(PolyCollection(rings, facecolors=PALE, edgecolors=GREY, linewidths=0.4))
+    x, y = np.array([shim["middle_mm"] for shim in shims]).T
+    percent = 100.0 * np.array([shim["strain"] for shim in shims])
+    dots = axes.scatter(x, y, 30.0, percent, cmap=style.MAGNITUDE, vmin=0.0, zorder=2)
+    bar = figure.colorbar(dots, cax=figure.add_axes((0.88, 0.1, 0.02, 0.8)))
+    bar.set_label("strain of the shim before any load, %")
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return _small(Image.open(stream))
 
 
 def _body(solid: MeshBody, colour: str) -> Body:

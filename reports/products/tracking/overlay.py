@@ -11,8 +11,14 @@ import xarray as xr
 from matplotlib.colors import Colormap, to_rgb
 from numpy.typing import NDArray
 
+from pipeline.runtime import UserError
 from pipeline.tracking.frames import Frame
-from pipeline.tracking.geometry import Camera, SpecimenOutlines, outlines_of_design
+from pipeline.tracking.geometry import (
+    Camera,
+    SpecimenOutlines,
+    camera_of,
+    outlines_of_design,
+)
 from reports.base import style
 from sim.core import Floats, Image
 
@@ -63,13 +69,8 @@ def painter(track: xr.Dataset, shown: str) -> Painter:
     specimen = of_track(track)
     there = np.isin(track["unit"].values, specimen.ids)
     pose = track["displacement"].transpose("time", "unit", "dof").values[:, there]
-    size = tuple(int(side) for side in track["image_size"].values)
-    camera = Camera(
-        track["camera_homography"].values,
-        track["camera_centre"].values,
-        track["camera_radial"].values,
-        (size[0], size[1]),
-    )
+    if (camera := camera_of(track)) is None:
+        raise UserError("the track has no camera", remedy="give one that was made of a video")
     if shown == "rotation":
         values, colours, label = np.rad2deg(pose[..., 2]), style.SIGNED, "rotation, deg"
     else:
@@ -85,7 +86,7 @@ def painter(track: xr.Dataset, shown: str) -> Painter:
         (-most if shown == "rotation" else 0.0, most),
         label,
         "SYNTHETIC" if track.attrs["synthetic"] == "yes" else "",
-        2 if max(size) < _LARGE else 1,
+        2 if max(camera.size) < _LARGE else 1,
     )
 
 

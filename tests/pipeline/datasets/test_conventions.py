@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cf_units
 import netCDF4
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -81,3 +82,17 @@ def test_a_file_of_the_first_version_is_read(kind: Kind, tmp_path: Path) -> None
     migrated = datasets.read(path, kind)
     xr.testing.assert_identical(migrated, now)
     assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 3
+
+
+def test_a_response_of_the_second_version_is_read(tmp_path: Path) -> None:
+    """It said less of stability; what it did not say reads NaN."""
+    path = written("response", tmp_path)
+    added = ["snap", "eigenvalue", "loss_other_branch", "snaps_by_contact"]
+    with xr.open_dataset(path) as opened:
+        old = opened.load().drop_vars(added)
+    del old.attrs[seal.ATTRIBUTE]
+    old.attrs["schema_version"] = np.int64(2)
+    old.to_netcdf(path)
+    migrated = datasets.read(path, "response")
+    assert all(np.isnan(migrated[name]).all() for name in added)
+    assert migrated["eigenvalue"].attrs["units"] == "N/mm"

@@ -62,7 +62,10 @@ def specimen(depth: float = 3.0) -> BuiltSpecimen:
         for unit, vertex in (first, second):
             ends.setdefault(unit, []).append((vertex, number))
         pair = (names[first[0]], names[second[0]])
-        ligaments.append(Ligament(number, pair, 2.25 + 2 * depth, 2.25 + 2 * TRUNCATION, 0.0))
+        free = 2.25 + 2 * TRUNCATION
+        at = [square(*indices[unit])[vertex] for unit, vertex in (first, second)]
+        x, y = np.mean(at, axis=0).tolist()
+        ligaments.append(Ligament(number, pair, 2.25 + 2 * depth, free, (x, y)))
     units = [
         _unit(number, names[number], index, ends[number], depth)
         for number, index in enumerate(indices)

@@ -12,6 +12,7 @@ from pipeline.fabrication.parts import LETTERS, Unit
 from pipeline.fabrication.units import UnitNetwork
 from pipeline.fabrication.units.slot_candidates import Corner
 from pipeline.fabrication.units.specimen_units import build_unit
+from pipeline.fabrication.units.unit_bodies import unit_body
 from pipeline.problem.sections import Fabrication
 
 FILE = Path(__file__).parents[2] / "data/slender_units.json"
@@ -24,8 +25,9 @@ def built(name: str, letters: str = LETTERS) -> Unit:
     polygons, labels = {0: Polygon(data["corners"])}, {0: data["label"]}
     net = UnitNetwork((0,), polygons, labels, {0: (0, 0)}, (), (), ())
     slotted = [
-        Corner(vertex, number, np.array(along))
+        Corner(vertex, number, np.array(along), 2.25)
         for number, (vertex, *along) in enumerate(data["slots"])
     ]
     neighbours = [Polygon(ring) for ring in data["neighbours"]]
-    return build_unit(net, 0, slotted, neighbours, Fabrication(), FILE, letters)[0]
+    body = unit_body(net, 0, slotted, neighbours, Fabrication(), FILE)
+    return build_unit(net, 0, body, Fabrication(), FILE, letters)

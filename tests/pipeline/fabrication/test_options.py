@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 import pytest
+from ezdxf.filemanagement import readfile
 
 from pipeline.fabrication.checks import check_package
+from pipeline.fabrication.files.drawing_files import write_dxf
+from pipeline.fabrication.plates import LaserSheet
 from tests.pipeline.fabrication import built
+
+DxfVersion: TypeAlias = Literal["R2010", "R12"]
 
 OPTIONS: dict[str, dict[str, object]] = {
     "strips, recesses, no kerf": {
@@ -35,6 +41,14 @@ OPTIONS: dict[str, dict[str, object]] = {
         "coupon": ["0 mm", "0.1 mm"],
     },
 }
+
+
+@pytest.mark.parametrize("version", ["R2010", "R12"])
+def test_a_drawing_says_how_far_it_extends(tmp_path: Path, version: DxfVersion) -> None:
+    write_dxf(LaserSheet("empty", (600.0, 300.0), ()), tmp_path / "empty.dxf", version)
+    header = readfile(tmp_path / "empty.dxf").header
+    assert tuple(header["$EXTMIN"])[:2] == (0.0, 0.0)
+    assert tuple(header["$EXTMAX"])[:2] == (600.0, 300.0)
 
 
 @pytest.mark.parametrize("name", OPTIONS)

@@ -27,7 +27,7 @@ def corners(polygon: Polygon) -> list[Corner]:
     points = np.asarray(polygon.exterior.coords)[:-1]
     ways = np.array([polygon.centroid.x, polygon.centroid.y]) - points
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    return [Corner(vertex, vertex, way) for vertex, way in enumerate(ways)]
+    return [Corner(vertex, vertex, way, 2.25) for vertex, way in enumerate(ways)]
 
 
 def cap(slot: Slot) -> LineString:
@@ -76,7 +76,7 @@ def test_slot_in_a_sharp_corner_goes_deeper_for_its_walls() -> None:
     half = np.radians(15.0)
     arm = 20.0 * np.array([np.cos(half), np.sin(half)])
     polygon = Polygon([(0.0, 0.0), arm * [1, -1], arm])
-    corner = Corner(0, 0, np.array([1.0, 0.0]))
+    corner = Corner(0, 0, np.array([1.0, 0.0]), 2.25)
     (slot,) = place_slots(polygon, [corner], asked(direction="ligament"), polygon)
     least = (0.8 + 0.225 * np.cos(half)) / np.sin(half)  # 0.56 mm would be left at 3 mm
     assert slot.depth == pytest.approx(np.ceil(least / 0.25) * 0.25)
@@ -143,7 +143,7 @@ def test_tips_are_cut_back_to_the_asked_thickness(angle: float, tip: float) -> N
 def test_too_slender_a_corner_is_named_with_the_wall_that_it_could_have() -> None:
     sliver = Polygon([(0.0, 0.0), (30.0, 0.0), (30.0, 1.0), (0.0, 1.0)])
     with pytest.raises(NoRoomError) as caught:
-        place_slots(sliver, [Corner(0, 0, np.array([1.0, 0.0]))], ASKED, sliver)
+        place_slots(sliver, [Corner(0, 0, np.array([1.0, 0.0]), 2.25)], ASKED, sliver)
     assert caught.value.vertex == 0
     assert caught.value.wall == pytest.approx((1.0 - 0.45) / 2, abs=0.05)
 

@@ -23,10 +23,13 @@ def motion(clock: np.ndarray, seed: int = 0) -> np.ndarray:
     return made + NOISE * random.normal(size=made.shape)
 
 
-def faults(moved: np.ndarray, time: np.ndarray | None = None) -> dict[int, int]:
-    """Finds faults of motions whose frames the file takes to be even."""
+def faults(
+    moved: np.ndarray, time: np.ndarray | None = None, same: tuple[int, ...] = ()
+) -> dict[int, int]:
+    """Finds faults of motions whose frames the file takes to be even, some shown again."""
     time = np.arange(len(moved)) / 30 if time is None else time
-    told = frame_timing.timing_faults(time, moved, np.full(moved.shape, NOISE))
+    again = np.isin(np.arange(len(moved)), same)
+    told = frame_timing.timing_faults(time, moved, np.full(moved.shape, NOISE), again)
     return {int(frame): int(told[frame]) for frame in np.flatnonzero(told)}
 
 
@@ -35,11 +38,22 @@ def test_even_frames_have_no_fault() -> None:
 
 
 @pytest.mark.parametrize("frame", [12, 25, 40])
-def test_a_gap_is_found_unless_the_file_tells_it(frame: int) -> None:
+@pytest.mark.parametrize("missing", [1, 2, 5])
+def test_a_gap_is_found_by_the_motion_and_by_the_stamps(frame: int, missing: int) -> None:
     clock = np.arange(FRAMES, dtype=float)
-    clock[frame:] += 1
+    clock[frame:] += missing
     assert faults(motion(clock)) == {frame: frame_timing.DROPPED}
-    assert faults(motion(clock), clock / 30) == {}
+    assert faults(motion(clock), clock / 30) == {frame: frame_timing.DROPPED}
+
+
+def test_a_varying_rate_is_no_row_of_gaps() -> None:
+    clock = np.cumsum(np.random.default_rng(3).choice([1.0, 1.5, 2.0, 3.0], FRAMES))
+    assert faults(motion(clock), clock / 60) == {}
+
+
+def test_a_specimen_that_rests_is_no_row_of_repeated_frames() -> None:
+    moved = motion(np.maximum(np.arange(FRAMES) - 20.0, 0.0))
+    assert faults(moved, same=tuple(range(1, 20))) == {}
 
 
 def test_frames_shown_again_are_found() -> None:
@@ -47,7 +61,7 @@ def test_frames_shown_again_are_found() -> None:
     clock[25:] -= 1
     moved = motion(clock)
     moved[25] = moved[24]
-    assert faults(moved) == {25: frame_timing.DUPLICATE}
+    assert faults(moved, same=(25,)) == {25: frame_timing.DUPLICATE}
 
 
 @pytest.mark.parametrize("step", [0.05, 0.5, 5.0])
@@ -70,7 +84,8 @@ def test_faults_of_a_quick_wave_are_found() -> None:
     clock = np.arange(FRAMES, dtype=float)
     clock[15:] += 1
     clock[40:] -= 1
-    assert faults(wave(clock)) == {15: frame_timing.DROPPED, 40: frame_timing.DUPLICATE}
+    found = faults(wave(clock), same=(40,))
+    assert found == {15: frame_timing.DROPPED, 40: frame_timing.DUPLICATE}
 
 
 @pytest.mark.parametrize("frames", [8, 12, 16])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -120,3 +121,30 @@ def test_a_package_of_another_version_makes_one_message(
     assert told in said
     assert "make the package again" in said
     assert not out.exists()
+
+
+def test_the_page_maps_the_shims_that_are_bent(tmp_path: Path) -> None:
+    built.write(tmp_path / "cloaked", {"slots": {"direction": "centroid"}})
+    out = tmp_path / "index.html"
+    words = ["--problem", str(built.PROBLEM), "--packages", str(tmp_path / "cloaked")]
+    assert main(["fabrication", *words, "--out", str(out), "--quiet"]) == 0
+    page = out.read_text(encoding="utf-8")
+    assert "Shims before any load" in page
+    assert "3.0 %" in page
+    assert "0 of 7 beyond 5 %" in page
+
+
+def test_the_page_puts_losses_as_built_beside_those_as_designed(tmp_path: Path) -> None:
+    for name, designed, built_loss in (("altered", 0.92, 0.9), ("cloaked", 0.0347, 0.111)):
+        built.write(tmp_path / name)
+        path = tmp_path / name / "manifest.json"
+        told = json.loads(path.read_text())
+        turns = {"turn_mean_deg": 0.39, "turn_max_deg": 4.59}
+        losses = {"loss_as_designed": designed, "loss_as_built": built_loss}
+        path.write_text(json.dumps(told | {"as_built": turns | losses}))
+    words = ["--problem", str(built.PROBLEM), "--out", str(tmp_path / "index.html"), "--packages"]
+    folders = [str(tmp_path / name) for name in ("altered", "cloaked")]
+    assert main(["fabrication", *words, *folders, "--quiet"]) == 0
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for cell in ("0.39° on average, 4.59° at most", "0.0347", "0.111", "3.8 %", "12.3 %"):
+        assert f"<td>{cell}</td>" in page

@@ -47,3 +47,28 @@ def test_processes_that_want_a_loop_at_once_compile_it_once(tmp_path: Path, writ
     assert {value for _, value in told} == {"9.0"}
     compiled = sum(int(misses) for misses, _ in told)
     assert compiled == 1 or (not writable and compiled <= 3)  # Numba has other places for its cache
+
+
+COUNT = """
+import logging, sys, time
+logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message)s")
+from sim.core import working_time
+import loops
+began, worked = time.monotonic(), working_time()
+loops.outer(3)
+print(time.monotonic() - began, working_time() - worked)
+"""
+
+
+def test_compiling_is_told_once_and_does_not_count_as_work(tmp_path: Path) -> None:
+    (tmp_path / "loops.py").write_text(LOOPS)
+    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(tmp_path)}
+    count = [sys.executable, "-c", COUNT]
+    first, second = (
+        subprocess.check_output(count, env=os.environ | places, text=True, timeout=120).splitlines()
+        for _ in range(2)
+    )
+    assert first[:-1] == ["compiling loops, once on this machine: up to a minute or two"]
+    passed, worked = map(float, first[-1].split())
+    assert worked < 0.1 * passed
+    assert len(second) == 1  # found in the cache

@@ -192,7 +192,7 @@ def test_mixed_derivatives(case: Crowd) -> None:
     zero = np.zeros(0)
     contacts = case.contacts
     out = Sensitivity(
-        zero, zero, zero, zero, np.zeros(1), np.zeros_like(contacts.corner), np.zeros((4, 2))
+        zero, zero, zero, zero, zero, np.zeros(1), np.zeros_like(contacts.corner), np.zeros((4, 2))
     )
     turn = np.stack([np.cos(motion[2::3]), np.sin(motion[2::3])], axis=1)
     distance_contact_kernels.add_mixed(motion, contacts, turn, direction, out)

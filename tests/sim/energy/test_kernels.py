@@ -62,6 +62,7 @@ def case(lattice: Lattice, seed: int) -> Case:
         vector=lattice.ligament_vectors + rng.normal(size=(n, 2)) * 0.2,
         void=current - np.stack([turn, -turn], axis=1),
         law=rng.uniform(0.5, 1.5, (n, 3)) * [120.0, 1.19, 1.5],
+        natural=rng.normal(size=(n, 3)) * [0.1, 0.3, 0.5],
         contact=contact,
         touching=np.arange(n),
     )
@@ -89,27 +90,30 @@ class Differentiable(NamedTuple):
     vector: Numbers
     void: Numbers
     law: Numbers
+    natural: Numbers
     stiffness: Numbers
 
 
 def numbers(net: NetworkArrays) -> Differentiable:
-    return Differentiable(net.arm, net.vector, net.void, net.law, net.contact[:, 0])
+    return Differentiable(net.arm, net.vector, net.void, net.law, net.natural, net.contact[:, 0])
 
 
 def definition(motion: Numbers, parts: Differentiable, unit: Ints) -> Array:
     """Energy of the network, summed from the law of one ligament and of one contact."""
-    arm, vector, void, law, stiffness = map(jnp.asarray, parts)
+    arm, vector, void, law, natural, stiffness = map(jnp.asarray, parts)
     of_units = jnp.asarray(motion).reshape(-1, 3)
     a, b = of_units[unit[:, 0]], of_units[unit[:, 1]]
 
-    def ligament(a: Array, b: Array, arm: Array, vector: Array, law: Array) -> Array:
-        return ligament_energy(a, b, arm[0], arm[1], vector, LigamentLaw(*law))
+    def ligament(
+        a: Array, b: Array, arm: Array, vector: Array, law: Array, natural: Array
+    ) -> Array:
+        return ligament_energy(a, b, arm[0], arm[1], vector, LigamentLaw(*law), natural)
 
     def contact(a: Array, b: Array, void: Array, stiffness: Array) -> Array:
         angles = contact_void_angles(void, a[2], b[2])
         return contact_energy(angles, ContactLaw(stiffness, BARRIER, CUTOFF)).sum()
 
-    strain = jax.vmap(ligament)(a, b, arm, vector, law)
+    strain = jax.vmap(ligament)(a, b, arm, vector, law, natural)
     return strain.sum() + jax.vmap(contact)(a, b, void, stiffness).sum()
 
 
@@ -188,7 +192,7 @@ def test_mixed_derivatives(random_case: Case) -> None:
 
 def mixed(of: Case, which: Ints) -> Sensitivity:
     net = of.net
-    parts = (net.arm, net.vector, net.void, net.law, net.contact[:, 0])
+    parts = (net.arm, net.vector, net.void, net.law, net.natural, net.contact[:, 0])
     none = np.zeros((0, 2))
     out = Sensitivity(*(np.zeros(part.shape) for part in (*parts, none, none)))
     ligament_kernels.mixed(of.motion, net, scratch(of.motion)[0], of.direction, which, out)
@@ -202,7 +206,7 @@ def test_mixed_derivatives_of_some_ligaments_alone(random_case: Case) -> None:
         mixed(random_case, np.arange(len(random_case.net.unit))),
         mixed(random_case, some),
     )
-    for all_of_it, part in zip(every[:5], chosen[:5], strict=True):
+    for all_of_it, part in zip(every[:6], chosen[:6], strict=True):
         np.testing.assert_array_equal(part[some], all_of_it[some])
         assert np.count_nonzero(part) <= all_of_it[some].size
 

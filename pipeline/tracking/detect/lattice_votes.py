@@ -1,0 +1,249 @@
+"""Locates a lattice among patches of an image: votes of all pairs, then growth from the best place.
+
+Two neighbouring patches and two joined units vote for a turn, every patch and every unit for a
+shift (a generalised Hough transform: Ballard, Pattern Recognition 13 (1981) 111). Patches that are
+no units, and units without a patch, win votes for nothing. From the place with most votes the match
+grows over the joints, where the affine map of the nearest matches says: lenses bend lattices, and
+loads deform them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from sim.core import Floats, Ints, Mask
+
+_LEAST = 6
+_ANGLE_BINS = 72
+_STRETCH = 0.3
+"""Logarithm of the size of a pair of neighbours over that of joined units, at most."""
+_JOINTS = 64
+_BIN, _NEAR, _GATE = 0.25, 0.3, 0.35
+"""Width of a bin of shifts; distance of a patch from a unit at first and in growth; in pitches."""
+_FRONTIER = 1.7
+"""Units are reached from matches at most so far, pitches."""
+_TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
+"""Votes of further candidates, over those of the best."""
+_MOST_SHIFTS, _MOST_SEEDS = 16, 3
+_SURE = 0.98
+"""Score, over the number of units, after which no other shift is tried."""
+_NEAREST, _RIDGE = 8, 0.05
+_ROUNDS = 80
+_BESIDE, _APART = 1.55, 0.6
+"""Distance of neighbours, diagonal ones too, between these, pitches."""
+
+Inside = Callable[[Floats], Mask]
+
+
+class Placement(NamedTuple):
+    """Holds one way in which units lie among patches.
+
+    Attributes:
+        unit, patch: (matches,) pairs, one unit a patch.
+        place: (units, 2) where all are, by the matches and what they say of the others.
+        turn: of the lattice against its reference, rad.
+        missing: number of units without a patch that should be in view.
+        surplus: number of patches without a unit that go on with the lattice.
+    """
+
+    unit: Ints
+    patch: Ints
+    place: Floats
+    turn: float
+    missing: int
+    surplus: int
+
+    @property
+    def score(self) -> int:
+        """Returns matches less what should be there and is not, and the reverse."""
+        return len(self.unit) - self.missing - self.surplus
+
+
+def locate_lattice(
+    points: Floats,
+    joint: Ints,
+    patches: Floats,
+    scale: float,
+    inside: Inside,
+    most_turn: float = np.pi,
+) -> list[Placement]:
+    """Places units among patches, not mirrored; the best placement comes first.
+
+    Args:
+        points: (units, 2) places of the units in the reference.
+        joint: (ligaments, 2) joined units.
+        patches: (n, 2) places of the patches.
+        scale: of the patches' frame against the reference, roughly.
+        inside: tells places (..., 2) that are in view.
+        most_turn: the largest angle to look for, rad.
+    """
+    if len(patches) < _LEAST or len(points) < _LEAST:
+        return []
+    ends = points[joint]
+    vectors = (ends[:, 1] - ends[:, 0]) @ np.array([1, 1j])
+    pitch = scale * float(np.median(np.abs(vectors)))
+    found: list[Placement] = []
+    for factor in _linear_factors(vectors, patches, scale, pitch, most_turn):
+        turned = _turned(points, factor)
+        seeds = [
+            _Growth(points, joint, turned + shift, patches, pitch * abs(factor) / scale)
+            for shift in _shifts(turned, patches, _BIN * pitch)
+        ]
+        for seed in sorted(seeds, key=lambda one: -one.first_score(inside))[:_MOST_SEEDS]:
+            grown = seed.placement(factor, inside)
+            if grown is not None:
+                found.append(grown)
+            if grown is not None and grown.score > _SURE * len(points):
+                break
+    return sorted(found, key=lambda one: -one.score)
+
+
+def match_one_to_one(expected: Floats, found: Floats, gate: float) -> tuple[Ints, Ints]:
+    """Pairs places that are each other's nearest, no farther than ``gate``."""
+    distance, near = cKDTree(found).query(expected, distance_upper_bound=gate)
+    back = cKDTree(expected).query(found)[1]
+    units = np.flatnonzero(np.isfinite(distance))
+    units = units[back[near[units]] == units]
+    return units, near[units]
+
+
+def _turned(points: Floats, factor: complex) -> Floats:
+    turned = (points @ np.array([1, 1j])) * factor
+    return np.stack([turned.real, turned.imag], axis=-1)
+
+
+def _linear_factors(
+    vectors: np.ndarray, patches: Floats, scale: float, pitch: float, most_turn: float
+) -> Iterator[complex]:
+    """Yields turns with scales, as complex factors, that most pairs of neighbours vote for."""
+    pairs = cKDTree(patches).query_pairs(1.4 * pitch, output_type="ndarray")
+    seen = (patches[pairs[:, 1]] - patches[pairs[:, 0]]) @ np.array([1, 1j])
+    seen = seen[np.abs(seen) > 0.6 * pitch]
+    few = vectors[:: -(-len(vectors) // _JOINTS)]
+    ratio = (seen[:, None] / np.concatenate([few, -few])).ravel()
+    ratio = ratio[np.abs(np.log(np.abs(ratio) / scale)) < _STRETCH]
+    ratio = ratio[np.abs(np.angle(ratio)) <= most_turn]
+    if not len(ratio):
+        return
+    width = 2 * np.pi / _ANGLE_BINS
+    bins = np.round(np.angle(ratio) / width).astype(int) % _ANGLE_BINS
+    votes = np.bincount(bins, minlength=_ANGLE_BINS).astype(float)
+    votes += np.roll(votes, 1) + np.roll(votes, -1)
+    peak = (votes >= np.roll(votes, 1)) & (votes > np.roll(votes, -1))
+    peak &= votes > _TURNS_KEPT * votes.max()
+    for angle in np.flatnonzero(peak) * width:
+        near = ratio[np.abs(np.angle(ratio * np.exp(-1j * angle))) < 1.5 * width]
+        yield complex(np.exp(np.log(near * np.exp(-1j * angle)).mean() + 1j * angle))
+
+
+def _shifts(turned: Floats, patches: Floats, width: float) -> Floats:
+    """Returns the shifts (n, 2) that most pairs of patch and unit vote for, the best first."""
+    pairs = (patches[:, None] - turned).reshape(-1, 2)
+    low = pairs.min(axis=0)
+    cells = np.round((pairs - low) / width).astype(int)
+    votes = np.zeros(cells.max(axis=0) + 1, np.float32)
+    np.add.at(votes, tuple(cells.T), 1.0)
+    votes = np.asarray(cv2.GaussianBlur(votes, (5, 5), 1.0, borderType=cv2.BORDER_CONSTANT))
+    highest = votes == cv2.dilate(votes, np.ones((5, 5), np.uint8))
+    places = np.argwhere(highest & (votes > _SHIFTS_KEPT * votes.max()))
+    order = np.argsort(-votes[tuple(places.T)], kind="stable")[:_MOST_SHIFTS]
+    return np.asarray(low + places[order] * width)
+
+
+class _Growth:
+    """Grows a match from where a linear map agrees with the patches, over the joints."""
+
+    def __init__(
+        self, points: Floats, joint: Ints, linear: Floats, patches: Floats, pitch: float
+    ) -> None:
+        self._points, self._linear, self._patches, self._pitch = points, linear, patches, pitch
+        self._reach = _FRONTIER * float(np.median(np.ptp(points[joint], axis=1).max(axis=1)))
+        self._patch = np.full(len(points), -1)
+        unit, patch = match_one_to_one(linear, patches, _NEAR * pitch)
+        self._patch[unit] = patch
+        self._keep_largest_part(joint)
+
+    def _keep_largest_part(self, joint: Ints) -> None:
+        both = joint[(self._patch[joint] >= 0).all(axis=1)]
+        shape = (len(self._points),) * 2
+        graph = coo_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape)
+        _, part = connected_components(graph, directed=False)
+        size = np.bincount(part[self._patch >= 0], minlength=1)
+        self._patch[part != size.argmax()] = -1
+
+    @property
+    def size(self) -> int:
+        """Counts the matches."""
+        return int((self._patch >= 0).sum())
+
+    def first_score(self, inside: Inside) -> int:
+        """Returns matches before growth less what should be there and is not."""
+        return self.size - int((inside(self._linear) & (self._patch < 0)).sum())
+
+    def placement(self, factor: complex, inside: Inside) -> Placement | None:
+        """Returns the match at its largest; nothing if it is small."""
+        for _ in range(_ROUNDS):
+            if self.size < _LEAST:
+                return None
+            place, far = self._expected()
+            alone = (self._patch < 0) & (far < self._reach)
+            free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
+            if not (alone.any() and len(free)):
+                break
+            unit, patch = match_one_to_one(place[alone], self._patches[free], _GATE * self._pitch)
+            if not len(unit):
+                break
+            self._patch[np.flatnonzero(alone)[unit]] = free[patch]
+        place, _ = self._expected()
+        self._patch[np.linalg.norm(place - self._seen(place), axis=1) > _GATE * self._pitch] = -1
+        unit = np.flatnonzero(self._patch >= 0)
+        if len(unit) < _LEAST:
+            return None
+        missing = int((inside(place) & (self._patch < 0)).sum())
+        return Placement(
+            unit,
+            self._patch[unit],
+            self._seen(place),
+            float(np.angle(factor)),
+            missing,
+            self._continuing(),
+        )
+
+    def _continuing(self) -> int:
+        """Counts patches without a unit that go on with the lattice, about a pitch from others."""
+        taken = np.zeros(len(self._patches), bool)
+        taken[self._patch[self._patch >= 0]] = True
+        apart = cdist(self._patches, self._patches)
+        beside = (apart < _BESIDE * self._pitch) & (apart > _APART * self._pitch)
+        before = int(taken.sum())
+        for _ in range(_ROUNDS):
+            more = ~taken & (beside[:, taken].sum(axis=1) > 1)
+            if not more.any():
+                break
+            taken |= more
+        return int(taken.sum()) - before
+
+    def _seen(self, place: Floats) -> Floats:
+        """Replaces expected places by those of the units' own patches."""
+        return np.where(self._patch[:, None] >= 0, self._patches[self._patch], place)
+
+    def _expected(self) -> tuple[Floats, Floats]:
+        """Returns where other matches expect units (units, 2), and how far the nearest one is."""
+        known = np.flatnonzero(self._patch >= 0)
+        off = self._patches[self._patch[known]] - self._linear[known]
+        count = min(_NEAREST + 1, len(known))
+        far, near = cKDTree(self._points[known]).query(self._points, k=count)
+        other = known[near] != np.arange(len(self._points))[:, None]
+        offset = (self._points[known][near] - self._points[:, None]) / self._reach
+        rows = np.concatenate([offset, np.ones((*near.shape, 1))], axis=2) * other[..., None]
+        normal = np.einsum("uki,ukj->uij", rows, rows) + _RIDGE * np.diag([1.0, 1.0, 1e-6])
+        right = np.einsum("uki,ukj->uij", rows, off[near])
+        return self._linear + np.linalg.solve(normal, right)[:, 2], far[:, 0]

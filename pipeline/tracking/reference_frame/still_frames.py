@@ -1,0 +1,101 @@
+"""Averages the frames in which a specimen rests before it moves, and measures their noise."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from pipeline.runtime import Picture
+from pipeline.tracking.frames import BrokenOffError, Frame
+from sim.core import Floats
+
+_MOST, _MEMORY = 64, 1 << 27
+"""Frames, and pixels of all, that are averaged at most."""
+_BLOCK = 8
+_ALIKE, _JUMP = 1.3, 7.0
+"""Mean square, and largest, of blocks' changes that noise alone makes, in standard deviations."""
+_ROUNDED = 0.41
+"""Standard deviation of the difference of two frames that are rounded to whole levels."""
+_LAPLACE = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
+"""Passes noise with its standard deviation, but no plane (Immerkaer, CVIU 64 (1996) 300)."""
+_NORMAL = 0.6745
+
+
+class StillFrames(NamedTuple):
+    """Holds the beginning of a video.
+
+    Attributes:
+        frames: all of the video, the averaged ones again.
+        image: mean of those in which nothing moves; the first frame alone, if the next differs.
+        count: number of them; zero in a video without frames.
+        noise: standard deviation of the brightness in a single one.
+    """
+
+    frames: Iterator[Frame]
+    image: Picture
+    count: int
+    noise: float
+
+
+def average_at_rest(frames: Iterator[Frame]) -> StillFrames:
+    """Averages the first frames as long as only noise tells them apart."""
+    first = next(frames, None)
+    if first is None:
+        return StillFrames(iter(()), np.zeros((0, 0), np.float32), 0, 0.0)
+    kept, total = [first], first.image.astype(np.float32)
+    most = min(_MOST, max(1, _MEMORY // first.image.size))
+    ahead: Frame | None = None
+    error: BrokenOffError | KeyboardInterrupt | None = None
+    noises: list[float] = []
+    try:
+        while len(kept) < most and (ahead := next(frames, None)) is not None:
+            noise = _noise_between(total / np.float32(len(kept)), ahead.image, len(kept))
+            if noise is None:
+                break
+            noises.append(noise)
+            kept.append(ahead)
+            total += ahead.image
+            ahead = None
+    except (BrokenOffError, KeyboardInterrupt) as broken:
+        error = broken
+    count = len(kept)
+    image: Picture = first.image if count == 1 else total / np.float32(count)
+    noise = float(np.median(noises)) if noises else image_noise(first.image)
+    again = itertools.chain(kept, () if ahead is None else (ahead,), _after(frames, error))
+    return StillFrames(again, image, count, noise)
+
+
+def _after(
+    frames: Iterator[Frame], error: BrokenOffError | KeyboardInterrupt | None
+) -> Iterator[Frame]:
+    if error is not None:
+        raise error
+    yield from frames
+
+
+def image_noise(image: Picture) -> float:
+    """Measures the standard deviation of noise in a picture that is smooth nearly everywhere."""
+    rough = cv2.filter2D(image.astype(np.float32), -1, _LAPLACE)
+    return float(np.median(np.abs(rough))) / _NORMAL
+
+
+def _noise_between(mean: Floats, image: Picture, count: int) -> float | None:
+    """Returns the noise of a frame that shows what the mean of some does; nothing if it moved."""
+    if mean.shape != image.shape:
+        return None
+    shown = image.astype(np.float32)
+    gain = float(np.vdot(shown, mean)) / max(float(np.vdot(mean, mean)), 1e-9)  # lamps flicker
+    change = shown - np.float32(gain) * mean
+    spread = max(image_noise(change), _ROUNDED)
+    rows, columns = (size // _BLOCK for size in image.shape)
+    blocks = cv2.resize(
+        change[: rows * _BLOCK, : columns * _BLOCK], (columns, rows), interpolation=cv2.INTER_AREA
+    )
+    blocks *= _BLOCK / spread
+    if float(np.mean(blocks**2)) > _ALIKE or float(np.abs(blocks).max()) > _JUMP:
+        return None
+    return spread / float(np.sqrt(1 + 1 / count))

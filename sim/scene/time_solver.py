@@ -1,0 +1,317 @@
+"""Chooses integrator and steps of a motion in time, by estimates of the error that they make.
+
+A first grid is solved beside one of half its steps. The difference over ``ratio^order - 1``
+estimates the error of the finer one, and steps are cut until it is what the accuracy allows. The
+order is that of motions which start with a jump of the velocity, well below that of the method.
+Explicit steps, which cannot be longer than stable ones, are compared with the leapfrog's first.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from sim.core import Floats, SimulationError
+from sim.scene.scene import DIRECTED, Accuracy, Scene
+from sim.solvers import PrescribedMotion, Pulse, breakpoints, solve_case
+from sim.structure import ConcreteParameters
+from sim.time_integration import (
+    BLANES_MOAN,
+    LEAPFROG,
+    ExplicitSolver,
+    ImplicitSolver,
+    adapted,
+    time_grid,
+)
+from sim.vibration import highest_frequency, lowest_frequency
+
+LOG = logging.getLogger(__name__)
+
+TURN_ALLOWANCE = np.deg2rad(30.0)
+"""Relative rotation that a ligament's units may make before its contact is no longer skipped."""
+
+SLOW = 0.75
+"""Drives below this fraction of the lowest eigenfrequency may excite no waves worth resolving."""
+
+STABLE_FRACTION = {"draft": 0.95, "default": 0.95, "tight": 0.9}
+STIFFENING = 1.7
+"""Highest eigenfrequency in motion over that at rest (4.6 -> 7 kHz for the paper's lattices)."""
+
+NEWTON = 1e-6
+"""Tolerance of the stage velocities, mm/s: losses are smooth to 1e-13, gradients exact to 1e-6."""
+IMPLICIT_ORDER, EXPLICIT_ORDER = 0.6, 3.0
+MOST_PARTS = 8
+EXPLICIT_STEPS = 6
+"""Explicit steps that take the time of one implicit step, the adjoint of either counted in."""
+MOST_DOUBLINGS = 4
+MOST_MEMORY = 1 << 29
+"""Bytes that the stages of an implicit run may take."""
+SAMPLES = 1001
+"""Times at which the size of a drive is looked for."""
+
+
+@dataclass(frozen=True)
+class StepRule:
+    """Holds the first grid of an accuracy, and the errors that it allows.
+
+    Attributes:
+        first: first step of a graded grid, s.
+        growth: of its steps.
+        per_period: its longest steps, as parts of the drive's period.
+        per_step: error allowed in each step of an adapted grid, over the size of the drive.
+        loss: error allowed in the mean square of the region's motion, relative.
+        motion: in its motion, root mean square, relative.
+    """
+
+    first: float
+    growth: float
+    per_period: int
+    per_step: float
+    loss: float
+    motion: float
+
+
+RULES: dict[Accuracy, StepRule] = {
+    "draft": StepRule(1e-3, 1.3, 16, 1e-2, 1e-2, 5e-2),
+    "default": StepRule(7e-4, 1.3, 20, 3e-3, 1e-3, 1e-2),
+    "tight": StepRule(1e-4, 1.05, 80, 3e-4, 1e-6, 1e-4),
+}
+
+TimeSolver = ImplicitSolver | ExplicitSolver
+S = TypeVar("S", ImplicitSolver, ExplicitSolver)
+
+
+def time_solver(
+    scene: Scene,
+    values: ConcreteParameters,
+    times: Floats,
+    threads: int,
+    decisions: list[str],
+    warnings: list[str],
+) -> TimeSolver:
+    """Chooses the solver of a motion; adds what was decided, a line each.
+
+    Args:
+        scene: the scene.
+        values: parameters of the structure that the steps are chosen for.
+        times: (n_times,) of the output, s.
+        threads: cases to solve side by side.
+        decisions: appended to.
+        warnings: likewise, if the accuracy is not reached.
+    """
+    error = _Error(scene, values)
+    explicit = _explicit(scene, values, times, threads)
+    if _implicit_first(scene, values, decisions):
+        auto = scene.numerics.integrator == "auto"
+        stored = 3 * 4 * scene.topology.n_dofs * np.dtype(float).itemsize
+        most = explicit.n_steps // EXPLICIT_STEPS if auto else MOST_MEMORY // stored
+        try:
+            first = _first_grid(scene, values, times, threads, most)
+            solver, left = _shortened(first, None, _parts, IMPLICIT_ORDER, error, most)
+        except SimulationError:
+            if not auto:
+                raise
+            left = np.inf
+        if left <= 1.0 or not auto:
+            kind = "adapted" if scene.loads.drive_frequency is None else "graded"
+            told = f"grid: {len(solver.times) - 1} {kind} steps over {times[-1]:.6g} s, frozen"
+            decisions.extend([told, error.told(left, warnings)])
+            return solver
+        decisions.append("explicit: implicit steps as short as the accuracy asks for take longer")
+    rough = replace(explicit, splitting=LEAPFROG, n_steps=_same_share(explicit.n_steps))
+    most = 2**MOST_DOUBLINGS * explicit.n_steps
+    chosen, left = _shortened(rough, explicit, _doubled, EXPLICIT_ORDER, error, most)
+    told = f"grid: {chosen.n_steps} equal steps over {times[-1]:.6g} s"
+    decisions.extend([told, error.told(left, warnings)])
+    return chosen
+
+
+def _same_share(n_steps: int) -> int:
+    """Counts the leapfrog's steps at the same share of its stability limit."""
+    return int(np.ceil(n_steps * BLANES_MOAN.stability / LEAPFROG.stability))
+
+
+def _implicit_first(scene: Scene, values: ConcreteParameters, decisions: list[str]) -> bool:
+    """Tells whether an implicit grid is tried, and says why."""
+    if scene.numerics.integrator != "auto":
+        decisions.append("integrator as asked for")
+        return scene.numerics.integrator == "implicit"
+    if scene.numerics.accuracy == "tight":
+        decisions.append("explicit: a tight tolerance needs every frequency resolved")
+        return False
+    bells = [0.5 / float(m.width) for m in scene.loads.motions if isinstance(m, Pulse)]
+    driven = scene.loads.drive_frequency or max(bells, default=None)
+    if driven is None:
+        decisions.append("the drive has no frequency of its own")
+        return True
+    lowest = lowest_frequency(scene.topology, values) / (2 * np.pi)
+    decisions.append(f"drive at {driven:.4g} Hz, lowest eigenfrequency {lowest:.4g} Hz")
+    return driven < SLOW * lowest
+
+
+class _Error:
+    """Compares solutions of all different drives with what the accuracy allows."""
+
+    def __init__(self, scene: Scene, values: ConcreteParameters) -> None:
+        self._values, self._drives = values, different_drives(scene)
+        self._rule, self._accuracy = RULES[scene.numerics.accuracy], scene.numerics.accuracy
+        region, every = scene.objective.region, np.arange(scene.lattice.n_units)
+        self._units = region if len(region) else np.setdiff1d(every, scene.loads.driven)
+        self._scales = np.array([scene.lattice.spacing, scene.lattice.spacing, 1.0])
+
+    def motions(self, solver: S) -> tuple[list[Floats] | None, S]:
+        """Solves for the region's motions (n_times, n_region, 3); None if that fails.
+
+        Also returns the solver with the steps that had to be cut on the way.
+        """
+        try:
+            solved = [solve_case(solver, self._values, drive) for drive in self._drives]
+        except SimulationError:
+            return None, solver
+        moved = [u.reshape(len(u), -1, 3)[:, self._units] / self._scales for u, _, _ in solved]
+        if isinstance(solver, ImplicitSolver):
+            longest = max((record.times for _, _, record in solved), key=len)
+            return moved, replace(solver, times=longest)
+        return moved, solver
+
+    def between(self, one: list[Floats] | None, other: list[Floats] | None) -> float:
+        """Returns the greatest difference of two solutions, over what is allowed."""
+        if one is None or other is None:
+            return np.inf
+        return max(self._difference(*pair) for pair in zip(one, other, strict=True))
+
+    def _difference(self, one: Floats, other: Floats) -> float:
+        size = float(np.sum(other**2))
+        if size == 0.0:
+            return np.inf if one.any() else 0.0
+        loss = abs(float(np.sum(one**2)) - size) / size
+        motion = float(np.sqrt(np.sum((one - other) ** 2) / size))
+        return max(loss / self._rule.loss, motion / self._rule.motion)
+
+    def told(self, left: float, warnings: list[str]) -> str:
+        """Says how much of the allowed error is estimated to be there."""
+        allowed = f"loss {self._rule.loss:g}, motion {self._rule.motion:g}"
+        line = f"estimated error: {left:.2g} of what {self._accuracy} allows ({allowed})"
+        if left > 1.0:
+            warnings.append(f"{line}, with the shortest steps that were tried")
+            LOG.warning(warnings[-1])
+        return line
+
+
+def different_drives(scene: Scene) -> list[PrescribedMotion]:
+    """Lists the drives of the load cases; the first of those that differ by direction alone."""
+    found: dict[object, PrescribedMotion] = {}
+    for drive in scene.loads.cases:
+        motion = drive.motion
+        besides = motion._replace(direction=0.0) if isinstance(motion, DIRECTED) else id(motion)
+        found.setdefault((type(motion), tuple(drive.units), besides), drive)
+    return list(found.values())
+
+
+def _shortened(
+    rough: S,
+    finer: S | None,
+    cut: Callable[[S, float], tuple[S, int]],
+    order: float,
+    error: _Error,
+    most: int,
+) -> tuple[S, float]:
+    """Cuts steps until the error is allowed; also returns the estimate, over the allowed one.
+
+    Args:
+        rough: about half as accurate as the finer one.
+        finer: the first that may do; None for the rough one and that with half its steps.
+        cut: makes a solver with shorter steps that reduces an error (over the allowed one) to 1 if
+            it can, and says into how many parts they were cut.
+        order: of convergence, cautiously.
+        error: to compare solutions.
+        most: number of steps.
+    """
+    seen, rough = error.motions(rough)
+    kept, finer = (rough, twice_as_fine(rough)) if finer is None else (None, finer)
+    parts, (motions, finer) = 2, error.motions(finer)
+    while motions is not None:
+        left = error.between(seen, motions) / (parts**order - 1.0)
+        if kept is not None and left * parts**order <= 1.0:
+            return kept, left * parts**order
+        if left <= 1.0:
+            return finer, left
+        following, parts = cut(finer, left)
+        if _n_steps(following) > most:
+            return finer, left
+        kept, seen = finer, motions
+        motions, finer = error.motions(following)
+    return finer, np.inf
+
+
+def _parts(solver: ImplicitSolver, left: float) -> tuple[ImplicitSolver, int]:
+    parts = int(np.clip(np.ceil(min(left, 1e3) ** (1 / IMPLICIT_ORDER)), 2, MOST_PARTS))
+    return replace(solver, times=time_grid.divided(solver.times, parts)), parts
+
+
+def _doubled(solver: ExplicitSolver, left: float) -> tuple[ExplicitSolver, int]:
+    del left
+    return twice_as_fine(solver), 2
+
+
+def twice_as_fine(solver: S) -> S:
+    """Cuts every step in two."""
+    if isinstance(solver, ImplicitSolver):
+        return replace(solver, times=time_grid.halved(solver.times))
+    return replace(solver, n_steps=2 * solver.n_steps)
+
+
+def _n_steps(solver: TimeSolver) -> int:
+    return solver.n_steps if isinstance(solver, ExplicitSolver) else len(solver.times) - 1
+
+
+def _first_grid(
+    scene: Scene, values: ConcreteParameters, times: Floats, threads: int, most: int
+) -> ImplicitSolver:
+    """Grades a grid by the drive's frequency, or adapts one to each of the drives without."""
+    rule, end, frequency = (
+        RULES[scene.numerics.accuracy],
+        float(times[-1]),
+        scene.loads.drive_frequency,
+    )
+    largest = (end if frequency is None else 1 / frequency) / rule.per_period
+    steps = time_grid.graded(end, min(rule.first, largest), rule.growth, largest)
+    drives = different_drives(scene)
+    stops = np.unique(np.concatenate([breakpoints(each.motion, end) for each in drives]))
+    solver = ImplicitSolver(
+        scene.topology, steps, times, NEWTON, threads, turn_allowance=TURN_ALLOWANCE
+    )
+    if frequency is not None:
+        return replace(solver, times=time_grid.through(steps, stops))
+    grids = [
+        adapted(solver, values, drive, rule.per_step * _size(solver, drive, stops), rule.first,
+                largest, stops, most).times
+        for drive in drives
+    ]  # fmt: skip
+    return replace(solver, times=time_grid.through(grids[0], np.concatenate(grids)))
+
+
+def _size(solver: ImplicitSolver, drive: PrescribedMotion, stops: Floats) -> float:
+    """Finds how far a drive goes, mm (rotations times the rotation scale)."""
+    held = solver.topology.held
+    at = np.union1d(np.linspace(0.0, float(solver.times[-1]), SAMPLES), stops)
+    return float(np.abs(drive.values(held, at) * solver.topology.scale[held]).max()) or 1.0
+
+
+def _explicit(
+    scene: Scene, values: ConcreteParameters, times: Floats, threads: int
+) -> ExplicitSolver:
+    end, accuracy = float(times[-1]), scene.numerics.accuracy
+    highest = STIFFENING * highest_frequency(scene.topology, values)
+    largest = STABLE_FRACTION[accuracy] * BLANES_MOAN.stability / max(highest, 1e-300)
+    # a heavy or soft structure is stable with steps far too long for its drive
+    if (frequency := scene.loads.drive_frequency) is not None:
+        largest = min(largest, 1 / (frequency * RULES[accuracy].per_period))
+    for drive in different_drives(scene):
+        gaps = np.diff(breakpoints(drive.motion, end))
+        largest = min(largest, max(gaps.min(initial=np.inf) / 2, largest / 16))
+    return ExplicitSolver(scene.topology, end, int(np.ceil(end / largest)), times, threads)

@@ -1,0 +1,124 @@
+"""Shims in slots that are not in line: how they are bent, and that slots are chosen against it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.integrate import solve_bvp
+
+from pipeline.fabrication.checks.package_check import page_words
+from pipeline.fabrication.papers import read_bill
+from pipeline.fabrication.parts import Slot, UnbuildableUnitError
+from pipeline.fabrication.units import build_specimen, network
+from pipeline.fabrication.units.prebend import peak_curvature, prebend
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
+from sim.core import Floats
+from tests.pipeline.fabrication import built, handmade
+
+DESIGN = Path("design.nc")
+
+
+def way(degrees: float) -> Floats:
+    return np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+
+
+def elastica(start: float, end: float, chord: float) -> float:
+    """Largest curvature of an inextensible strip that slides in clamps at both ends of a chord.
+
+    The angle t of a strip under end forces (p, q) obeys t'' = -p sin t - q cos t over its length.
+    Its energy is least over that length too where the Hamiltonian t'^2 / 2 - p cos t + q sin t
+    vanishes.
+    """
+
+    def slopes(_: Floats, y: Floats, p: Floats) -> Floats:
+        angle, bend, _, _ = y
+        force, shear, length = p
+        rates = [bend, -force * np.sin(angle) - shear * np.cos(angle), np.cos(angle), np.sin(angle)]
+        return length * np.stack(rates)
+
+    def ends(a: Floats, b: Floats, p: Floats) -> Floats:
+        energy = a[1] ** 2 / 2 - p[0] * np.cos(a[0]) + p[1] * np.sin(a[0])
+        return np.array([a[0] - start, b[0] - end, a[2], b[2] - chord, a[3], b[3], energy])
+
+    s = np.linspace(0.0, 1.0, 60)
+    slope = start + (end - start) * s
+    guess = np.stack([slope, np.gradient(slope, s) / chord, chord * s, 0.0 * s])
+    found = solve_bvp(slopes, ends, s, guess, p=np.array([0.0, 0.0, chord]), tol=1e-8)
+    assert found.success
+    return float(np.abs(found.sol(np.linspace(0.0, 1.0, 1001))[1]).max())
+
+
+@pytest.mark.parametrize(("a", "b"), [(-20.0, 20.0), (15.0, 15.0), (30.0, 0.0), (-25.0, 10.0)])
+def test_the_curvature_is_near_that_of_the_elastica(a: float, b: float) -> None:
+    found = peak_curvature(np.zeros(2), way(a), np.array([2.5, 0.0]), way(b))
+    exact = elastica(np.radians(a), np.radians(b), 2.5)
+    assert float(found) == pytest.approx(exact, rel=0.1)
+
+
+def test_a_shim_of_the_paper_towards_the_centroids_is_bent_to_an_arc() -> None:
+    settings = Fabrication()
+    one = Slot(0, 0, np.zeros(2), -way(-20.0), 3.0, 0.45, 0.0, 1.0)
+    other = replace(one, mouth=np.array([2.25, 0.0]), direction=way(20.0))
+    found = prebend(one, other, settings)
+    assert np.degrees(found.angles) == pytest.approx([-20.0, 20.0])
+    assert found.strain == pytest.approx(0.125 * 2 * np.radians(20.0) / 2.25)  # 3.9 %
+    assert found.moment == pytest.approx(4500 * 8.1 * 0.25**3 / 12 * 2 * np.radians(20.0) / 2.25)
+    assert prebend(other, one, settings).strain == pytest.approx(found.strain)
+
+
+def test_slots_of_the_regular_lattice_leave_its_shims_straight() -> None:
+    specimen = build_specimen(
+        network(built.design(), "cloaked"), Fabrication(), ("toy", ""), DESIGN
+    )
+    assert max(ligament.strain for ligament in specimen.ligaments) < 1e-9
+    assert specimen.bent == []
+
+
+def test_a_slot_that_has_to_turn_is_followed_by_the_one_across() -> None:
+    """The corner of unit B1 that faces A1 is so sharp that its slot cannot follow the ligament."""
+    design = sharpened()
+    specimen = build_specimen(network(design, "cloaked"), Fabrication(), ("toy", ""), DESIGN)
+    (bent,) = (one for one in specimen.ligaments if one.name == "A1 - B1")
+    assert abs(bent.angles[1]) > np.radians(10.0)
+    assert bent.angles[0] * bent.angles[1] < 0  # an arc, not an S, as far as the walls of A1 allow
+    assert bent in specimen.bent
+
+
+def sharpened() -> xr.Dataset:
+    """The six squares, the middle one of the lower row drawn out along a line off its ligaments."""
+    design = built.design()
+    corners = design["vertices"].values.copy()
+    corners[1, 1] += [-2.0, -5.0]
+    corners[1, 3] += [-2.0, 4.0]
+    design["vertices"] = design["vertices"].copy(data=corners)
+    return design
+
+
+def test_shims_that_are_bent_too_much_are_refused() -> None:
+    settings = Fabrication.model_validate(
+        {"slots": {"direction": "centroid"}, "shims": {"prebend_strain": 0.02}}, context=SIM_UNITS
+    )
+    with pytest.raises(UnbuildableUnitError) as caught:
+        build_specimen(network(built.design(), "cloaked"), settings, ("toy", ""), DESIGN)
+    assert caught.value.key == "fabrication.shims.prebend_strain"
+    assert "is bent to a strain of 3.1 % before any load" in str(caught.value)
+
+
+def test_papers_tell_how_every_shim_is_bent(tmp_path: Path) -> None:
+    built.write(tmp_path / "cloaked", {"slots": {"direction": "centroid"}})
+    told = json.loads((tmp_path / "cloaked/manifest.json").read_text())["prebend"]
+    assert len(told) == len(handmade.neighbours())
+    assert np.abs(told["A1 - B1"]["end_angles_deg"]) == pytest.approx([20.0, 20.0])
+    assert told["A1 - B1"]["strain"] == pytest.approx(0.0305, abs=1e-4)
+    rows = [row for row in read_bill(tmp_path / "cloaked/bom.csv") if row["item"] == "ligament"]
+    assert len(rows) == len(told)
+    assert "strain 3.05 %, moment" in rows[0]["note"]
+    last = page_words(tmp_path / "cloaked/assembly.pdf")[-1]
+    assert "7 of 7 shims are bent before any load" in last[0]
+    assert "worst 7" in last

@@ -1,0 +1,74 @@
+"""Clips as labs film them: nothing is wrong and called good, and sigma holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.tracking.wild_clips import WildClip, errors, make, tracked
+from pipeline.runtime import UserError
+from pipeline.tracking.motion import Track, track_video
+from pipeline.tracking.reference_frame import RecordingSetup
+
+
+def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
+    clip = make(name, folder, frames)
+    return clip, tracked(clip)
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "rms", "lost"),
+    [
+        ("leaves_and_returns", 44, 0.012, 0.02),
+        ("hand", 12, 0.012, 0.02),
+        ("low_light", 8, 0.06, 0.0),
+        ("motion_blur", 10, 0.05, 0.0),
+        ("rolling_shutter", 10, 0.012, 0.0),
+        ("tripod_knocked", 16, 0.008, 0.0),
+        ("fisheye", 6, 0.01, 0.0),
+        ("red_on_teal", 6, 0.03, 0.0),
+        ("bolts_and_tape", 6, 0.01, 0.0),
+    ],
+)
+def test_no_unit_is_wrong_and_called_good(
+    name: str, frames: int, rms: float, lost: float, tmp_path: Path
+) -> None:
+    clip, track = shown(name, tmp_path, frames)
+    found = errors(clip, track)
+    assert found.gross == 0
+    assert found.rms < rms
+    assert found.lost <= lost
+    assert ((track.quality == 0) == np.isfinite(track.displacement[..., 0])).all()
+
+
+def test_sigma_holds_while_a_specimen_sticks_and_slips(tmp_path: Path) -> None:
+    clip, track = shown("stick_slip", tmp_path, 24)
+    assert (track.timing == 0).all()
+    assert errors(clip, track).honesty.min() > 0.7
+    assert errors(clip, track).honesty.max() < 1.4
+
+
+def test_the_blur_of_a_camera_is_measured(tmp_path: Path) -> None:
+    _, track = shown("soft_focus", tmp_path, 2)
+    assert track.calibration.blur / track.calibration.pixel == pytest.approx(1.1, rel=0.2)
+
+
+def test_a_picture_shown_again_is_told(tmp_path: Path) -> None:
+    clip, track = shown("shown_again", tmp_path, 30)
+    np.testing.assert_array_equal(track.timing == 1, clip.fault)
+
+
+def test_a_camera_that_moves_is_told_or_refused_without_supports(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    clip = make("tripod_knocked", tmp_path, 14)
+    fixed = RecordingSetup(held=clip.held)
+    with caplog.at_level("WARNING"):
+        track_video(iter(clip.frames), clip.specimen, clip.scale, setup=fixed)
+    assert "all clamped units move together" in caplog.text
+    blind = RecordingSetup(held=clip.held & False, follows_supports=True)
+    with pytest.raises(UserError, match="clamped units") as caught:
+        track_video(iter(clip.frames[:2]), clip.specimen, clip.scale, setup=blind)
+    assert caught.value.remedy

@@ -1,0 +1,32 @@
+"""The kind of strain that a drive puts on a lattice is named by its direction and its side."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import problem
+from reports.figures.loading_path.abscissa import Abscissa
+from reports.figures.loading_path.facts import strain_fact
+
+FIG4 = Path(__file__).parents[3] / "experiments/fig4/problem.yaml"
+PATH = Abscissa("displacement", "u", "mm", np.array([0.0, 15.0]), True, None, (0, 1))
+
+
+@pytest.mark.parametrize(
+    ("degrees", "label"),
+    [
+        ((180,), "Compression"),
+        ((0,), "Extension"),
+        ((90,), "Shear"),
+        ((180, 270), "Compression, shear"),
+    ],
+)
+def test_a_drive_of_the_right_column_is_named(degrees: tuple[float, ...], label: str) -> None:
+    asked = problem.load(FIG4)
+    drive = asked.drive.model_copy(update={"directions": tuple(np.radians(degrees))})
+    found = strain_fact(asked.model_copy(update={"drive": drive}), PATH)
+    assert found.label == label
+    assert found.value == pytest.approx(100 * 15.0 / 210.0)

@@ -1,0 +1,69 @@
+"""What was loaded and generated keeps to the level, on a processor that has more."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.runtime import ROOT
+from sim.core.instruction_set import can_pin
+
+REPORT = """
+import pipeline
+import re, sys, numpy, scipy.linalg
+from threadpoolctl import threadpool_info
+from numba import njit
+
+def total(values):
+    found = 0.0
+    for value in values:
+        found += value * 2.0
+    return found
+
+from sim.core import compiled
+loop = compiled(total, fastmath=True)
+loop(numpy.ones(64))
+code = "".join(loop.inspect_asm().values())
+assert re.search(r"%ymm", code), "not vectorised at all"
+print("numba", "%zmm" in code)
+module = numpy._core._multiarray_umath
+print("numpy", *(name for name in module.__cpu_dispatch__ if module.__cpu_features__[name]))
+print("blas", *sorted({row["architecture"] for row in threadpool_info() if "architecture" in row}))
+"""
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    assert can_pin(), "this processor lacks AVX2: results differ in their last bits"
+    script = tmp_path_factory.mktemp("script") / "report.py"
+    script.write_text(REPORT)
+    done = subprocess.run(
+        [sys.executable, script], cwd=ROOT, capture_output=True, text=True, check=True,
+        env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin", "HOME": str(Path.home())},
+    )  # fmt: skip
+    return dict(line.split(" ", 1) for line in done.stdout.splitlines())
+
+
+def test_loops_have_no_wider_vectors(report: dict[str, str]) -> None:
+    assert report["numba"] == "False"
+
+
+def test_numpy_takes_no_wider_loops(report: dict[str, str]) -> None:
+    assert report["numpy"] == "X86_V3"
+
+
+def test_blas_is_that_of_the_level(report: dict[str, str]) -> None:
+    assert report["blas"] == "Haswell"
+
+
+def test_xla_obeys(tmp_path: Path) -> None:
+    """Its flags are read up to the first that it does not know."""
+    dump = f"import os, pipeline; os.environ['XLA_FLAGS'] += ' --xla_dump_to={tmp_path}'"
+    script = f"{dump}\nimport jax\njax.jit(lambda x: x + 1)(1.0)"
+    subprocess.run([sys.executable, "-c", script], cwd=ROOT, check=True, capture_output=True)
+    options = [path.read_text() for path in tmp_path.glob("*debug_options")]
+    assert options
+    assert all('xla_cpu_max_isa: "AVX2"' in text for text in options)

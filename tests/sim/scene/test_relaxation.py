@@ -1,0 +1,139 @@
+"""Ligaments under stress at rest: their energy, their equilibrium, its derivatives."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sim.core import Floats
+from sim.energy import ligament_strain, topology
+from sim.quasistatics import StaticSolver
+from sim.scene import (
+    Clamp,
+    Loads,
+    Scene,
+    Structure,
+    as_built,
+    concrete_parameters,
+    relaxed,
+    simulate,
+)
+from sim.solvers import Harmonic, LinearRamp, MotionLaw, PrescribedMotion
+from sim.structure import Material, quads
+
+PLAIN = Material(6.18e-9, 120.0, 1.19, 1.5, 1.5, 1e-8, 1e-7)
+
+
+def scene(material: Material, motion: MotionLaw | None = None, static: bool = True) -> Scene:
+    """Four by three squares, the left column clamped, the right one pulled."""
+    lattice = quads(4, 3, 15.0, 2.25, np.deg2rad(20.0))
+    right, left = np.array([3, 7, 11]), np.array([0, 4, 8])
+    law = LinearRamp(-1.0, 1.0, 0.0) if motion is None else motion
+    loads = Loads((PrescribedMotion(right, law),), (Clamp(left),), static=static, duration=1.0)
+    return Scene(Structure(lattice, material), loads)
+
+
+def bent(size: float = 0.3) -> Material:
+    rng = np.random.default_rng(3)
+    n = quads(4, 3, 15.0, 2.25, 0.3).n_ligaments
+    return PLAIN._replace(
+        end_angles=size * rng.normal(size=(n, 2)), elongation=0.02 * rng.normal(size=n)
+    )
+
+
+def test_a_strip_is_free_of_stress_once_its_clamps_are_in_line() -> None:
+    a, b = 0.3, -0.1
+    made = concrete_parameters(
+        scene(PLAIN._replace(end_angles=np.array([a, b]))), scene(PLAIN).lattice.vertices
+    )
+    vector, still = jnp.array([2.25, 0.0]), jnp.zeros(3)
+    # the second unit turns so that its clamp is parallel to the first's, and moves onto its line
+    there = 2.25 * np.array([np.cos(a), np.sin(a)])
+    motion = jnp.array([*(there - np.asarray(vector)), a - b])
+    strain = ligament_strain(still, motion, jnp.zeros(2), jnp.zeros(2), vector)
+    assert np.array(strain) == pytest.approx(made.natural[0], abs=1e-15)
+
+
+def test_without_a_natural_state_nothing_changes_by_a_bit() -> None:
+    zeros = PLAIN._replace(end_angles=np.zeros((17, 2)), elongation=np.zeros(17))
+    one, other = simulate(scene(PLAIN)), simulate(scene(zeros))
+    assert np.array_equal(one.displacement, other.displacement)
+    at_rest = relaxed(scene(PLAIN))
+    assert np.array_equal(at_rest.motion, np.zeros((12, 3)))
+
+
+@pytest.mark.parametrize("static", [True, False], ids=["static", "in time"])
+def test_a_relaxed_structure_rests_and_answers_as_the_one_it_was(static: bool) -> None:
+    """A path from the design, less the motion at its start, is the path from rest."""
+    plain = scene(bent())
+    at_rest = relaxed(plain)
+    assert np.abs(at_rest.motion[:, 2]).max() > 0.01
+    again = relaxed(at_rest.scene)
+    assert np.abs(again.motion).max() < 1e-9
+    if static:
+        path, moved = (
+            simulate(each, times=np.array([0.5, 1.0])) for each in (plain, at_rest.scene)
+        )
+        from_rest = np.asarray(path.displacement) - at_rest.motion
+        np.testing.assert_allclose(moved.displacement, from_rest, atol=1e-8)
+        np.testing.assert_allclose(moved.drive_force, path.drive_force, rtol=1e-7)
+        strained = [each.observables[0].strain_energy for each in (path, moved)]
+        np.testing.assert_allclose(strained[0], strained[1], rtol=1e-8)
+    else:
+        shaken = at_rest.scene.updated(
+            cases=(PrescribedMotion(plain.loads.driven, Harmonic(0.0, 5.0, 0.0)),), static=False
+        )
+        assert np.abs(simulate(shaken, times=np.linspace(0.0, 0.1, 5)).displacement).max() < 1e-8
+
+
+def test_derivatives_by_the_natural_state_pass_the_taylor_test() -> None:
+    posed = scene(bent())
+    values = concrete_parameters(posed, posed.lattice.vertices)
+    joined = topology(posed.lattice, posed.loads.held, posed.structure.contact)
+    solver = StaticSolver(joined, np.array([0.5, 1.0]), relative=1e-13)
+    rng = np.random.default_rng(5)
+    way = values._replace(
+        **{name: np.zeros_like(part) for name, part in values._asdict().items()}
+    )._replace(natural=rng.normal(size=values.natural.shape) * [0.05, 0.2, 0.3])
+    weight = rng.normal(size=(2, 36))
+
+    def value(step: float) -> float:
+        shifted = values._replace(natural=values.natural + step * way.natural)
+        return float((solver.forward(shifted, posed.loads.cases[0])[0] * weight).sum())
+
+    def remainder(step: float) -> float:
+        return abs(value(step) - value(0.0) - step * slope)
+
+    _, _, record = solver.forward(values, posed.loads.cases[0])
+    bar: Floats = solver.backward(values, record, weight, np.zeros_like(weight))[0].natural
+    slope = float((bar * way.natural).sum())
+    steps = np.array([1e-2, 5e-3, 2.5e-3])
+    left = [remainder(step) for step in steps]
+    order = np.log2(np.array(left[:-1]) / left[1:])
+    np.testing.assert_allclose(order, 2.0, atol=0.1)
+
+
+def pulled(kind: Literal["displacement", "strain_energy"]) -> Scene:
+    """The squares, two in the middle of which are to rest."""
+    return scene(PLAIN).updated(region=np.array([5, 6]), kind=kind, steps=2)
+
+
+@pytest.mark.parametrize("kind", ["displacement", "strain_energy"])
+def test_straight_shims_change_no_loss(kind: Literal["displacement", "strain_energy"]) -> None:
+    posed = pulled(kind)
+    found = as_built(posed, posed.lattice.vertices, np.zeros((17, 2)))
+    assert np.abs(found.turn).max() == 0.0
+    assert found.loss_as_built == pytest.approx(found.loss_as_designed, rel=1e-9)
+    assert found.loss_as_designed > 0.0
+
+
+def test_a_bent_shim_turns_units_and_only_what_loads_add_counts() -> None:
+    posed, angles = pulled("strain_energy"), np.zeros((17, 2))
+    angles[4] = 0.3, -0.3
+    found = as_built(posed, posed.lattice.vertices, angles)
+    assert 0.01 < np.degrees(np.abs(found.turn).max()) < 20.0
+    assert abs(found.loss_as_built / found.loss_as_designed - 1.0) > 1e-3
+    assert 0.0 < found.loss_as_built < 3.0 * found.loss_as_designed
