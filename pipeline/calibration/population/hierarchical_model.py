@@ -72,9 +72,7 @@ class Readings(NamedTuple):
         forces = jnp.exp(self.of_samples(logs))
         return jnp.log(jnp.einsum("tns,tsn->tn", self.shares, forces))
 
-    def covariance(
-        self, discrepancy: Numbers | float, mounting: Numbers, reading: Numbers
-    ) -> Array:
+    def covariance(self, discrepancy: Numbers, mounting: Numbers, reading: Numbers) -> Array:
         """Computes (n_kinds, n, n) of what is added; the last two scales are by kind."""
         common = jnp.einsum("tns,tms->tnm", self.shares, self.shares)
         alike = jax.vmap(correlation)(self.place)

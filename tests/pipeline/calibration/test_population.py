@@ -89,7 +89,7 @@ def test_a_reading_that_is_left_out_tells_nothing(emulator: CurveEmulator) -> No
         curves(1.0, 1.2), {"compression": emulator}, SAMPLES, 5
     )
     some = found._replace(used=found.used * (np.arange(15) < 10))
-    made = np.asarray(some.covariance(0.1, np.array([0.05]), np.array([0.01])))[0]
+    made = np.asarray(some.covariance(np.array(0.1), np.array([0.05]), np.array([0.01])))[0]
     np.testing.assert_allclose(made[10:], np.eye(15)[10:], atol=1e-6)
     # d of all samples goes together, and with it what a mounting changes in one
     np.testing.assert_allclose(made[0, 0], 0.1**2 + 0.05**2 + 0.01**2, rtol=1e-3)
