@@ -97,7 +97,7 @@ def delegate(program: str, imports: str) -> int | None:
 
 @contextmanager
 def _passed_on(server: socket.socket) -> Iterator[None]:
-    """Hands signals on to the stage; SIGINT of a terminal reaches it as it reaches us."""
+    """Hands signals on to the stage, which is in a group of its own: each reaches it once."""
 
     def hand_on(number: int, _: object) -> None:
         with suppress(OSError):
@@ -211,6 +211,7 @@ def _received(client: socket.socket) -> tuple[_Request, list[int]] | None:
 def _become(request: _Request, given: list[int]) -> None:
     """Gives this fork the streams, folder, environment and arguments of its client."""
     ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGTERM)
+    os.setpgid(0, 0)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for stream, own in zip(given, _STREAMS, strict=True):
         os.dup2(stream, own)

@@ -195,7 +195,7 @@ class _Error:
     def told(self, left: float, warnings: list[str]) -> str:
         """Says how much of the allowed error is estimated to be there."""
         allowed = f"loss {self._rule.loss:g}, motion {self._rule.motion:g}"
-        line = f"estimated error: {left:.2g} of what {self._accuracy} allows ({allowed})"
+        line = f"estimate: {left:.2g} of the error that {self._accuracy} allows ({allowed})"
         if left > 1.0:
             warnings.append(f"{line}, with the shortest steps that were tried")
             LOG.warning(warnings[-1])
