@@ -90,7 +90,8 @@ def _counted_from(scene: Scene, moved: Floats, values: Parameters[Floats], motio
         elongation=stretch,
         end_angles=np.stack([shear + bend / 2, shear - bend / 2], axis=1),
     )
-    return scene.updated(lattice=lattice, material=material)
+    # at rest the lattice is as symmetric as its shims, which a design of it need not know
+    return scene.updated(lattice=lattice, material=material, symmetry="none")
 
 
 def as_built(scene: Scene, vertices: Floats, end_angles: Floats) -> AsBuilt:

@@ -137,3 +137,19 @@ def test_a_bent_shim_turns_units_and_only_what_loads_add_counts() -> None:
     assert 0.01 < np.degrees(np.abs(found.turn).max()) < 20.0
     assert abs(found.loss_as_built / found.loss_as_designed - 1.0) > 1e-3
     assert 0.0 < found.loss_as_built < 3.0 * found.loss_as_designed
+
+
+def test_a_symmetric_design_is_built_with_shims_that_are_not() -> None:
+    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0))
+    loads = Loads(
+        (PrescribedMotion(np.array([12]), LinearRamp(0.5, 1.0, 0.0)),),
+        (Clamp(np.array([0, 4, 20, 24])),),
+        static=True,
+        duration=1.0,
+    )
+    posed = Scene(Structure(lattice, PLAIN), loads).updated(
+        region=np.array([2]), steps=2, cloak=np.array([7, 11, 13, 17]), symmetry="C4"
+    )
+    assert posed.space.n_variables < 8
+    angles = np.random.default_rng(4).normal(size=(lattice.n_ligaments, 2)) * 0.1
+    assert as_built(posed, lattice.vertices, angles).loss_as_built > 0.0
