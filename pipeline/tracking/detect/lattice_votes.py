@@ -97,7 +97,7 @@ def locate_lattice(
             _Growth(points, joint, turned + shift, patches, pitch * abs(factor) / scale)
             for shift in _shifts(turned, patches, _BIN * pitch)
         ]
-        for seed in sorted(seeds, key=lambda one: -one.first_score(inside))[:_MOST_SEEDS]:
+        for seed in sorted(seeds, key=lambda one: one.rank(inside))[:_MOST_SEEDS]:
             grown = seed.placement(factor, inside)
             if grown is not None:
                 found.append(grown)
@@ -184,9 +184,12 @@ class _Growth:
         """Counts the matches."""
         return int((self._patch >= 0).sum())
 
-    def first_score(self, inside: Inside) -> int:
-        """Returns matches before growth less what should be there and is not."""
-        return self.size - int((inside(self._linear) & (self._patch < 0)).sum())
+    def rank(self, inside: Inside) -> tuple[int, int]:
+        """Returns what sorts matches before growth: the most first, then the fewest units missing.
+
+        A lens or a load takes units off the linear map, so ones missing do not outweigh matches.
+        """
+        return -self.size, int((inside(self._linear) & (self._patch < 0)).sum())
 
     def placement(self, factor: complex, inside: Inside) -> Placement | None:
         """Returns the match at its largest; nothing if it is small."""
