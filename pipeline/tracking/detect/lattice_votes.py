@@ -3,8 +3,8 @@
 Two neighbouring patches and two joined units vote for a turn, every patch and every unit for a
 shift (a generalised Hough transform: Ballard, Pattern Recognition 13 (1981) 111). Patches that are
 no units, and units without a patch, win votes for nothing. From the place with most votes the match
-grows over the joints, where the affine map of the nearest matches says: lenses bend lattices, and
-loads deform them.
+grows over the joints, then over gaps between parts of a design, where the affine map of the nearest
+matches says: lenses bend lattices, and loads deform them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
@@ -29,7 +29,7 @@ _JOINTS = 64
 _BIN, _NEAR, _GATE = 0.25, 0.3, 0.35
 """Width of a bin of shifts; distance of a patch from a unit at first and in growth; in pitches."""
 _FRONTIER = 1.7
-"""Units are reached from matches at most so far, pitches."""
+"""Units are reached from matches so far, over the length of a joint, or of the widest gap."""
 _TURNS_KEPT, _SHIFTS_KEPT = 0.6, 0.75
 """Votes of further candidates, over those of the best."""
 _MOST_SHIFTS, _MOST_SEEDS = 16, 3
@@ -90,14 +90,15 @@ def locate_lattice(
     ends = points[joint]
     vectors = (ends[:, 1] - ends[:, 0]) @ np.array([1, 1j])
     pitch = scale * float(np.median(np.abs(vectors)))
+    gap = float(minimum_spanning_tree(cdist(points, points)).max())
     found: list[Placement] = []
     for factor in _linear_factors(vectors, patches, scale, pitch, most_turn):
         turned = _turned(points, factor)
         seeds = [
-            _Growth(points, joint, turned + shift, patches, pitch * abs(factor) / scale)
+            _Growth(points, joint, gap, turned + shift, patches, pitch * abs(factor) / scale)
             for shift in _shifts(turned, patches, _BIN * pitch)
         ]
-        for seed in sorted(seeds, key=lambda one: -one.first_score(inside))[:_MOST_SEEDS]:
+        for seed in sorted(seeds, key=lambda one: one.rank(inside))[:_MOST_SEEDS]:
             grown = seed.placement(factor, inside)
             if grown is not None:
                 found.append(grown)
@@ -162,10 +163,17 @@ class _Growth:
     """Grows a match from where a linear map agrees with the patches, over the joints."""
 
     def __init__(
-        self, points: Floats, joint: Ints, linear: Floats, patches: Floats, pitch: float
+        self,
+        points: Floats,
+        joint: Ints,
+        gap: float,
+        linear: Floats,
+        patches: Floats,
+        pitch: float,
     ) -> None:
         self._points, self._linear, self._patches, self._pitch = points, linear, patches, pitch
         self._reach = _FRONTIER * float(np.median(np.ptp(points[joint], axis=1).max(axis=1)))
+        self._widest = max(self._reach, _FRONTIER * gap)
         self._patch = np.full(len(points), -1)
         unit, patch = match_one_to_one(linear, patches, _NEAR * pitch)
         self._patch[unit] = patch
@@ -184,24 +192,19 @@ class _Growth:
         """Counts the matches."""
         return int((self._patch >= 0).sum())
 
-    def first_score(self, inside: Inside) -> int:
-        """Returns matches before growth less what should be there and is not."""
-        return self.size - int((inside(self._linear) & (self._patch < 0)).sum())
+    def rank(self, inside: Inside) -> tuple[int, int]:
+        """Returns what sorts matches before growth: the most first, then the fewest units missing.
+
+        A lens or a load takes units off the linear map, so ones missing do not outweigh matches.
+        """
+        return -self.size, int((inside(self._linear) & (self._patch < 0)).sum())
 
     def placement(self, factor: complex, inside: Inside) -> Placement | None:
         """Returns the match at its largest; nothing if it is small."""
-        for _ in range(_ROUNDS):
-            if self.size < _LEAST:
-                return None
-            place, far = self._expected()
-            alone = (self._patch < 0) & (far < self._reach)
-            free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
-            if not (alone.any() and len(free)):
-                break
-            unit, patch = match_one_to_one(place[alone], self._patches[free], _GATE * self._pitch)
-            if not len(unit):
-                break
-            self._patch[np.flatnonzero(alone)[unit]] = free[patch]
+        for reach in (self._reach, self._widest):  # parts of a design may lie apart
+            self._grow(reach)
+        if self.size < _LEAST:
+            return None
         place, _ = self._expected()
         self._patch[np.linalg.norm(place - self._seen(place), axis=1) > _GATE * self._pitch] = -1
         unit = np.flatnonzero(self._patch >= 0)
@@ -216,6 +219,20 @@ class _Growth:
             missing,
             self._continuing(),
         )
+
+    def _grow(self, reach: float) -> None:
+        for _ in range(_ROUNDS):
+            if self.size < _LEAST:
+                return
+            place, far = self._expected()
+            alone = (self._patch < 0) & (far < reach)
+            free = np.setdiff1d(np.arange(len(self._patches)), self._patch)
+            if not (alone.any() and len(free)):
+                return
+            unit, patch = match_one_to_one(place[alone], self._patches[free], _GATE * self._pitch)
+            if not len(unit):
+                return
+            self._patch[np.flatnonzero(alone)[unit]] = free[patch]
 
     def _continuing(self) -> int:
         """Counts patches without a unit that go on with the lattice, about a pitch from others."""
