@@ -93,7 +93,7 @@ def test_a_response_holds_motion_forces_and_loss() -> None:
 
 
 def test_evaluations_by_a_plan_of_ones_own_are_not_mixed_up() -> None:
-    """What is compiled for a scene and a plan is kept; another plan finds none of it."""
+    """Compiled functions are kept for a scene and a plan; another plan finds none of them."""
     twice = scene().driven_by(sim.LinearRamp(-2.0, 1.0), sim.LinearRamp(-1.0, 1.0))
     plan = sim.make_plan(twice)
     both, _ = sim.evaluate(twice, design(), plan)

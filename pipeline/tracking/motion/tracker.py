@@ -41,8 +41,8 @@ _TURNED = 0.5
 """Or so far turned from there, rad."""
 _TIGHT = 6.0
 _FEW, _HALF = 0.9, 0.5
-"""Where a smaller part of the units is found, the specimen may have jumped; where as many are found
-in another place, it has."""
+"""Part of the units below which the specimen may have jumped; with as many found in another place,
+it has."""
 _WHOLE = 0.8
 """Part of the units that must be found for their poses to be those looked for after a loss."""
 _OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])

@@ -1,4 +1,4 @@
-"""What was loaded and generated keeps to the level, on a processor that has more."""
+"""Libraries and generated code keep to the level, on a processor that has more."""
 
 from __future__ import annotations
 
