@@ -17,6 +17,7 @@ PINNED: dict[str, dict[str, float]] = {
     },
     "custom_lattice": {"force": 14.6877, "n_units": 24.0, "n_ligaments": 37.0},
     "custom_loss": {"turn_deg": -15.6055, "steepest": 1.15457},
+    "cut_units": {"n_parts": 9.0, "cut_length": 457.565, "widest": 0.0},
     "energy_balance": {},
     "error_estimate": {"draft": 0.00209083, "default": 0.00149858},
     "gradient_by_stiffness": {"axial": 0.0200955, "shear": -0.0110401, "bending": -0.00905535},
@@ -34,6 +35,7 @@ PINNED: dict[str, dict[str, float]] = {
     "static_compression": {"stiffness": 2.20316, "plateau": 12.4432, "contacts": 0.0},
     "symmetric_design": {"variables": 28.0, "without": 112.0},
     "taylor_test": {"loss": 15.1018, "slope": 1.9974},
+    "track_video": {"rms_px": 0.014, "lost": 0.0},
     "transmission": {"largest": 5.04154, "at_100_hz": 0.508965},
     "void_from_image": {"n_cut": 55.0, "force": 3.53916},
 }
