@@ -31,7 +31,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         for name in (
             *("design", "response", "sweep", "scatter", "verification", "geometric-design"),
             *("geometric-response", "spectrum", "gains", "calibration", "track"),
-            *("samples", "cycles"),
+            *("samples", "cycles", "pictures"),
         )
     },
     "--datasets": _path("NC", "what was measured", nargs="+"),
@@ -40,6 +40,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "--problems": _path("YAML", "the studies", nargs="+"),
     "--figure": _path("YAML", "the studies"),
     "--preset": {"metavar": "NAME", "help": "a preset that all of them have"},
+    "--folder": _path("FOLDER", "where the pictures are"),
     "--packages": _path("FOLDER", "the packages", nargs="+"),
     "--counts": _path("JSON", "of the suite"),
     "--video": _path("FILE", "its video"),

@@ -38,10 +38,29 @@ rule validate_cycles:
         "python -m pipeline validate cycles {input.description} --out {output} --log {log}"
 
 
+rule validate_pictures:
+    input:
+        measured=calibration_inputs.measured_files("escapement", "*.*")
+        + calibration_inputs.measured_files("photographs", "*.png"),
+        description="experiments/validation/pictures.yaml",
+    output:
+        "results/validation/pictures.nc",
+    log:
+        "results/validation/logs/pictures.log",
+    threads: 1
+    params:
+        source=source_hash("pipeline.stages.validate"),
+    message:
+        "Tracking the parts of an escapement, and locating a specimen in a photograph"
+    shell:
+        "python -m pipeline validate pictures {input.description} --out {output} --log {log}"
+
+
 rule validation_page:
     input:
         samples="results/validation/hinges.nc",
         cycles="results/validation/morpher.nc",
+        pictures="results/validation/pictures.nc",
     output:
         "results/validation/prediction.svg",
         page="results/validation/index.html",
@@ -55,4 +74,5 @@ rule validation_page:
         "Drawing the validation on measured specimens"
     shell:
         "python -m reports validation --samples {input.samples} --cycles {input.cycles}"
+        " --pictures {input.pictures} --folder experiments/validation"
         " --out-dir {params.folder} --log {log}"

@@ -304,11 +304,12 @@ labelled SYNTHETIC.""",
     ),
     Stage(
         "validate",
-        "predict a measured test from tests of other samples, and measure load cycles",
+        "predict a measured test from others, measure load cycles, track real pictures",
         extra="validation",
         parts={
             "samples": (option("file", type=Path, metavar="POPULATION.yaml"), _OUT),
             "cycles": (option("file", type=Path, metavar="LOAD_CYCLES.yaml"), _OUT),
+            "pictures": (option("file", type=Path, metavar="PICTURES.yaml"), _OUT),
         },
     ),
     Stage(

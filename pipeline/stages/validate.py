@@ -1,11 +1,11 @@
-"""Stage: predicts a measured test from tests of other samples; measures load cycles."""
+"""Stage: predicts a measured test from others; measures load cycles; tracks real pictures."""
 
 import argparse
 import logging
 
 from pipeline import datasets
-from pipeline.calibration import simulation_fault, study_cycles
-from pipeline.calibration.inputs import LoadCycles, Population
+from pipeline.calibration import simulation_fault, study_cycles, study_pictures
+from pipeline.calibration.inputs import KnownPictures, LoadCycles, Population
 from pipeline.calibration.population import validate_population
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
@@ -15,13 +15,13 @@ LOG = logging.getLogger(__name__)
 
 
 def work(args: argparse.Namespace) -> None:
-    """Makes the part that a command line names: samples or cycles.
+    """Makes the part that a command line names: samples, cycles or pictures.
 
     Raises:
         UserError: a fault of the files.
     """
     try:
-        {"samples": _samples, "cycles": _cycles}[args.command](args)
+        {"samples": _samples, "cycles": _cycles, "pictures": _pictures}[args.command](args)
     except SimulationError as error:
         raise simulation_fault(error, args.file) from error
 
@@ -49,3 +49,15 @@ def _cycles(args: argparse.Namespace) -> None:
     )
     datasets.write(made, args.out, "load_cycles", origin)
     LOG.info("%d snaps in %d records", made.sizes["snap"], made.sizes["record"])
+
+
+def _pictures(args: argparse.Namespace) -> None:
+    asked, folder = load_section(args.file, KnownPictures), args.file.parent
+    made = study_pictures(asked, folder)
+    parents = {"rigid_parts": folder / asked.rigid_parts.folder}
+    parents["specimen"] = folder / asked.specimen.file
+    origin = provenance.of_recording(
+        asked.model_dump_json(), parents, synthetic=False, role="pictures"
+    )
+    datasets.write(made, args.out, "pictures", origin)
+    LOG.info("%d of %d units found", int(made["seen"].sum()), made.sizes["unit"])

@@ -48,9 +48,9 @@ def description(wildcards: Wildcards) -> str:
     return found.get("description") or f"{found['folder']}/calibration.yaml"
 
 
-def measured_files(folder: str, root: Path = WORK) -> list[str]:
+def measured_files(folder: str, pattern: str = "*.csv", root: Path = WORK) -> list[str]:
     """Lists the measured files of a validation, all of which its YAML may name."""
-    found = (root / "experiments/validation" / folder).glob("*.csv")
+    found = (root / "experiments/validation" / folder).glob(pattern)
     return sorted(path.relative_to(root).as_posix() for path in found)
 
 

@@ -14,6 +14,9 @@ from .description import MeasurementSet as MeasurementSet
 from .description import RecordOptions as RecordOptions
 from .description import TestKind as TestKind
 from .description import TrackedMotion as TrackedMotion
+from .known_pictures import KnownPictures as KnownPictures
+from .known_pictures import RigidParts as RigidParts
+from .known_pictures import SpecimenPicture as SpecimenPicture
 from .load_cycles import CycleRecord as CycleRecord
 from .load_cycles import LoadCycles as LoadCycles
 from .population import MeasurementSource as MeasurementSource

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from pipeline.calibration.inputs import Calibration, LoadCycles, Population
+from pipeline.calibration.inputs import Calibration, KnownPictures, LoadCycles, Population
 from pipeline.problem import Problem
 from pipeline.problem.fields import Section, units
 from pipeline.problem.reading import JointFigure
@@ -55,6 +55,7 @@ def pages() -> dict[str, str]:
         File("A calibration", Calibration, "`experiments/calibration/NAME.yaml`"),
         File("Several samples", Population, "For `python -m pipeline validate samples`"),
         File("Load cycles", LoadCycles, "For `python -m pipeline validate cycles`"),
+        File("Pictures", KnownPictures, "For `python -m pipeline validate pictures`"),
     )
     return {
         "keys.md": _page("problem files", studies),

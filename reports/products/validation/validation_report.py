@@ -1,4 +1,4 @@
-"""Makes the page of the measured specimens beside their prediction."""
+"""Makes the page of the measured specimens beside their prediction, and of real pictures."""
 
 import argparse
 import json
@@ -9,9 +9,11 @@ import numpy as np
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration.inputs import UNITS
+from pipeline.calibration.inputs import UNITS, KnownPictures
+from pipeline.problem.fields import SIM_UNITS
 from reports.base import Table
 from reports.page import PageTable, Report, publish
+from reports.products.validation import pictures
 from reports.products.validation.figures import draw_cycles, draw_samples
 from sim.core import Floats
 
@@ -20,10 +22,22 @@ def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for."""
     samples = datasets.read(args.samples, "population")
     cycles = datasets.read(args.cycles, "load_cycles")
+    seen = datasets.read(args.pictures, "pictures")
     asked = json.loads(samples.attrs["population"])
-    figures = {"prediction": lambda: draw_samples(samples), "cycles": lambda: draw_cycles(cycles)}
+    shown = KnownPictures.model_validate_json(seen.attrs["pictures"], context=SIM_UNITS)
+    figures = {
+        "prediction": lambda: draw_samples(samples),
+        "cycles": lambda: draw_cycles(cycles),
+        "pictures": lambda: pictures.draw_pictures(seen, shown, args.folder),
+    }
     values = {
-        "sources": [asked["source"], json.loads(cycles.attrs["load_cycles"])["source"]],
+        "sources": [
+            asked["source"],
+            json.loads(cycles.attrs["load_cycles"])["source"],
+            shown.rigid_parts.source.model_dump(),
+            shown.specimen.source.model_dump(),
+        ],
+        "pictures": pictures.picture_facts(seen, shown),
         "headline": list(_headline(samples)),
         "shown": {
             "errors": _errors(samples),
@@ -32,6 +46,7 @@ def report(args: argparse.Namespace) -> None:
             "left_out": _left_out(samples),
             "mechanisms": _mechanisms(samples),
             "cycles": _cycles(cycles),
+            "pictures": pictures.error_table(seen),
         },
         "priors": asked["priors"],
         "signed": _signed(samples),
@@ -46,9 +61,13 @@ def report(args: argparse.Namespace) -> None:
         "diverging": f"{100 * samples['diverging'].item():.2g} %",
         "provenance": sorted(
             (f"{name}: {key}", str(value))
-            for name, made in (("hinges.nc", samples), ("morpher.nc", cycles))
+            for name, made in (
+                ("hinges.nc", samples),
+                ("morpher.nc", cycles),
+                ("pictures.nc", seen),
+            )
             for key, value in made.attrs.items()
-            if key not in ("population", "load_cycles")
+            if key not in ("population", "load_cycles", "pictures")
         ),
     }
     publish(Report(figures, "validation.html.j2", values, _tables(samples)), args.out_dir)

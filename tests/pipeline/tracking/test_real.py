@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 
+from pipeline.runtime import ROOT
 from pipeline.tracking.detect import detect_lattice, orientation_text
 from pipeline.tracking.detect.blobs import find_blobs
 from pipeline.tracking.frames import import_video
@@ -12,6 +15,7 @@ from pipeline.tracking.geometry import SpecimenOutlines, outlines_of_design
 from tests.pipeline.tracking.conftest import CLIPS
 from tests.pipeline.virtual_lab.conftest import GRID
 
+AT_REST = ROOT / "experiments/validation/photographs/specimen_at_rest.png"
 PIXEL = 0.365 / 0.66  # mm: of the camera, and of the picture made smaller
 
 
@@ -19,13 +23,13 @@ def specimen() -> SpecimenOutlines:
     return outlines_of_design(import_video.design({**GRID, "grid": [24, 16]}))
 
 
-def picture(name: str) -> np.ndarray:
-    return np.asarray(cv2.imread(str(CLIPS / f"real/{name}.png"), cv2.IMREAD_GRAYSCALE))
+def picture(path: Path) -> np.ndarray:
+    return np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE))
 
 
 def test_units_at_rest_are_found_in_their_places() -> None:
     shown = specimen()
-    found = detect_lattice(picture("focusing_ref_frame_overlay_contours"), shown, None)[0]
+    found = detect_lattice(picture(AT_REST), shown, None)[0]
     assert not found.bright
     assert len(found.unit) > 0.8 * shown.count
     assert orientation_text(found.camera) == "upright"
@@ -37,7 +41,7 @@ def test_units_at_rest_are_found_in_their_places() -> None:
 
 def test_most_units_in_motion_stand_apart() -> None:
     shown = specimen()
-    image = picture("focusing_dynamic_frame_overlay_quads")
+    image = picture(CLIPS / "real/focusing_dynamic_frame_overlay_quads.png")
     found = find_blobs(image, shown, 1 / PIXEL, bright=False)
     assert 0.6 * shown.count < len(found) < 1.1 * shown.count
     assert (np.ptp(found, axis=0) > 0.7 * np.ptp(shown.centre, axis=0) / PIXEL).all()

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration import study_cycles
-from pipeline.calibration.inputs import LoadCycles, Population
+from pipeline.calibration import study_cycles, study_pictures
+from pipeline.calibration.inputs import KnownPictures, LoadCycles, Population
 from pipeline.datasets import provenance
 from pipeline.datasets.tables import TABLES
 from pipeline.problem.reading import load_section
@@ -52,23 +52,27 @@ def made_up() -> xr.Dataset:
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     folder = tmp_path_factory.mktemp("validation")
-    for name, kind, made, asked in (
+    cycles = load_section(FOLDER / "morpher.yaml", LoadCycles)
+    pictures = load_section(FOLDER / "pictures.yaml", KnownPictures)
+    for name, kind, data, asked in (
         ("hinges", "population", made_up(), load_section(FOLDER / "hinges.yaml", Population)),
-        ("morpher", "load_cycles", None, load_section(FOLDER / "morpher.yaml", LoadCycles)),
+        ("morpher", "load_cycles", study_cycles(cycles, FOLDER), cycles),
+        ("pictures", "pictures", study_pictures(pictures, FOLDER), pictures),
     ):
-        data = study_cycles(asked, FOLDER) if isinstance(asked, LoadCycles) else made
         told = asked.model_dump_json()
         origin = provenance.of_recording(told, {}, synthetic=False, role=kind)
         datasets.write(data, folder / f"{name}.nc", kind, origin)  # type: ignore[arg-type]
     words = ["--samples", folder / "hinges.nc", "--cycles", folder / "morpher.nc"]
+    words += ["--pictures", folder / "pictures.nc", "--folder", FOLDER]
     assert main(["validation", *map(str, words), "--out-dir", str(folder), "--quiet"]) == 0
     assert (Path(folder) / "prediction.pdf").stat().st_size > 10_000
     return (folder / "index.html").read_text()
 
 
 def test_it_says_who_measured_and_nothing_is_called_synthetic(page: str) -> None:
-    assert page.count("Bertoldi Group, Harvard University") == 2
-    assert page.count("Licence: MIT") == 2
+    assert page.count("Measured at: Bertoldi Group, Harvard University") == 3
+    assert page.count("Licence: MIT") == 3
+    assert page.count("Licence: BSD 3-clause") == 1
     assert "SYNTHETIC" not in page
 
 
@@ -81,3 +85,8 @@ def test_it_tells_the_errors_and_their_sign(page: str) -> None:
 def test_it_tells_snaps_and_loops(page: str) -> None:
     assert "4.41 mm, -6.68 N to 5.05 mm, -0.07 N" in page
     assert page.count("not simulated") == 2
+
+
+def test_it_tells_what_was_found_in_real_pictures(page: str) -> None:
+    assert "340 of 384 units are found" in page
+    assert "all parts agree with it within that" in page

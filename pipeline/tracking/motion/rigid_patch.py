@@ -1,0 +1,92 @@
+"""Finds how one rigid patch moved between two pictures, from features to a fit of its pixels.
+
+Lengths are pixels, x to the right and y down, pixel centres at whole numbers; rotations are from x
+to y.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from shapely import Polygon
+
+from pipeline.tracking.fit import PoseFitter, TemplateGrid, learn_templates
+from pipeline.tracking.geometry import Camera, SpecimenOutlines
+from sim.core import Floats, Image
+
+_MARGIN = 24
+"""Distance from the outline within which features count, px."""
+_REACH = 2.0
+"""Between two features that agree, px."""
+_LEAST, _RATIO = 4, 0.8
+_BLUR = 0.3
+"""Standard deviation of the camera's, px."""
+_FADED = 1.75
+"""Distance within an outline at which half of a template's weight has faded in, px."""
+
+
+class Patch(NamedTuple):
+    """Holds a patch of the first of two pictures.
+
+    Attributes:
+        before, after: the pictures (rows, columns).
+        outline: (n, 2) in the first one.
+        centre: (2,) whose motion is told.
+    """
+
+    before: Image
+    after: Image
+    outline: Floats
+    centre: Floats
+
+
+def find_motion(patch: Patch) -> Floats | None:
+    """Finds shift and rotation (3,) roughly by features; None if too few agree.
+
+    Features and their matches are SIFT's (Lowe, IJCV 60 (2004) 91), the motion RANSAC's.
+    """
+    sift, mask = cv2.SIFT.create(), np.zeros_like(patch.before)
+    cv2.fillPoly(mask, [np.round(patch.outline).astype(np.int32)], 255)
+    about = cv2.dilate(mask, np.ones((_MARGIN, _MARGIN), np.uint8))
+    first, described = sift.detectAndCompute(patch.before, about)
+    second, others = sift.detectAndCompute(patch.after, None)
+    if min(len(first), len(second)) < _LEAST:
+        return None
+    pairs = cv2.BFMatcher(cv2.NORM_L2).knnMatch(described, others, k=2)
+    good = [near for near, next_ in pairs if near.distance < _RATIO * next_.distance]
+    if len(good) < _LEAST:
+        return None
+    start = np.array([first[one.queryIdx].pt for one in good])
+    end = np.array([second[one.trainIdx].pt for one in good])
+    matrix, kept = cv2.estimateAffinePartial2D(start, end, ransacReprojThreshold=_REACH)
+    if np.ndim(matrix) < 2 or kept.sum() < _LEAST:
+        return None
+    turn = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
+    return np.append(matrix[:, :2] @ patch.centre + matrix[:, 2] - patch.centre, turn)
+
+
+def fit_motion(patch: Patch, start: Floats, *, whole: bool = False) -> Floats:
+    """Fits shift and rotation (3,) by correlation of the pixels; NaN where that fails.
+
+    Args:
+        patch: the patch.
+        start: (3,) near the motion.
+        whole: whether pixels at the very edge count as well, for patches that lie within a part;
+            by default their weight fades out, since what is beyond may move otherwise.
+    """
+    rows, columns = patch.before.shape
+    camera = Camera(np.eye(3), np.array([columns, rows]) / 2 - 0.5, np.zeros(2), (columns, rows))
+    outline = patch.outline - patch.centre
+    if whole:
+        wider = Polygon(outline).buffer(_FADED, join_style="mitre")
+        outline = np.array(wider.exterior.coords)[:-1]
+    if cv2.contourArea(outline.astype(np.float32), oriented=True) < 0:
+        outline = outline[::-1]
+    nothing = np.empty((0, 2), int), np.zeros((1, len(outline)), bool)
+    shown = SpecimenOutlines(np.array([0]), patch.centre[None], outline[None], *nothing)
+    grid = TemplateGrid(shown, 1.0, 4.0)
+    fitter = PoseFitter(camera, learn_templates(patch.before, camera, grid, _BLUR, 1.0, "speckle"))
+    _, photometry = fitter.start(1.0)
+    return np.asarray(fitter.fit(patch.after, start[None], photometry).pose[0])

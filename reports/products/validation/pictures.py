@@ -1,0 +1,135 @@
+"""Draws parts tracked in real pictures beside another program's result, and a located specimen."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from pipeline.calibration import read_picture
+from pipeline.calibration.inputs import KnownPictures
+from pipeline.tracking.geometry import rotation_matrix
+from reports.base import style
+from reports.page import PageTable
+from sim.core import Floats, Image
+
+_SHOWN = 3
+"""Of the later pictures, evenly spaced."""
+_ABOUT = 60
+"""Distance of a picture's rim from the outlines, px."""
+_UNITS = ("px", "px", "mrad")
+_LIMITS = (0.03, 0.03, 2.0)
+"""What the other program's result is good for."""
+
+
+def tracking_error(made: xr.Dataset) -> Floats:
+    """Computes root mean squares (n_parts, 3) of this tracker less the other: px, px, rad."""
+    apart = (made["measured"] - made["reference"]).transpose("part", "frame", "dof").values
+    return np.asarray(np.sqrt((apart**2).mean(axis=1)))
+
+
+def error_table(made: xr.Dataset) -> PageTable:
+    """Tabulates the differences of both trackers by part."""
+    rows = []
+    for part, error in zip(made["part"].values.tolist(), tracking_error(made), strict=True):
+        motion = made["reference"].sel(part=part)
+        shift = np.hypot(*motion.sel(dof=["ux", "uy"]).values.T).max()
+        turn = np.abs(motion.sel(dof="theta").values).max()
+        told = f"{shift:.1f} px, {turn:.2f} rad"
+        rows.append([part, told, f"{error[0]:.3f}", f"{error[1]:.3f}", f"{error[2]:.4f}"])
+    heads = ["Part", "Moves by up to", "rms to the right, px", "rms down, px", "rms rotation, rad"]
+    return PageTable(heads, rows)
+
+
+def draw_pictures(made: xr.Dataset, asked: KnownPictures, folder: Path) -> Figure:
+    """Draws the parts in some pictures, the differences of the trackers, and the specimen."""
+    drawn = style.page(208.0)
+    parts = asked.rigid_parts
+    outlines = [np.array(each.outline) for each in parts.parts]
+    at = np.linspace(0, made.sizes["frame"] - 1, _SHOWN).round().astype(int)
+    pictures = sorted((folder / parts.folder).glob("*.png"))
+    frames = made["frame"].values
+    shown = [path for frame in frames[at] for path in pictures if path.stem.endswith(str(frame))]
+    reach = _reach(np.concatenate(outlines))
+    style.letter(drawn, 2.0, 1.0, "a", "At rest, and tracked")
+    for k, path in enumerate([folder / parts.folder / parts.first, *shown]):
+        axes = style.place(drawn, 2.0 + 43.5 * k, 8.0, 42.0, 60.0)
+        _show(axes, read_picture(path), reach)
+        for part, outline in enumerate(outlines):
+            motion = np.zeros(3) if k == 0 else made["measured"].values[part, at[k - 1]]
+            corners = _moved(outline, np.array(parts.parts[part].centre), motion)
+            for colour, width in (("white", 2.0), (style.INTACT if k == 0 else style.CLOAKED, 1.0)):
+                axes.fill(*corners.T, facecolor="none", edgecolor=colour, linewidth=width)
+    for k, name in enumerate(("to the right", "down", "rotation")):
+        style.letter(drawn, 2.0 + 60.0 * k, 74.0, "bcd"[k], f"Less DICe’s, {name}")
+        _difference(style.place(drawn, 11.0 + 60.0 * k, 81.0, 44.0, 26.0), made, k)
+    style.letter(drawn, 2.0, 118.0, "e", "A specimen at rest, located")
+    axes = style.place(drawn, 28.0, 124.0, 124.0, 80.0)
+    _specimen(axes, made, read_picture(folder / asked.specimen.file))
+    return drawn
+
+
+def _reach(points: Floats) -> tuple[Floats, Floats]:
+    return points.min(axis=0) - _ABOUT, points.max(axis=0) + _ABOUT
+
+
+def _moved(outline: Floats, centre: Floats, motion: Floats) -> Floats:
+    return centre + motion[:2] + (outline - centre) @ rotation_matrix(motion[2]).T
+
+
+def _show(axes: Axes, image: Image, reach: tuple[Floats, Floats]) -> None:
+    """Shows part of a picture, itself cut, so that no more of it is in the file."""
+    (left, top), (right, bottom) = (np.clip(end, 0, image.shape[::-1]).astype(int) for end in reach)
+    cut = image[top:bottom, left:right]
+    extent = (left - 0.5, right - 0.5, bottom - 0.5, top - 0.5)
+    axes.imshow(cut, cmap="gray", vmin=0, vmax=np.percentile(cut, 99.5), extent=extent)
+    axes.set_axis_off()
+
+
+def _difference(axes: Axes, made: xr.Dataset, dof: int) -> None:
+    scale = 1000.0 if dof == 2 else 1.0
+    apart = scale * (made["measured"] - made["reference"]).values[:, :, dof]
+    for part, name in enumerate(made["part"].values.tolist()):
+        colour = (style.CLOAKED, "#1d7f78", style.INTACT)[part % 3]
+        axes.plot(made["frame"], apart[part], "o-", color=colour, markersize=2.5, label=name)
+    limit = _LIMITS[dof]
+    for end in (-limit, limit):
+        axes.axhline(end, color=style.GREY, linestyle=":", linewidth=0.8)
+    axes.set(xlabel="number of the picture", ylabel=_UNITS[dof], ylim=(-3 * limit, 3 * limit))
+    if dof == 0:
+        axes.legend(loc="upper left", ncols=2)
+
+
+def _specimen(axes: Axes, made: xr.Dataset, image: Image) -> None:
+    rows, columns = image.shape
+    axes.imshow(image, cmap="gray", vmin=0, vmax=255)
+    found = made["seen"].values > 0
+    for chosen, colour in ((found, style.CLOAKED), (~found, style.ALTERED)):
+        outlines = PolyCollection(
+            list(made["outline"].values[chosen]),
+            facecolors="none",
+            edgecolors=colour,
+            linewidths=0.8,
+        )
+        axes.add_collection(outlines)
+    axes.plot(*made["blob"].values[found].T, ".", color=style.CLOAKED, markersize=1.5)
+    axes.set(xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
+    axes.set_axis_off()
+
+
+def picture_facts(made: xr.Dataset, asked: KnownPictures) -> Mapping[str, Any]:
+    """Tells how many units were found, and how large a pixel is."""
+    stated, found = asked.specimen.pixel_size, made["pixel_size"].item()
+    return {
+        "units": made.sizes["unit"],
+        "found": int(made["seen"].sum()),
+        "pixel_size": f"{found:.3f} mm",
+        "stated": f"{stated:.3f} mm",
+        "pictures": made.sizes["frame"],
+        "missed_parts": int(np.isnan(made["measured"].values).any(axis=2).sum()),
+        "within": bool((tracking_error(made) <= (0.03, 0.03, 0.002)).all()),
+    }
