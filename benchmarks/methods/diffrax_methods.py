@@ -62,7 +62,9 @@ def _slowly(posed: LoadCase, duration: Any) -> DiffraxProblem:  # noqa: ANN401  
     scene, (ramp,) = posed.scene, posed.scene.loads.motions
     assert isinstance(ramp, LinearRamp)
     constants = scene.structure.material
-    shear, bending = (float(np.mean(each)) for each in (constants.shear, constants.bending))
+    shear, bending = (
+        float(np.mean(each)) for each in (constants.shear_stiffness, constants.bending_stiffness)
+    )
     damping = damping_of_ratio(RATIO, DENSITY, scene.lattice.spacing, shear, bending)
     heavy = constants._replace(
         density=DENSITY, damping_translation=damping[0], damping_rotation=damping[1]

@@ -59,7 +59,7 @@ def force(scene: Scene) -> Force:
         return strain + jnp.sum(
             contact_energy(
                 angles,
-                ContactLaw(contact, angle.barrier, angle.cutoff),
+                ContactLaw(contact, angle.barrier_angle, angle.cutoff_angle),
             )
         )
 

@@ -47,7 +47,7 @@ class EquilibriumProblem:
         self.work["forces"] += 1
         void = self.topology.smallest_void_angle(self.values.void, state.reshape(-1, 3))
         law = self.topology.contact
-        if isinstance(law, VoidAngleContact) and void <= law.barrier:
+        if isinstance(law, VoidAngleContact) and void <= law.barrier_angle:
             raise ArithmeticError("units passed through each other")
         gradient(state, self._system, self._turn, self._force)
         return self._force[self.free], float(np.abs(self._force[self.held]).max())

@@ -66,7 +66,9 @@ def fig4() -> Scene:
 def fig4_as_dynamics() -> Scene:
     """Poses it as the authors solve it: density 1 tonne/mm^2, damped, pushed over 3500 s."""
     scene, duration = fig4(), 3500.0
-    shear, bending = (float(np.mean(each)) for each in (HEAVY.shear, HEAVY.bending))
+    shear, bending = (
+        float(np.mean(each)) for each in (HEAVY.shear_stiffness, HEAVY.bending_stiffness)
+    )
     damping = damping_of_ratio(DAMPING_RATIO, 1.0, SPACING, shear, bending)
     material = HEAVY._replace(damping_translation=damping[0], damping_rotation=damping[1])
     drive = TanhRamp(-15.0, duration)

@@ -134,7 +134,7 @@ def admissible(case: StressScene, states: Floats) -> list[Check]:
     turned = np.array([case.values.void + _turns(case, state) for state in motion])
     seen = np.array([np.asarray(_void_angles(case, state)) for state in motion])
     off = np.abs((turned - seen + np.pi) % (2 * np.pi) - np.pi).max()
-    beyond = np.rad2deg(law.barrier - turned.min())
+    beyond = np.rad2deg(law.barrier_angle - turned.min())
     return [
         *checks,
         Check("void angles off their geometry, rad", float(off), 1e-8),

@@ -119,7 +119,7 @@ def _angles(of: ReferenceStructure) -> Floats:
     """Returns barrier and cutoff, out of reach where contact acts on the distance of units."""
     law = of.contact
     if isinstance(law, VoidAngleContact):
-        return np.array([law.barrier, law.cutoff])
+        return np.array([law.barrier_angle, law.cutoff_angle])
     return np.array([-1e3, -1e3 + 1.0])
 
 

@@ -18,7 +18,7 @@ best = sim.minimise(scene, limits, options=sim.SqpOptions(evaluations=6))
 
 before, _ = sim.evaluate(scene)  # N mm
 after = best.loss
-shear_stiffness = PLA.shear
+shear_stiffness = PLA.shear_stiffness
 
 figure, axes = panels(2)
 for panel, design, loss in zip(axes, (None, best.x), (before, after)):

@@ -51,13 +51,13 @@ def _true_scene(made: TrackedSpecimen, true: Constants) -> Scene:
         made.stiffer * axial,
         made.stiffer * shear,
         made.stiffer * bending,
-        scene.structure.material.contact,
+        scene.structure.material.contact_stiffness,
         translation,
         rotation,
     )
     law = scene.structure.contact
     if true.cutoff is not None and isinstance(law, VoidAngleContact):
-        law = replace(law, cutoff=true.cutoff)
+        law = replace(law, cutoff_angle=true.cutoff)
     return scene.updated(material=constants, contact=law, reference=None, accuracy="tight")
 
 

@@ -100,7 +100,9 @@ def estimate_constants(fit: Fit, known: Uncertainty) -> Estimate:
 
 def _values(here: Constants, names: Sequence[ConstantName], logs: Floats) -> Floats:
     """Constants in working units, each from its own logarithm."""
-    barrier = np.array([here.law.barrier if name == "contact_cutoff" else 0.0 for name in names])
+    barrier = np.array(
+        [here.law.barrier_angle if name == "contact_cutoff" else 0.0 for name in names]
+    )
     return barrier + np.exp(np.minimum(logs, 300.0))
 
 

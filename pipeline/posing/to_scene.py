@@ -169,10 +169,10 @@ def material_of(problem: Problem) -> Material:
     translation, rotation = problem.damping_coefficients
     return Material(
         density=given.density,
-        axial=given.axial_stiffness,
-        shear=given.shear_stiffness,
-        bending=given.bending_stiffness,
-        contact=problem.contact.stiffness,
+        axial_stiffness=given.axial_stiffness,
+        shear_stiffness=given.shear_stiffness,
+        bending_stiffness=given.bending_stiffness,
+        contact_stiffness=problem.contact.stiffness,
         damping_translation=translation,
         damping_rotation=rotation,
     )
@@ -186,9 +186,9 @@ def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Materi
     touched = np.isin(lattice.ligament_units, stiff).any(axis=1)
     factor = np.where(touched, problem.inclusion.stiffness_factor, 1.0)
     return material._replace(
-        axial=material.axial * factor,
-        shear=material.shear * factor,
-        bending=material.bending * factor,
+        axial_stiffness=material.axial_stiffness * factor,
+        shear_stiffness=material.shear_stiffness * factor,
+        bending_stiffness=material.bending_stiffness * factor,
     )
 
 

@@ -87,7 +87,7 @@ class Topology:
         contact = np.full((n, 3), -np.inf)
         contact[:, 0] = values.contact
         if isinstance(law, VoidAngleContact):
-            contact[:, 1:] = law.barrier, law.cutoff
+            contact[:, 1:] = law.barrier_angle, law.cutoff_angle
         else:
             touching = np.zeros(0, dtype=np.int64)
         return NetworkArrays(

@@ -75,7 +75,7 @@ def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> O
         energies[:, 1],
         reaction.reshape(motion.shape),
         voids.min(axis=1, initial=np.pi),
-        (voids < law.cutoff).sum(axis=1) if isinstance(law, VoidAngleContact) else near,
+        (voids < law.cutoff_angle).sum(axis=1) if isinstance(law, VoidAngleContact) else near,
         *(np.asarray(part) for part in strain),
     )
 

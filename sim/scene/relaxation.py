@@ -86,7 +86,7 @@ def _counted_from(scene: Scene, moved: Floats, values: Parameters[Floats], motio
     before, after = (np.linalg.norm(v, axis=1) for v in (values.vector, lattice.ligament_vectors))
     material = scene.structure.material._replace(
         # k_s (l0 gamma)^2 knows the length as designed
-        shear=values.law[:, 1] * (before / after) ** 2,
+        shear_stiffness=values.law[:, 1] * (before / after) ** 2,
         elongation=stretch,
         end_angles=np.stack([shear + bend / 2, shear - bend / 2], axis=1),
     )

@@ -97,13 +97,13 @@ def check_start(
     law = topology.contact
     if isinstance(law, VoidAngleContact) and len(values.void) > 0:
         angles = topology.smallest_void_angles(values.void, start.reshape(-1, 3))
-        if angles.min() <= law.barrier:
+        if angles.min() <= law.barrier_angle:
             one, other = topology.ligament_units[angles.argmin()]
             raise SimulationError(
                 f"the void between units {one} and {other} is closed to"
                 f" {np.rad2deg(angles.min()):.4g} deg at {_moment(start)}, its barrier is at"
-                f" {np.rad2deg(law.barrier):.4g} deg; ask for a larger smallest void angle, or"
-                " try a drive that starts from rest",
+                f" {np.rad2deg(law.barrier_angle):.4g} deg; ask for a larger smallest void angle,"
+                " or try a drive that starts from rest",
                 unit=int(one),
             )
 
@@ -146,7 +146,7 @@ def inadmissible(
     law = topology.contact
     if isinstance(law, VoidAngleContact):
         motion = states.reshape(len(states), -1, 3)
-        return topology.smallest_void_angle(values.void, motion) <= law.barrier
+        return topology.smallest_void_angle(values.void, motion) <= law.barrier_angle
     contacts = contact_arrays(law, values, topology.n_units)
     found = np.array([find(state, contacts) < 0 for state in states], dtype=bool)
     raise_new_pairs(contacts)

@@ -11,12 +11,12 @@ class VoidAngleContact:
     """Lets joined units touch where the void between them closes (the authors' law).
 
     Attributes:
-        barrier: void angle at which the energy is infinite, rad.
-        cutoff: void angle above which there is no contact, rad.
+        barrier_angle: void angle at which the energy is infinite, rad.
+        cutoff_angle: void angle above which there is no contact, rad.
     """
 
-    barrier: float
-    cutoff: float
+    barrier_angle: float
+    cutoff_angle: float
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ class Material(NamedTuple):
 
     Attributes:
         density: areal density, tonne/mm^2.
-        axial, shear: ligament stiffness, N/mm.
-        bending: ligament stiffness, N mm/rad.
-        contact: contact stiffness, N mm/rad^2.
+        axial_stiffness, shear_stiffness: of ligaments, N/mm.
+        bending_stiffness: of ligaments, N mm/rad.
+        contact_stiffness: of voids, N mm/rad^2.
         damping_translation: to ground, per unit, tonne/s.
         damping_rotation: to ground, per unit, tonne mm^2/s.
         end_angles: (n_ligaments, 2) at which a ligament, straight by itself, is held at its first
@@ -25,10 +25,10 @@ class Material(NamedTuple):
     """
 
     density: float | Numbers
-    axial: float | Numbers
-    shear: float | Numbers
-    bending: float | Numbers
-    contact: float | Numbers
+    axial_stiffness: float | Numbers
+    shear_stiffness: float | Numbers
+    bending_stiffness: float | Numbers
+    contact_stiffness: float | Numbers
     damping_translation: float | Numbers
     damping_rotation: float | Numbers
     end_angles: float | Numbers = 0.0

@@ -51,7 +51,7 @@ ConcreteParameters: TypeAlias = Parameters[Floats]
 def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters[Array]:
     """Derives the parameters of a network; differentiable in shape and material."""
     n = lattice.n_ligaments
-    stiffness = (material.axial, material.shear, material.bending)
+    stiffness = (material.axial_stiffness, material.shear_stiffness, material.bending_stiffness)
     angles = jnp.broadcast_to(jnp.asarray(material.end_angles, dtype=float), (n, 2))
     # a strip straight by itself, clamped at angles a and b to its chord, is so if the units turn by
     # -a and -b about its ends: gamma = -(mean rotation) = (a + b) / 2, kappa = a - b
@@ -68,7 +68,7 @@ def parameters(lattice: Lattice, shape: Shape, material: Material) -> Parameters
         void=shape.void_angle,
         law=jnp.stack([jnp.broadcast_to(k, (n,)) for k in stiffness], axis=1),
         natural=jnp.stack([jnp.broadcast_to(strain, (n,)) for strain in natural], axis=1),
-        contact=jnp.broadcast_to(jnp.asarray(material.contact, dtype=float), (n,)),
+        contact=jnp.broadcast_to(jnp.asarray(material.contact_stiffness, dtype=float), (n,)),
         corner=shape.arm,
         centroid=shape.centroid,
         mass=jnp.stack([mass, mass, inertia], axis=1),

@@ -80,7 +80,7 @@ def perturbed(
         vertices: (n_vertices, 2) of its design, mm.
         material: its constants.
         sizes: of the deviations.
-        contact: law of contact; void angles stay above its cutoff, so that the copy is at rest
+        contact: law of contact; void angles stay above its cutoff angle: the copy is at rest
             without a load.
         seed: equal seeds give equal copies, whatever else is drawn.
     """
@@ -104,9 +104,9 @@ def _varied(
     damping = _factors((lattice.n_units,), sizes.units, random)
     damping = damping * _factors((1,), sizes.damping, random)
     return material._replace(
-        axial=material.axial * own[0] * common[0],
-        shear=material.shear * own[1] * common[1],
-        bending=material.bending * own[2] * common[2],
+        axial_stiffness=material.axial_stiffness * own[0] * common[0],
+        shear_stiffness=material.shear_stiffness * own[1] * common[1],
+        bending_stiffness=material.bending_stiffness * own[2] * common[2],
         damping_translation=material.damping_translation * damping,
         damping_rotation=material.damping_rotation * damping,
     )
@@ -184,7 +184,7 @@ def clashing_units(lattice: Lattice, vertices: Floats, contact: ContactModel) ->
     """Finds the units (n,) that overlap or touch (by a void angle) another, or cross themselves."""
     pairs = overlapping_pairs(lattice, vertices)
     crossed = np.flatnonzero(~shapely.is_valid(polygons(lattice, vertices)))
-    cutoff = contact.cutoff if isinstance(contact, VoidAngleContact) else -np.inf
+    cutoff = contact.cutoff_angle if isinstance(contact, VoidAngleContact) else -np.inf
     closed = (np.asarray(void_angles(lattice, vertices)) <= cutoff).any(axis=1)
     return np.unique(
         np.concatenate([pairs.ravel(), crossed, lattice.ligament_units[closed].ravel()])

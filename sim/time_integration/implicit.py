@@ -79,7 +79,7 @@ class ImplicitSolver:
         law = self.topology.contact
         if not isinstance(law, VoidAngleContact):
             return np.zeros(0, dtype=np.int64)
-        return np.flatnonzero(values.void.min(axis=1) < law.cutoff + self.turn_allowance)
+        return np.flatnonzero(values.void.min(axis=1) < law.cutoff_angle + self.turn_allowance)
 
     def coupling(self, pairs: Ints) -> ImplicitSolver:
         """See ``Solver``."""
@@ -116,7 +116,7 @@ class ImplicitSolver:
         stages = record.u[:-1].reshape(-1, self.topology.n_units, 3)
         closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
         closest[record.touching] = np.inf
-        return bool(closest.min() < law.cutoff)
+        return bool(closest.min() < law.cutoff_angle)
 
     def _march(
         self, values: ConcreteParameters, drive: PrescribedMotion, touching: Ints, times: Floats

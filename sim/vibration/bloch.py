@@ -114,7 +114,7 @@ def cell_of(
     mine = np.flatnonzero(number[begin] >= 0)
     if not isinstance(contact, VoidAngleContact):
         raise ValueError("the unit cell of a lattice knows contact on void angles alone")
-    limits = np.tile([contact.barrier, contact.cutoff], (len(mine), 1))
+    limits = np.tile([contact.barrier_angle, contact.cutoff_angle], (len(mine), 1))
     return UnitCell(
         unit=unit,
         joined=number[of_home[lattice.ligament_units[mine]]],

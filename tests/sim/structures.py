@@ -178,10 +178,10 @@ class Rig:
             one = numbers.density * MATERIAL.density
             material = Material(
                 one,
-                MATERIAL.axial * axial,
-                MATERIAL.shear * shear,
-                MATERIAL.bending * bending,
-                MATERIAL.contact * numbers.contact,
+                MATERIAL.axial_stiffness * axial,
+                MATERIAL.shear_stiffness * shear,
+                MATERIAL.bending_stiffness * bending,
+                MATERIAL.contact_stiffness * numbers.contact,
                 MATERIAL.damping_translation * numbers.damping[:, 0],
                 MATERIAL.damping_rotation * numbers.damping[:, 1],
             )

@@ -166,10 +166,10 @@ def _scene(draws: RandomDesigns, seed: int, static: bool) -> StressScene:
     clamped, driven = np.split(random.permutation(lattice.n_units)[:4], 2)
     factor = 10.0 ** random.uniform(-0.5, 0.5, (5, lattice.n_ligaments))
     material = MATERIAL._replace(
-        axial=MATERIAL.axial * factor[0],
-        shear=MATERIAL.shear * factor[1],
-        bending=MATERIAL.bending * factor[2],
-        contact=MATERIAL.contact * factor[3],
+        axial_stiffness=MATERIAL.axial_stiffness * factor[0],
+        shear_stiffness=MATERIAL.shear_stiffness * factor[1],
+        bending_stiffness=MATERIAL.bending_stiffness * factor[2],
+        contact_stiffness=MATERIAL.contact_stiffness * factor[3],
         density=MATERIAL.density * factor[4, : lattice.n_units],
         damping_rotation=MATERIAL.damping_rotation * 10.0 ** random.uniform(-2, 2),
     )

@@ -63,12 +63,16 @@ def constants(small: bool) -> Iterator[StressCase]:
 
 def _stiffness(ratio: float) -> Iterator[tuple[str, dict[str, Any]]]:
     for name in ("axial", "shear", "bending", "contact"):
-        yield f"{name} stiffness times", {name: getattr(MATERIAL, name) * ratio}
+        key = f"{name}_stiffness"
+        yield f"{name} stiffness times", {key: getattr(MATERIAL, key) * ratio}
     units = squares(SIDE).ligament_units
     factor = np.where(np.isin(units, [6, 7, 11]).any(axis=1), ratio, 1.0)
     yield (
         "an inclusion of stiffness",
-        {name: getattr(MATERIAL, name) * factor for name in ("axial", "shear", "bending")},
+        {
+            f"{name}_stiffness": getattr(MATERIAL, f"{name}_stiffness") * factor
+            for name in ("axial", "shear", "bending")
+        },
     )
 
 

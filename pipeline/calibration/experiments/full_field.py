@@ -154,7 +154,7 @@ def pose_track(
         driven.lattice,
         vertices,
         begin.material.density,
-        float(np.max(driven.structure.material.contact)),
+        float(np.max(driven.structure.material.contact_stiffness)),
         _solver(
             driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
         ),
@@ -177,7 +177,9 @@ def _refuse_other_contact(scene: Scene, begin: Constants, path: Path) -> None:
     if begin.cutoff is None:
         return
     law = scene.structure.contact
-    if isinstance(law, DistanceContact) or not np.isclose(law.barrier, begin.law.barrier):
+    if isinstance(law, DistanceContact) or not np.isclose(
+        law.barrier_angle, begin.law.barrier_angle
+    ):
         what = "the contact of the problem is not that of which the cut-off is wanted"
         remedy = "give the calibration's contact the law and the barrier_angle of the problem"
         raise UserError(what, file=path, key="contact", remedy=remedy)

@@ -79,7 +79,9 @@ def pose_specimen(asked: TrackedMotion, folder: Path) -> TrackedSpecimen:
         scene = scene.objective.reference
     ones = np.ones(scene.lattice.n_ligaments)
     return TrackedSpecimen(
-        problem, scene, ones * scene.structure.material.axial / problem.material.axial_stiffness
+        problem,
+        scene,
+        ones * scene.structure.material.axial_stiffness / problem.material.axial_stiffness,
     )
 
 

@@ -77,7 +77,7 @@ class Constants(NamedTuple):
     def value(self, name: ConstantName) -> float:
         """Computes the value of one constant in its working unit."""
         if name == "contact_cutoff":
-            return self.law.cutoff
+            return self.law.cutoff_angle
         if name == "damping_ratio":
             return self.ratio
         if name.startswith("damping_"):
@@ -97,7 +97,7 @@ class Constants(NamedTuple):
 
     def logs(self, names: Sequence[ConstantName]) -> Floats:
         """Natural logarithms of constants; of the cut-off, that of its distance to the barrier."""
-        barrier = self.law.barrier
+        barrier = self.law.barrier_angle
         return np.log(
             [self.value(name) - (barrier if name == "contact_cutoff" else 0.0) for name in names]
         )
@@ -109,7 +109,7 @@ class Constants(NamedTuple):
         cutoff = self.cutoff
         for name, value in zip(names, np.exp(logs).tolist(), strict=True):
             if name == "contact_cutoff":
-                cutoff = self.law.barrier + value
+                cutoff = self.law.barrier_angle + value
             elif name.startswith("damping_"):
                 damping[name.removeprefix("damping_")] = value
             else:
@@ -122,4 +122,4 @@ class Constants(NamedTuple):
 def start_constants(asked: Calibration) -> Constants:
     """Returns the constants that a calibration starts from."""
     made = Constants(asked.material, asked.contact, asked.spacing)
-    return made._replace(cutoff=made.law.cutoff) if "contact_cutoff" in asked.fit else made
+    return made._replace(cutoff=made.law.cutoff_angle) if "contact_cutoff" in asked.fit else made

@@ -47,7 +47,7 @@ from tests.sim.structures import dense, hand_made
 EXACT = 1e-12
 """Relative to the largest entry."""
 REACH = 0.8
-LAW = DistanceLaw(float(MATERIAL.contact) * (REACH / 2.0) ** 2, REACH)
+LAW = DistanceLaw(float(MATERIAL.contact_stiffness) * (REACH / 2.0) ** 2, REACH)
 
 
 def ring(rng: np.random.Generator, n: int, size: float) -> Floats:
@@ -119,7 +119,9 @@ class Differentiable(NamedTuple):
 def numbers(case: Crowd) -> Differentiable:
     contacts = case.contacts
     scale = contacts.per_stiffness
-    return Differentiable(contacts.corner, contacts.centroid, np.array([MATERIAL.contact]), scale)
+    return Differentiable(
+        contacts.corner, contacts.centroid, np.array([MATERIAL.contact_stiffness]), scale
+    )
 
 
 PAIRS = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])

@@ -67,10 +67,10 @@ SUPPORTS = {
     "region": {"region": np.array([6, 7])},
 }
 CONSTANTS = {
-    "axial": uneven("axial", of_unit=False),
-    "shear": uneven("shear", of_unit=False),
-    "bending": uneven("bending", of_unit=False),
-    "contact": uneven("contact", of_unit=False),
+    "axial": uneven("axial_stiffness", of_unit=False),
+    "shear": uneven("shear_stiffness", of_unit=False),
+    "bending": uneven("bending_stiffness", of_unit=False),
+    "contact": uneven("contact_stiffness", of_unit=False),
     "mass": uneven("density", of_unit=True),
     "damping": uneven("damping_translation", of_unit=True),
     "damping of rotations": uneven("damping_rotation", of_unit=True),
