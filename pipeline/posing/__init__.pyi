@@ -27,8 +27,10 @@ from .structure_variables import network_variables as network_variables
 from .structure_variables import read_design as read_design
 from .structure_variables import spread as spread
 from .structure_variables import unit_coordinates as unit_coordinates
+from .to_scene import altered_lattice_of as altered_lattice_of
 from .to_scene import lattice_of as lattice_of
 from .to_scene import limits_of as limits_of
+from .to_scene import material_of as material_of
 from .to_scene import scene_of as scene_of
 from .verification import AS_RUN as AS_RUN
 from .verification import CheckResult as CheckResult

@@ -49,7 +49,7 @@ def _cell(asked: Problem) -> UnitCell:
         what = "a lattice from a file has no unit cell to send waves through"
         raise UserError(what, key="spectrum", remedy="leave the section out")
     lattice = lattice_of(asked)
-    made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked))
+    made = parameters(lattice, shape(lattice, lattice.vertices), material_of(asked, lattice))
     period = (4, 2) if isinstance(asked.lattice, Kagome) else (2, 2)
     values = Parameters(*(np.asarray(part) for part in made))
     try:

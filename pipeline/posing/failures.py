@@ -14,16 +14,24 @@ if TYPE_CHECKING:
     from sim.constraints import ConstraintVector
     from sim.core import SimulationError
     from sim.optimise import InfeasibleStartError
-    from sim.scene import Scene, SnapMargin
+    from sim.scene import PathConstraints, Scene
 
 _KEYS = {"convexity": "constraints.convex", "snap": "objective.snap"}
 
 
 def infeasible_start(
-    error: InfeasibleStartError, constraints: ConstraintVector | SnapMargin, source: Path
+    error: InfeasibleStartError, constraints: ConstraintVector | PathConstraints, source: Path
 ) -> UserError:
     """Explains that no design near the start can be made."""
     kind, where = constraints.named(error.constraint)
+    if kind == "shim_strain":
+        return UserError(
+            f"the shims are strained to {1.0 + error.violation:.3g} times the limit at the start"
+            f" (load {where}), and by no design nearby less than that limit",
+            file=source,
+            key="constraints.shim_strain",
+            remedy="take a thinner foil (fabrication.shims.thickness), a smaller load, or raise it",
+        )
     return UserError(
         f"infeasible at the start, by {error.violation:.3g} mm (angles times 5 mm) at {where},"
         " and no design nearby can be made",

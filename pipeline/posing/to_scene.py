@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +13,10 @@ from pipeline import problem as problems
 from pipeline.problem import Problem
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import (
+    STIFFNESSES,
     HarmonicDrive,
     LinearRampDrive,
+    ListedNetwork,
     PulseDrive,
     RampHarmonicDrive,
     Selector,
@@ -23,6 +25,7 @@ from pipeline.problem.sections import (
 )
 from pipeline.runtime import UserError
 from sim.constraints import Limits
+from sim.core import Numbers
 from sim.energy import activation_distance
 from sim.scene import (
     Clamp,
@@ -36,7 +39,14 @@ from sim.scene import (
     check_scene,
 )
 from sim.solvers import PrescribedMotion, loads
-from sim.structure import ContactModel, DistanceContact, Lattice, Material, VoidAngleContact
+from sim.structure import (
+    ContactModel,
+    DistanceContact,
+    FoilLimit,
+    Lattice,
+    Material,
+    VoidAngleContact,
+)
 
 TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "theta": units.ANGLE}
 """Columns of a measured drive, whose heading names each with its unit in brackets."""
@@ -67,7 +77,7 @@ def scene_of(
     """
     made = motions_of(problem, folder) if motions is None else motions
     intact, altered = lattice_of(problem), altered_lattice_of(problem)
-    material, law = material_of(problem), contact_laws(problem)[problem.contact.law]
+    material, law = material_of(problem, intact), contact_laws(problem)[problem.contact.law]
     weights = None if motions is not None else np.asarray(problem.drive.case_weights)
     interest, samples = _units(problems.interest_units(problem)), problem.horizon.samples
     scene = Scene(
@@ -81,12 +91,13 @@ def scene_of(
             snap_margin=problem.objective.snap_margin
             if problem.objective.snap == "avoid"
             else None,
+            foil=foil_limit(problem),
         ),
         numerics=Numerics(problem.solver.accuracy, problem.solver.integrator),
     )
     posed = replace(
         scene,
-        structure=Structure(altered, _stiffened(problem, altered, material), law),
+        structure=Structure(altered, _stiffened(problem, altered), law),
         loads=_loads(problem, altered, made, weights),
         objective=replace(
             scene.objective,
@@ -163,23 +174,46 @@ def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
     return _selected(problem, problem.drive.units, lattice)
 
 
-def material_of(problem: Problem) -> Material:
-    """Reads the constants of a problem's specimen, without those of an inclusion."""
-    given = problem.material
+def foil_limit(problem: Problem) -> FoilLimit | None:
+    """Reads how far the foil of the ligaments may be strained."""
+    most = problem.constraints.shim_strain
+    return None if most is None else FoilLimit(problem.shim_thickness, most)
+
+
+def material_of(problem: Problem, lattice: Lattice) -> Material:
+    """Reads the constants of a specimen of some lattice, without those of an inclusion."""
     translation, rotation = problem.damping_coefficients
+    axial, shear, bending = _stiffnesses(problem, lattice)
     return Material(
-        density=given.density,
-        axial_stiffness=given.axial_stiffness,
-        shear_stiffness=given.shear_stiffness,
-        bending_stiffness=given.bending_stiffness,
+        density=problem.material.density,
+        axial_stiffness=axial,
+        shear_stiffness=shear,
+        bending_stiffness=bending,
         contact_stiffness=problem.contact.stiffness,
         damping_translation=translation,
         damping_rotation=rotation,
     )
 
 
-def _stiffened(problem: Problem, lattice: Lattice, material: Material) -> Material:
+def _stiffnesses(problem: Problem, lattice: Lattice) -> Sequence[float | Numbers]:
+    """Reads axial, shear and bending stiffness, arrays where a file lists the ligaments."""
+    given = problem.material
+    alike: Sequence[float | Numbers] = [getattr(given, name) for name in STIFFNESSES]
+    if not isinstance(problem.lattice, ListedNetwork):
+        return alike
+    if given.foil is not None:
+        alike = given.foil.foil.stiffness(np.linalg.norm(lattice.ligament_vectors, axis=1))
+    if (listed := problem.lattice.stiffnesses) is None:
+        return alike
+    intact = lattice_of(problem)
+    kept = np.isin(intact.id[intact.ligament_units], lattice.id).all(axis=1)
+    own = np.array(listed, dtype=float)[kept].T  # NaN where the file gives none
+    return [np.where(np.isnan(each), other, each) for each, other in zip(own, alike, strict=True)]
+
+
+def _stiffened(problem: Problem, lattice: Lattice) -> Material:
     """Stiffens the ligaments of an inclusion's units as much as asked for."""
+    material = material_of(problem, lattice)
     if problem.inclusion is None:
         return material
     stiff = lattice.positions(_units(problems.inclusion_units(problem)))

@@ -25,6 +25,8 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
     for name in () if stage == REPORT else STAGES[stage].unused or ():
         data.pop(name, None)
+    if "shim_strain" in data.get("constraints", ()) and "fabrication" not in data:
+        data["fabrication"] = {"shims": {"thickness": problem.shim_thickness}}
     if stage not in ("redesign", REPORT):
         data["optimiser"].pop("geometric")
     if method is not None:

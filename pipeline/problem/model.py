@@ -18,6 +18,7 @@ from pipeline.problem.fields import (
     exactly_one,
 )
 from pipeline.problem.sections import (
+    STIFFNESSES,
     CloakRegion,
     Contact,
     Designs,
@@ -93,7 +94,7 @@ class Horizon(Section):
 
 
 class ConstraintLimits(Section):
-    """Lower bounds at every unit that can be made, none where a key is left out.
+    """Bounds of designs that can be made and last, none where a key is left out.
 
     Attributes:
         edge_length: of the units.
@@ -101,6 +102,8 @@ class ConstraintLimits(Section):
         void_angle: between the edges of neighbouring units, at either side of a ligament.
         gap: between two units.
         convex: whether units must be convex.
+        shim_strain: largest strain of the shims' foil, under all loads of the loss; of
+            `material.foil`, or of foil as thick as `fabrication.shims.thickness`.
     """
 
     edge_length: Length | None = None
@@ -108,6 +111,7 @@ class ConstraintLimits(Section):
     void_angle: Angle | None = None
     gap: Gap | None = None
     convex: bool = True
+    shim_strain: Positive | None = None
 
 
 class SolverOptions(Section):
@@ -186,6 +190,36 @@ class Problem(Section):
     spectrum: Spectrum | None = None
     report: ReportOptions = ReportOptions()
     fabrication: Fabrication = Fabrication()
+
+    @model_validator(mode="after")
+    def _made_of_foil(self) -> Self:
+        """Fills in what follows from the foil of the ligaments, where it is given."""
+        if (strip := self.material.foil) is None:
+            return self
+        stiffness = strip.foil.stiffness(self.lattice.ligament_length)
+        constants = dict(zip(STIFFNESSES, stiffness, strict=True))
+        made = self.fabrication
+        shims = made.shims.model_copy(
+            update={
+                name: getattr(strip, name)
+                for name in ("thickness", "young_modulus")
+                if name not in made.shims.model_fields_set
+            }
+        )
+        update: dict[str, object] = {"shims": shims}
+        if "thickness" not in made.model_fields_set:
+            update["thickness"] = strip.width
+        return self.model_copy(
+            update={
+                "material": self.material.model_copy(update=constants),
+                "fabrication": made.model_copy(update=update),
+            }
+        )
+
+    @property
+    def shim_thickness(self) -> float:
+        """Returns the thickness of the ligaments' foil in mm."""
+        return self.fabrication.shims.thickness
 
     @property
     def static(self) -> bool:

@@ -1,6 +1,7 @@
 from . import checks as checks
 from . import claims as claims
 from . import fact_records as fact_records
+from . import foil as foil
 from . import measures as measures
 from . import recording_facts as recording_facts
 from .checks import JUMPED as JUMPED

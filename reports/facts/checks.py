@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem
-from reports.facts import measures
-from reports.facts.fact_records import Fact, number, percent, share, within
+from reports.facts import foil, measures
+from reports.facts.fact_records import Fact, number, percent, within
 from reports.study import RigidUnits
 
 JUMPED = 2
@@ -78,6 +78,7 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
 
 def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
     """Yields voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
+    yield from foil.strain_facts(problem, response)
     for name in (str(name) for name in response["structure"].values):
         part = response.sel(structure=name)
         void, gap = float(np.degrees(part["min_void_angle"].min())), float(part["min_gap"].min())
@@ -93,7 +94,6 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
         label = f"Pairs in contact, {name}"
         yield number(f"contact_pairs_{name}", label, int(touching.max()), note=when)
         yield from stability_facts(name, part)
-        yield _shim_strain(problem, name, part)
 
 
 def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
@@ -111,36 +111,6 @@ def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
         label = f"Smallest eigenvalue of the tangent, {name}"
         note = "of all loads, at fixed supports and drive; the path ends where it vanishes"
         yield number(f"eigenvalue_{key}", label, least, "N/mm", digits=3, note=note)
-
-
-def _shim_strain(problem: Problem, name: str, part: xr.Dataset) -> Fact:
-    """Finds largest strain of a shim as a foil bent by the turn of its ends, against the limit."""
-    length, limit = problem.lattice.ligament_length, problem.report.shim_strain_limit
-    slenderness = problem.fabrication.shims.thickness / length
-    stretch, shear, bend = (
-        float(part[each].max()) for each in ("max_stretch", "max_shear", "max_bend")
-    )
-    strain = beam_strain(stretch, 0.0, bend, slenderness)
-    whole = beam_strain(stretch, shear, bend, slenderness)
-    note = (
-        f"foil of {problem.fabrication.shims.thickness:g} mm, stretched by {percent(stretch)} and "
-        f"bent by {np.degrees(bend):.3g}°; up to {percent(whole)} where the shear of "
-        f"{np.degrees(shear):.3g}° bends it too; limit {percent(limit)}: "
-        + ("kept" if strain <= limit else "exceeded")
-    )
-    return share(f"shim_strain_{name}", f"Largest shim strain, {name}", strain, note=note)
-
-
-def beam_strain(stretch: float, shear: float, bend: float, slenderness: float) -> float:
-    """Finds the largest strain of a beam (Euler-Bernoulli) whose ends turn against one another.
-
-    Args:
-        stretch: of its axis.
-        shear: angle of the chord from the mean of both ends, rad; it bends the ends by 6 times.
-        bend: relative turn of the ends, rad.
-        slenderness: thickness over length.
-    """
-    return stretch + slenderness / 2 * (bend + 6 * shear)
 
 
 def variant_facts(verification: xr.Dataset | None) -> Iterator[Fact]:

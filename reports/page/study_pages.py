@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from pipeline.problem import Problem, canonical_json, content_hash
 from reports.base import Table
-from reports.facts import ABSENT, Fact, claims, worded
+from reports.facts import ABSENT, Fact, claims, foil, worded
 from reports.page import citation
 from reports.page.report import Report
 from reports.panels import Animation, payload, quantisation_error
@@ -162,7 +162,8 @@ def _skipped(study: StudyResults) -> list[str]:
 def _warnings(study: StudyResults) -> list[str]:
     """Lists what may not be meant in the structures that were simulated, each once."""
     plans = json.loads(study.response.attrs["plan"]).values()
-    return list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
+    said = list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
+    return [*said, *foil.strain_warning(study.problem, study.response)]
 
 
 def sources(study: StudyResults, label: str = "") -> Iterator[Source]:

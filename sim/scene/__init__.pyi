@@ -9,6 +9,8 @@ from .objectives import combined as combined
 from .objectives import estimated_errors as estimated_errors
 from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
+from .path_constraints import PathConstraints as PathConstraints
+from .path_constraints import foil_strains as foil_strains
 from .plan import Plan as Plan
 from .plan import concrete_parameters as concrete_parameters
 from .plan import make_plan as make_plan
@@ -33,7 +35,6 @@ from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
-from .snap_margin import SnapMargin as SnapMargin
 from .soundness import SceneError as SceneError
 from .soundness import check_scene as check_scene
 from .time_solver import NEWTON as NEWTON

@@ -20,10 +20,10 @@ from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
+from sim.scene.path_constraints import PathConstraints
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking, parameters_of_design
-from sim.scene.snap_margin import SnapMargin
 from sim.scene.time_solver import RULES, twice_as_fine
 from sim.scene.warm_starts import Paths
 from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
@@ -277,10 +277,11 @@ def _check_steps(evaluate: Evaluator, result: Result) -> None:
             )
 
 
-def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector | SnapMargin:
+def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector | PathConstraints:
     """Lists what a design must keep to."""
-    geometry = ConstraintVector(scene.space, limits)
-    return geometry if scene.objective.snap_margin is None else SnapMargin(scene, plan, geometry)
+    geometry, asked = ConstraintVector(scene.space, limits), scene.objective
+    at_rest = asked.snap_margin is None and asked.foil is None
+    return geometry if at_rest else PathConstraints(scene, plan, geometry)
 
 
 def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:

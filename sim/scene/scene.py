@@ -14,6 +14,7 @@ from sim.solvers import Harmonic, LinearRamp, MotionLaw, PrescribedMotion, Pulse
 from sim.structure import (
     ContactModel,
     DesignSpace,
+    FoilLimit,
     Lattice,
     Material,
     Symmetry,
@@ -136,6 +137,8 @@ class Objective:
             a large one a smooth maximum.
         snap_margin: smallest eigenvalue of the tangent that a design must keep at all loads of a
             static scene, over that of the initial structure at rest; None where it may snap.
+        foil: largest strain of the foil of its ligaments that a design must keep to at all times;
+            None where it may be strained.
     """
 
     region: Ints = field(default_factory=_none)
@@ -145,6 +148,7 @@ class Objective:
     reference: Scene | None = None
     sharpness: float = 1.0
     snap_margin: float | None = None
+    foil: FoilLimit | None = None
 
 
 @dataclass(frozen=True)

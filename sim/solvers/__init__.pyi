@@ -1,6 +1,7 @@
 from . import base as base
 from . import loads as loads
 from .base import PrescribedMotion as PrescribedMotion
+from .base import Records as Records
 from .base import Solver as Solver
 from .base import adjoint_cases as adjoint_cases
 from .base import concrete as concrete

@@ -1,4 +1,6 @@
 from .images import read_outlines as read_outlines
+from .network_files import NetworkContent as NetworkContent
+from .network_files import Stiffness as Stiffness
 from .network_files import read_network as read_network
 from .plane import FormulaError as FormulaError
 from .plane import Outline as Outline

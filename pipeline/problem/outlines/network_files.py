@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from pipeline.problem.fields import csv_columns
 from pipeline.runtime import UserError
@@ -19,12 +19,21 @@ Point = tuple[float, float]
 COLUMNS = ("kind", "number", "x (mm)", "y (mm)")
 """Header of a CSV; its kinds are `unit` (one row a corner) and `ligament` (one row an end)."""
 
+STIFFNESS_COLUMNS = ("axial (N/mm)", "shear (N/mm)", "bending (N mm/rad)")
+"""Further columns, some or all: of ligaments, in either of their rows or in both."""
+
+Stiffness: TypeAlias = tuple[float | None, float | None, float | None]
+
 
 class NetworkContent(NamedTuple):
-    """Holds corners of the units and end points of the ligaments, mm."""
+    """Holds corners of the units and end points of the ligaments, mm, and what a file says more.
+
+    Axial, shear (N/mm) and bending stiffness (N mm/rad) of each ligament are None where not given.
+    """
 
     polygons: tuple[tuple[Point, ...], ...]
     ligaments: tuple[tuple[Point, Point], ...]
+    stiffnesses: tuple[Stiffness, ...] | None = None
 
 
 def read_network(path: Path) -> NetworkContent:
@@ -51,27 +60,48 @@ def read_network(path: Path) -> NetworkContent:
 def _of_csv(path: Path) -> NetworkContent:
     units: dict[float, list[Point]] = {}
     ligaments: dict[float, list[Point]] = {}
+    stiffnesses: dict[float, dict[str, float]] = {}
     groups = {"unit": units, "ligament": ligaments}
-    remedy = f"write the header {','.join(COLUMNS)} and a row for every corner and every end"
     cells = csv_columns.read_cells(path)
-    if not cells.rows or tuple(cells.rows[0]) != COLUMNS:
+    header = tuple(cells.rows[0]) if cells.rows else ()
+    more = header[len(COLUMNS) :]
+    remedy = (
+        f"write the header {','.join(COLUMNS)}, with {', '.join(STIFFNESS_COLUMNS)} if wanted,"
+        " and a row for every corner and every end"
+    )
+    known = len(set(more)) == len(more) and set(more) <= set(STIFFNESS_COLUMNS)
+    if header[: len(COLUMNS)] != COLUMNS or not known:
         raise UserError("the columns of the list are wrong", remedy=remedy)
     for line, row in enumerate(cells.rows[1:], start=2):
         number, x, y = (cells.number(row, column) for column in (1, 2, 3))
-        group = groups.get(row[0]) if len(row) == len(COLUMNS) else None
+        group = groups.get(row[0]) if len(row) == len(header) else None
         if group is None or number is None or x is None or y is None:
             what = f"row {line} of the list is no corner and no end"
             raise UserError(what, remedy=remedy)
         group.setdefault(number, []).append((x, y))
+        for column, name in enumerate(more, start=len(COLUMNS)):
+            if not row[column].strip():
+                continue
+            value, own = cells.number(row, column), stiffnesses.setdefault(number, {})
+            if group is units or value is None or not 0.0 < value == own.setdefault(name, value):
+                what = f"row {line} of the list has no {name} that its ligament can have"
+                raise UserError(what, remedy="give ligaments one number above zero, units none")
     for ligament, ends in ligaments.items():
         if len(ends) != 2:
             raise UserError(
                 f"ligament {ligament:g} has {len(ends)} ends", remedy="give it two rows"
             )
+    listed = sorted(ligaments.items())
     return NetworkContent(
         tuple(tuple(corners) for _, corners in sorted(units.items())),
-        tuple((first, second) for _, (first, second) in sorted(ligaments.items())),
+        tuple((first, second) for _, (first, second) in listed),
+        tuple(_stiffness(stiffnesses.get(number, {})) for number, _ in listed) if more else None,
     )
+
+
+def _stiffness(given: dict[str, float]) -> Stiffness:
+    axial, shear, bending = (given.get(name) for name in STIFFNESS_COLUMNS)
+    return axial, shear, bending
 
 
 def _of_netcdf(path: Path) -> NetworkContent:

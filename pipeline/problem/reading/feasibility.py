@@ -74,6 +74,22 @@ def _contact_distance(problem: Problem) -> Findings:
         )
 
 
+def _foil(problem: Problem) -> Findings:
+    """Compares the foil of the model with the foil that is cut."""
+    strip, made = problem.material.foil, problem.fabrication
+    if strip is None:
+        return
+    for name, cut, model in (
+        ("shims.thickness", made.shims.thickness, strip.thickness),
+        ("shims.young_modulus", made.shims.young_modulus, strip.young_modulus),
+        ("thickness", made.thickness, strip.width),
+    ):
+        if not math.isclose(cut, model):
+            what = f"it is {cut:g} here, and {model:g} by material.foil"
+            keys = ("fabrication", *name.split("."))
+            yield ProblemFault(what, keys, "leave it out: material.foil says it")
+
+
 def _smallest_void(lattice: Quads) -> float:
     return 90.0 - 2.0 * abs(math.degrees(lattice.bias_angle))
 
@@ -270,6 +286,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _lattice,
     _contact,
     _contact_distance,
+    _foil,
     _units_exist,
     _drive_is_free,
     _horizon,

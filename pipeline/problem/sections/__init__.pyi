@@ -20,6 +20,7 @@ from .lattices import Kagome as Kagome
 from .lattices import Lattice as Lattice
 from .lattices import ListedNetwork as ListedNetwork
 from .lattices import Quads as Quads
+from .material import STIFFNESSES as STIFFNESSES
 from .material import Contact as Contact
 from .material import MaterialConstants as MaterialConstants
 from .objective import Load as Load

@@ -15,7 +15,7 @@ from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInf
 from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
-from pipeline.problem.outlines import read_network
+from pipeline.problem.outlines import NetworkContent, Stiffness, read_network
 from pipeline.runtime import UserError
 from sim.structure import kagome, listed, quads
 
@@ -197,19 +197,20 @@ class ListedNetwork(_WithNetwork):
     spacing: Length
     polygons: SkipJsonSchema[tuple[tuple[Point, ...], ...] | None] = None
     ligaments: SkipJsonSchema[tuple[tuple[Point, Point], ...] | None] = None
+    stiffnesses: SkipJsonSchema[tuple[Stiffness, ...] | None] = None
 
     @model_validator(mode="after")
     def _with_content(self, info: ValidationInfo) -> Self:
         if info.context == SIM_UNITS:
             return self
-        for name in ("polygons", "ligaments"):
+        for name in NetworkContent._fields:
             if getattr(self, name) is not None:
                 raise fault("unknown key", "leave it out: they are read from the file", name)
 
         folder = (info.context or {}).get(FOLDER, ".")
         try:
-            polygons, ligaments = read_network(Path(folder) / self.file)
-            made = self.model_copy(update={"polygons": polygons, "ligaments": ligaments})
+            content = read_network(Path(folder) / self.file)
+            made = self.model_copy(update=content._asdict())
             made.network()
         except UserError as error:
             raise fault(error.what, str(error.remedy), "file") from error

@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from pipeline.problem.fields import (
+    SIM_UNITS,
     Angle,
     BendingStiffness,
     ContactStiffness,
     Damping,
     Density,
     Length,
+    Modulus,
     Ratio,
     RotaryDamping,
     Section,
     Stiffness,
     fault,
 )
-from sim.structure import damping_of_ratio
+from sim.structure import Foil, damping_of_ratio
 
 
 class DampingLaw(Section):
@@ -43,22 +45,56 @@ class DampingLaw(Section):
         return self
 
 
+class FoilStrip(Section):
+    """Foil that the ligaments are strips of, held by rigid ends.
+
+    Attributes:
+        young_modulus: along the strips.
+        thickness: of the foil.
+        width: of the strips, across the plane: the height of the units.
+    """
+
+    young_modulus: Modulus
+    thickness: Length
+    width: Length
+
+    @property
+    def foil(self) -> Foil:
+        """Returns the foil as sim/ knows it."""
+        return Foil(self.young_modulus, self.thickness, self.width)
+
+
+STIFFNESSES = ("axial_stiffness", "shear_stiffness", "bending_stiffness")
+
+
 class MaterialConstants(Section):
     """Units and ligaments.
 
     Attributes:
         density: mass of the units over their area, in the plane.
-        axial_stiffness: force over elongation of a ligament.
+        axial_stiffness: force over elongation of a ligament; all three, or `foil`.
         shear_stiffness: force over lateral displacement of its ends.
         bending_stiffness: torque over relative rotation of its ends.
+        foil: what ligaments are made of, in place of the three stiffnesses.
         damping: of the units.
     """
 
     density: Density
-    axial_stiffness: Stiffness
-    shear_stiffness: Stiffness
-    bending_stiffness: BendingStiffness
+    axial_stiffness: Stiffness = Field(default_factory=float)
+    shear_stiffness: Stiffness = Field(default_factory=float)
+    bending_stiffness: BendingStiffness = Field(default_factory=float)
+    foil: FoilStrip | None = None
     damping: DampingLaw
+
+    @model_validator(mode="after")
+    def _one_form_of_stiffness(self, info: ValidationInfo) -> Self:
+        given = [name for name in STIFFNESSES if name in self.model_fields_set]
+        missing = [name for name in STIFFNESSES if name not in given]
+        if self.foil is None and missing:
+            raise fault("missing key", "add it, or foil in the place of all three", missing[0])
+        if self.foil is not None and given and info.context != SIM_UNITS:
+            raise fault(f"foil and {given[0]} exclude each other", "leave one of them out")
+        return self
 
     def damping_coefficients(self, spacing: float) -> tuple[float, float]:
         """Computes translational (tonne/s) and rotary (tonne mm^2/s) damping of every unit.

@@ -16,6 +16,7 @@ from reports.facts import (
     MEASURED,
     Fact,
     checks,
+    foil,
     grouped,
     measures,
     number,
@@ -61,6 +62,8 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         *recording_facts.recorded_facts(study.recordings),
         *grouped("Robustness", map_facts(sweep)),
         *grouped("Checks", check_facts(design, response)),
+        *grouped("Checks", foil.strain_facts(study.problem, response)),
+        *grouped("Checks", foil.strain_facts(study.problem, response)),
     ]
 
 

@@ -11,6 +11,7 @@ from ezdxf.filemanagement import new
 
 from pipeline import datasets
 from pipeline.__main__ import run_stage
+from pipeline.posing import scene_of
 from pipeline.problem import canonical_json, cloak_units, from_canonical, interest_units, void_units
 from pipeline.problem.outlines.network_files import COLUMNS
 from pipeline.problem.reading import load
@@ -24,6 +25,7 @@ QUADS = (
     "  kind: quads\n  columns: 5\n  rows: 5\n  spacing: 15 mm\n  ligament_length: 2.25 mm\n"
     "  bias_angle: 20 deg\n"
 )
+STIFF = "kind,number,x (mm),y (mm),shear (N/mm)\n"
 
 
 def as_csv(path: Path, lattice: Lattice) -> None:
@@ -167,6 +169,10 @@ def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
         ("x.csv", "kind,number,x (mm),y (mm)\nunit,one,1,2", "row 2 of the list is no corner"),
         ("x.csv", "kind,number,x (mm),y (mm)\nligament,7,1,2", "ligament 7 has 1 ends"),
         ("x.csv", "kind,number,x (mm),y (mm)\n", "the file has no units"),
+        ("x.csv", "kind,number,x (mm),y (mm),k\n", "the columns of the list are wrong"),
+        ("x.csv", f"{STIFF}ligament,7,1,2,-1", "row 2 of the list has no shear (N/mm)"),
+        ("x.csv", f"{STIFF}ligament,7,1,2,1\nligament,7,3,4,2", "row 3 of the list has no shear"),
+        ("x.csv", f"{STIFF}unit,7,1,2,1", "row 2 of the list has no shear (N/mm)"),
         ("x.nc", "no netCDF", "not a readable lattice"),
         ("x.dxf", "no drawing", "not a readable DXF"),
         ("x.txt", "", "not a kind of file that lattices are read from"),
@@ -201,3 +207,27 @@ def test_bad_ligaments_are_told(tmp_path: Path, change: Callable[[str], str], wh
     with pytest.raises(UserError) as caught:
         load(from_file(tmp_path, "x.csv"))
     assert what in caught.value.what
+
+
+def test_ligaments_of_a_list_may_have_stiffnesses_of_their_own(tmp_path: Path) -> None:
+    """Told by either row, kept by those that stay when the void is cut, and by a round trip."""
+    as_csv(tmp_path / "x.csv", SQUARES)
+    header, *rows = (tmp_path / "x.csv").read_text().splitlines()
+    filled = [f"{row},{i}" if row.startswith("lig") and i % 2 else f"{row}," for i, row in
+              enumerate(rows)]  # fmt: skip
+    told = "\n".join([f"{header},bending (N mm/rad)", *filled])
+    (tmp_path / "x.csv").write_text(told)
+    problem = load(from_file(tmp_path, "x.csv"))
+    scene = scene_of(from_canonical(canonical_json(problem)), tmp_path)
+    first = 1 + next(i for i, row in enumerate(rows) if row.startswith("lig")) // 2 * 2
+    own = first + 2 * np.arange(SQUARES.n_ligaments, dtype=float)
+    intact = scene.objective.reference
+    assert intact is not None
+    np.testing.assert_array_equal(intact.structure.material.bending_stiffness, own)
+    np.testing.assert_array_equal(
+        intact.structure.material.shear_stiffness, np.full(len(own), 1.19)
+    )
+    ends = intact.lattice.id[intact.lattice.ligament_units]
+    kept = np.isin(ends, scene.lattice.id).all(axis=1)
+    assert 0 < kept.sum() < len(own)
+    np.testing.assert_array_equal(scene.structure.material.bending_stiffness, own[kept])

@@ -250,3 +250,65 @@ def test_a_stage_depends_on_every_section_that_it_may_read(
 def test_a_page_depends_on_every_section(fig2: Path) -> None:
     problem = load(fig2)
     assert all(changes(problem, "report", key) for key in Problem.model_fields)
+
+
+FOIL = "foil: { young_modulus: 4500 MPa, thickness: 0.125 mm, width: 8 mm }"
+STIFFNESSES = (
+    "axial_stiffness: 120 N/mm\n  shear_stiffness: 1.19 N/mm\n  bending_stiffness: 1.5 N mm/rad"
+)
+
+
+def test_foil_takes_the_place_of_the_stiffnesses(fig2: Path, tmp_path: Path) -> None:
+    """E w t / l, 12 E I / l^3, E I / l; what is cut is of the same foil."""
+    made = edited(fig2, tmp_path, STIFFNESSES, FOIL)
+    inertia = 8.0 * 0.125**3 / 12
+    material = scene_of(made, tmp_path).structure.material
+    found = np.array(
+        [material.axial_stiffness, material.shear_stiffness, material.bending_stiffness],
+        dtype=float,
+    )
+    wanted = [4500 * 8 * 0.125 / 2.25, 12 * 4500 * inertia / 2.25**3, 4500 * inertia / 2.25]
+    np.testing.assert_allclose(found, np.array(wanted))
+    assert (made.fabrication.thickness, made.fabrication.shims.thickness) == (8.0, 0.125)
+    assert from_canonical(canonical_json(made)) == made
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        (STIFFNESSES, f"{FOIL}\n  shear_stiffness: 1 N/mm", "material"),
+        ("bending_stiffness: 1.5 N mm/rad", "", "material.bending_stiffness"),
+    ],
+)
+def test_stiffnesses_have_one_form(
+    fig2: Path, tmp_path: Path, old: str, new: str, key: str
+) -> None:
+    with pytest.raises(UserError) as told:
+        edited(fig2, tmp_path, old, new)
+    assert told.value.key == key
+
+
+def test_foil_of_the_model_is_the_one_that_is_cut(fig2: Path, tmp_path: Path) -> None:
+    other = fig2.read_text(encoding="utf-8").replace(STIFFNESSES, FOIL)
+    cut = "fabrication:\n  shims:\n    thickness: 0.25 mm\n\nconstraints:"
+    (tmp_path / "other.yaml").write_text(other.replace("constraints:", cut, 1))
+    with pytest.raises(UserError, match=r"material\.foil") as told:
+        load(tmp_path / "other.yaml")
+    assert told.value.key == "fabrication.shims.thickness"
+
+
+def test_a_bound_of_the_strain_makes_the_design_depend_on_the_foil(
+    fig2: Path, tmp_path: Path
+) -> None:
+    bound, thin = (
+        "constraints:\n  shim_strain: 0.05",
+        "fabrication: {{ shims: {{ thickness: {} }} }}",
+    )
+    text = "constraints:"
+
+    def hashed(new: str, thickness: str) -> str:
+        made = edited(fig2, tmp_path, text, f"{thin.format(thickness)}\n{new}")
+        return section_hash(made, "design", "sqp")
+
+    assert hashed(text, "0.1 mm") == hashed(text, "0.2 mm")
+    assert hashed(bound, "0.1 mm") != hashed(bound, "0.2 mm")

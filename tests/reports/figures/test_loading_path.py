@@ -121,15 +121,6 @@ def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
     assert "1 failed" in values(shield)["copies_geometry_5"].note
 
 
-def test_strain_of_a_shim_is_that_of_a_bent_beam() -> None:
-    """Ends turned by a and b against the chord: moments 2EI/l (2a + b) and 2EI/l (a + 2b)."""
-    length, thickness = 2.25, 0.25
-    for a, b in ((0.3, 0.1), (-0.2, 0.25), (0.1, 0.1), (-0.2, 0.2)):
-        curvature = 2 / length * max(abs(2 * a + b), abs(a + 2 * b))
-        found = checks.beam_strain(0.01, abs(a + b) / 2, abs(b - a), thickness / length)
-        assert found == pytest.approx(0.01 + curvature * thickness / 2)
-
-
 def test_a_paper_is_quoted_by_the_keys_of_the_facts(
     shield: StudyResults, smile: StudyResults
 ) -> None:

@@ -1,9 +1,10 @@
-"""Designs that keep away from snaps."""
+"""Designs that keep away from snaps, and spare their foil."""
 
 from __future__ import annotations
 
 from functools import cache
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -16,21 +17,24 @@ from sim.scene import (
     Design,
     Loads,
     Objective,
+    PathConstraints,
     Scene,
-    SnapMargin,
     Structure,
+    foil_strains,
     make_plan,
     minimise,
     simulate,
 )
-from sim.solvers import LinearRamp, PrescribedMotion
+from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
+from sim.structure import FoilLimit
 from tests.sim.structures import rotating_squares
 
+FOIL = FoilLimit(thickness=0.25, strain=0.05)
 LIMITS = Limits(edge_length=3.0, block_angle=float(np.deg2rad(30.0)), void_angle=0.0)
 
 
 @cache
-def scene(share: float | None) -> Scene:
+def scene(share: float | None, foil: FoilLimit | None = None) -> Scene:
     """5 x 5 squares pushed together over four loads; the middle is to stay where it is."""
     left = 5 * np.arange(5)
     drive = PrescribedMotion(left + 4, LinearRamp(-9.0, 1.0))
@@ -38,18 +42,23 @@ def scene(share: float | None) -> Scene:
     return Scene(
         Structure(rotating_squares(5), MATERIAL),
         Loads((drive,), (Clamp(left),), static=True),
-        Objective(region=np.array([12]), steps=4, snap_margin=share),
+        Objective(region=np.array([12]), steps=4, snap_margin=share, foil=foil),
         Design(cloak=around),
     )
 
 
-def margins(posed: Scene) -> SnapMargin:
-    return SnapMargin(posed, make_plan(posed), ConstraintVector(posed.space, Limits()))
+def margins(posed: Scene) -> PathConstraints:
+    return PathConstraints(posed, make_plan(posed), ConstraintVector(posed.space, Limits()))
 
 
-def test_the_slope_of_the_margins_is_theirs() -> None:
+@pytest.mark.parametrize(
+    ("share", "foil", "count"), [(0.05, None, 4), (None, FOIL, 1), (0.05, FOIL, 5)]
+)
+def test_the_slope_of_the_margins_is_theirs(
+    share: float | None, foil: FoilLimit | None, count: int
+) -> None:
     """The remainder of a Taylor expansion falls with the second power of the step."""
-    posed = scene(0.05)
+    posed = scene(share, foil)
     constraint, rng = margins(posed), np.random.default_rng(3)
     design = rng.uniform(-0.5, 0.5, posed.space.n_variables)
     way = rng.normal(size=len(design))
@@ -62,7 +71,7 @@ def test_the_slope_of_the_margins_is_theirs() -> None:
 
     left = np.abs([remainder(step) for step in steps])
     slopes = np.diff(np.log(left), axis=0) / np.diff(np.log(steps))[:, None]
-    assert values.shape == (4,)
+    assert values.shape == (count,)
     np.testing.assert_allclose(slopes, 2.0, atol=0.1)
 
 
@@ -94,3 +103,47 @@ def test_a_start_that_snaps_is_refused() -> None:
     snapping = minimise(scene(None), LIMITS, options=SqpOptions(evaluations=25, retreats=0))
     with pytest.raises(SimulationError, match="snaps at"):
         constraint(snapping.x)
+
+
+def largest_strain(posed: Scene, design: Floats) -> float:
+    """Finds the largest strain of the foil without a norm in its place."""
+    response = simulate(posed, design)
+    ends = jnp.asarray(response.displacement[0])[:, posed.lattice.ligament_units]
+    return float(np.abs(foil_strains(ends, response.parameters, FOIL.thickness)).max())
+
+
+def test_the_strain_is_a_little_above_the_largest() -> None:
+    posed = scene(None, FOIL)
+    still = np.zeros(posed.space.n_variables)
+    (value,) = margins(posed)(still)[0]
+    largest = largest_strain(posed, still)
+    assert largest < (1.0 - value) * FOIL.strain < 1.1 * largest
+    assert margins(posed).named(0) == ("shim_strain", "case 0")
+
+
+def test_a_design_strains_its_foil_unless_it_is_to_spare_it() -> None:
+    """The regular squares are strained by 19 %, the best design by a quarter."""
+    strain = {}
+    for bound in (None, 0.15):
+        posed = scene(None, None if bound is None else FOIL._replace(strain=bound))
+        shipped = minimise(posed, LIMITS, options=SqpOptions(evaluations=8, retreats=0))
+        strain[bound] = largest_strain(posed, shipped.x)
+        assert shipped.loss < 0.5 * simulate(posed, np.zeros(posed.space.n_variables)).loss
+    assert strain[0.15] < 0.15
+    assert strain[None] > 0.19
+
+
+def test_a_strain_in_time_has_its_slope() -> None:
+    """The foil of a shaken structure; central differences."""
+    static = scene(None, FOIL)
+    drive = PrescribedMotion(static.loads.driven, Harmonic(2.0, 5.0, np.pi))
+    posed = static.updated(
+        cases=(drive,), static=False, duration=0.1, frequency=5.0, steps=None, samples=21
+    )
+    constraint, rng = margins(posed), np.random.default_rng(5)
+    design = rng.uniform(-0.5, 0.5, posed.space.n_variables)
+    way = rng.normal(size=len(design))
+    way *= 1e-3 / np.linalg.norm(way)
+    slope = constraint(design)[1] @ way
+    change = (constraint(design + way)[0] - constraint(design - way)[0]) / 2
+    np.testing.assert_allclose(slope, change, rtol=1e-4)

@@ -1,0 +1,172 @@
+"""Constrains designs by what they do under load: no snap on the way, no foil strained too far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse as sp
+from jax import Array
+
+from sim.constraints import ConstraintVector
+from sim.core import Floats, SimulationError
+from sim.energy import ligament_strain, system_of
+from sim.quasistatics import StaticRecord, StaticSolver, eigenvalue_and_slopes, lowest_eigenpair
+from sim.scene.plan import Plan
+from sim.scene.scene import Scene
+from sim.scene.simulation import parameters_of_design
+from sim.solvers import Records, adjoint_cases, concrete, solve_cases
+from sim.structure import ConcreteParameters, FoilLimit, Parameters, face_strains
+
+SHARPNESS = 64
+"""p of the p-norm that stands for the largest strain: some 2 % to 10 % above it."""
+
+Slope = tuple[float, ConcreteParameters]
+"""A constraint value, and its derivatives by all parameters."""
+
+
+class PathConstraints:
+    """Evaluates what a design must keep to, at rest and under its loads.
+
+    Below the geometric constraints there is, in mm,
+
+    - with ``scene.objective.snap_margin``, one value for each load of each case: lambda / bound - 1
+      of the smallest eigenvalue lambda of the tangent. The bound is that margin times the
+      eigenvalue of the initial structure at rest.
+    - with ``scene.objective.foil``, one value for each case: 1 - strain / limit of the largest
+      strain of all ligaments and times, a p-norm in the place of the maximum.
+
+    A structure that cannot be made is not loaded: its values are infinite.
+
+    Args:
+        scene: the scene, static if it has a snap margin.
+        plan: of `make_plan`.
+        geometry: the other constraints.
+
+    Raises:
+        ValueError: a scene with a snap margin is not static.
+        SimulationError: the initial structure is not stable at rest.
+    """
+
+    def __init__(self, scene: Scene, plan: Plan, geometry: ConstraintVector) -> None:
+        share, solver = scene.objective.snap_margin, plan.solver
+        self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
+        self._cases = [scene.loads.cases[case] for case in plan.simulated]
+        self._numbers = plan.simulated
+        of_design = parameters_of_design(scene)
+        self._parameters = of_design
+        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
+        self.bound: float | None = None
+        if share is not None:
+            if not isinstance(solver, StaticSolver):
+                raise ValueError("a snap margin belongs to a static scene")
+            initial = concrete(of_design(jnp.zeros(scene.space.n_variables)))
+            system = system_of(scene.topology, initial)
+            self.bound = share * lowest_eigenpair(system, np.zeros(scene.topology.n_dofs))[0]
+        if self._foil is not None:
+            self._strain = _strain_and_slopes(scene, self._foil)
+
+    def __call__(self, design: Floats) -> tuple[Floats, sp.csr_array]:
+        """Evaluates the constraints (n_constraints,) and their Jacobian at a design vector, mm.
+
+        Raises:
+            SimulationError: the structure snaps where it must not, or cannot be simulated.
+        """
+        geometric, jacobian = self.geometry(design)
+        if geometric.min(initial=0.0) < 0.0:
+            count = self._n_snap + self._n_strain
+            unknown, nothing = np.full(count, np.inf), sp.csr_array((count, len(design)))
+            return np.append(geometric, unknown), sp.csr_array(sp.vstack([jacobian, nothing]))
+        values, slopes = self._under_load(design)
+        return np.append(geometric, values), sp.csr_array(sp.vstack([jacobian, slopes]))
+
+    def named(self, number: int) -> tuple[str, str]:
+        """Names the kind of one of the values, and what it is about."""
+        if number < self.geometry.n_constraints:
+            return self.geometry.named(number)
+        after = number - self.geometry.n_constraints
+        if after >= self._n_snap:
+            return "shim_strain", f"case {self._numbers[after - self._n_snap]}"
+        case, load = divmod(after, len(self._solver.output_times))
+        return "snap", f"load {load + 1} of case {self._numbers[case]}"
+
+    @property
+    def _n_snap(self) -> int:
+        return 0 if self.bound is None else len(self._cases) * len(self._solver.output_times)
+
+    @property
+    def _n_strain(self) -> int:
+        return 0 if self._foil is None else len(self._cases)
+
+    def _under_load(self, design: Floats) -> tuple[Floats, Floats]:
+        """Values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
+        values = concrete(self._parameters(jnp.asarray(design)))
+        motion, _, records = solve_cases(self._solver, values, self._cases)
+        every = [*self._snaps(values, records), *self._strains(values, motion, records)]
+        rows = [np.asarray(self._pull_back(design, Parameters(*bar))) for _, bar in every]
+        return np.array([value for value, _ in every]), np.stack(rows)
+
+    def _snaps(self, values: ConcreteParameters, records: Records) -> Iterator[Slope]:
+        if self.bound is None:
+            return
+        for record in records.records:
+            self._refuse_snaps(record)
+            for state in record.states:
+                value, bar = eigenvalue_and_slopes(record.topology, values, state)
+                yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
+
+    def _refuse_snaps(self, record: StaticRecord) -> None:
+        if record.jumped.any():
+            load = np.nanmin(record.snapped) / self._solver.output_times[-1]
+            raise SimulationError(f"the structure snaps at {load:.4g} of the load")
+
+    def _strains(
+        self, values: ConcreteParameters, motion: Floats, records: Records
+    ) -> Iterator[Slope]:
+        if self._foil is None:
+            return
+        for drive, one, record in zip(self._cases, motion, records.records, strict=True):
+            ratio, (bar_motion, direct) = self._strain(one, values)
+            bar = np.asarray(bar_motion)[None]
+            alone = Records(values, [drive], [record])
+            through = adjoint_cases(self._solver, alone, bar, np.zeros_like(bar)).parameters
+            parts = (-one - other for one, other in zip(direct, through, strict=True))
+            yield 1.0 - float(ratio), ConcreteParameters(*map(np.asarray, parts))
+
+
+def _strain_and_slopes(
+    scene: Scene, foil: FoilLimit
+) -> Callable[..., tuple[Array, tuple[Array, Parameters[Array]]]]:
+    """Compiles the largest strain over its limit, and its slopes by motion and parameters."""
+    ends = scene.lattice.ligament_units
+
+    def ratio(motion: Array, values: Parameters[Array]) -> Array:
+        found = foil_strains(motion[:, ends], values, foil.thickness) / foil.strain
+        largest = jax.lax.stop_gradient(jnp.abs(found).max())
+        return largest * ((found / largest) ** SHARPNESS).sum() ** (1.0 / SHARPNESS)
+
+    return jax.jit(jax.value_and_grad(ratio, argnums=(0, 1)))
+
+
+def foil_strains(ends: Array, values: Parameters[Array], thickness: float) -> Array:
+    """Computes the extreme strains (n_times, n_ligaments, 4) of ligaments of foil.
+
+    Args:
+        ends: (n_times, n_ligaments, 2, 3) motion of the units at both ends, mm, mm, rad.
+        values: parameters of the structure; their natural state is that of straight foil.
+        thickness: of the foil, mm.
+    """
+    of_all = jax.vmap(ligament_strain)
+
+    def of_state(state: Array) -> Array:
+        seen = of_all(state[:, 0], state[:, 1], values.arm[:, 0], values.arm[:, 1], values.vector)
+        stretch, shear, bend = (
+            part - rest for part, rest in zip(seen, values.natural.T, strict=True)
+        )
+        length, law = jnp.linalg.norm(values.vector, axis=1), (values.law[:, 1], values.law[:, 2])
+        found = face_strains((stretch, shear, bend), law, length, thickness)
+        return jnp.stack(found, axis=-1)
+
+    return jax.vmap(of_state)(ends)
