@@ -58,6 +58,11 @@ _TO_LAB = np.array(
 )
 
 
+def tinted(colour: str, white: float) -> tuple[float, ...]:
+    """Mixes a colour with a share of white."""
+    return tuple((1.0 - white) * part + white for part in to_rgb(colour))
+
+
 def oklab(rgb: Floats) -> Floats:
     """Returns OKLab coordinates (..., 3) of sRGB colours (..., 3) in [0, 1]."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)

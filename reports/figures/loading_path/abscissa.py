@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.problem import Problem
+from pipeline.problem import Problem, selected_units
 from pipeline.problem.sections import Kagome, Lattice, Quads
 from sim.core import Floats
 
 ORDER = ("intact", "altered", "cloaked")
+_ALONG = np.cos(np.pi / 4)
+"""Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
 SECOND = "Cloaked, no overlap"
 """What a figure calls the design for contact on distance."""
 
@@ -69,6 +71,30 @@ def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
     mean = motion.isel(unit=driven).mean("unit")
     along = np.cos(angle) * mean.sel(dof="ux") + np.sin(angle) * mean.sel(dof="uy")
     return np.asarray(along.values, dtype=float)
+
+
+def load_names(problem: Problem, response: xr.Dataset | xr.DataArray) -> tuple[str, ...]:
+    """Names the load cases by their angles; those of a slow load at a side by their kind."""
+    angles = response["direction"].values.astype(float)
+    if not problem.static or np.isnan(angles).any():
+        return tuple(f"load {number + 1}" for number in range(len(angles)))
+    return tuple(f"{load_kind(problem, angle)} {angle % 360.0:g}°" for angle in angles)
+
+
+def load_kind(problem: Problem, angle: float) -> str:
+    """Tells compression, extension and shear along an angle (deg) by the side that is driven."""
+    outward, axis = driven_side(problem)
+    turned = np.radians(angle)
+    pull = np.sign(outward[axis]) * (np.cos(turned), np.sin(turned))[axis]
+    return "compression" if pull < -_ALONG else "extension" if pull > _ALONG else "shear"
+
+
+def driven_side(problem: Problem) -> tuple[Floats, int]:
+    """Finds the vector (2,) from the middle to the driven units, and its larger component."""
+    sites = {unit: (x, y) for unit, x, y in problem.lattice.sites()}
+    driven = [sites[unit] for unit in selected_units(problem.drive.units, problem.lattice)]
+    outward = np.mean(driven, axis=0) - np.array(list(sites.values())).mean(axis=0)
+    return np.asarray(outward), int(np.argmax(np.abs(outward)))
 
 
 def _samples(values: Floats, wanted: tuple[float, ...]) -> tuple[int, ...]:

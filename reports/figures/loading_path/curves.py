@@ -18,6 +18,7 @@ from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
     display_name,
+    load_names,
     structures,
 )
 from reports.figures.loading_path.measures import Measure
@@ -26,6 +27,13 @@ from reports.study import RedesignResults, StudyResults
 
 BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""
+CASE_STYLES = (
+    ("-", 0.0),
+    ((0, (4.0, 1.5)), 0.3),
+    ((0, (1.2, 1.2)), 0.45),
+    ((0, (5.0, 1.2, 1.2, 1.2)), 0.55),
+)
+"""Dashes and share of white of the curves of one load case after the other."""
 RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
@@ -49,13 +57,22 @@ def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
 def structure_curves(
     axes: Axes, problem: Problem, path: Abscissa, values: xr.DataArray, names: Iterable[str]
 ) -> None:
-    """Draws values (structure, case, time) of some structures, the mean of their load cases."""
-    mean = over_cases(problem, values)
+    """Draws values (structure, case, time) of some structures, a curve for each load case.
+
+    Of several cases each has its dashes and its tint of the structure's colour.
+    """
+    loads = load_names(problem, values)
     for name in names:
         width, order = (1.8, 3) if name == "intact" else (1.2, 4)
-        colour, label = style.STRUCTURE_COLOURS[name], display_name(problem, name)
-        curve = mean.sel(structure=name)
-        axes.plot(path.values, curve, color=colour, lw=width, label=label, zorder=order)
+        title = display_name(problem, name)
+        for number, load in enumerate(loads):
+            dashes, white = CASE_STYLES[number % len(CASE_STYLES)]
+            label = title if len(loads) == 1 else f"{title}, {load}"
+            colour = style.tinted(style.STRUCTURE_COLOURS[name], white)
+            curve = values.sel(structure=name).isel(case=number)
+            axes.plot(
+                path.values, curve, color=colour, lw=width, ls=dashes, label=label, zorder=order
+            )
 
 
 def over_cases(problem: Problem, values: xr.DataArray) -> xr.DataArray:
@@ -72,7 +89,7 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
     names = [name for name in structures(response) if name != "intact"]
     values = measure.of(response)
     structure_curves(axes, problem, path, values, names)
-    _jumps(axes, path, over_cases(problem, values), response)
+    _jumps(axes, path, values, response)
     if study.redesign is not None and study.redesign.changed:
         _second(axes, study, measure, study.redesign)
     if problem.objective.target == "rest":
@@ -93,13 +110,15 @@ def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignRe
     axes.plot(way.values, values, color=style.CLOAKED, lw=1.0, ls=dashes, label=SECOND)
 
 
-def _jumps(axes: Axes, path: Abscissa, mean: xr.DataArray, response: xr.Dataset) -> None:
+def _jumps(axes: Axes, path: Abscissa, values: xr.DataArray, response: xr.Dataset) -> None:
     """Draws crosses where a structure came to another branch of equilibria."""
-    jumped = (response["stability"] >= JUMPED).any("case")
+    jumped = response["stability"] >= JUMPED
     for name in structures(response):
-        at = jumped.sel(structure=name).values
         colour = style.STRUCTURE_COLOURS[name]
-        axes.plot(path.values[at], mean.sel(structure=name).values[at], "x", color=colour, ms=4)
+        for case in range(response.sizes["case"]):
+            at = jumped.sel(structure=name).isel(case=case).values
+            curve = values.sel(structure=name).isel(case=case).values
+            axes.plot(path.values[at], curve[at], "x", color=colour, ms=4)
 
 
 def _bands(

@@ -8,9 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import xarray as xr
 
 from pipeline.comparison import middle_units
-from pipeline.problem import Problem, selected_units
+from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
 from reports.facts import Fact, checks, grouped, number, recording_facts, share, worded
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
@@ -18,14 +19,14 @@ from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
     display_name,
+    driven_side,
     lattice_size,
+    load_kind,
+    load_names,
     structures,
 )
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults, from_dataset
-
-_ALONG = np.cos(np.pi / 4)
-"""Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
 
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
@@ -69,7 +70,7 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield from _radii(problem)
     if path.static:
         yield _displacement_fact(path)
-        yield strain_fact(problem, path)
+        yield from strain_facts(problem, path)
         count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
@@ -115,21 +116,17 @@ def _displacement_fact(path: Abscissa) -> Fact:
     return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
 
 
-def strain_fact(problem: Problem, path: Abscissa) -> Fact:
-    """Describes the strain along the line from the middle to the driven side, by its kinds."""
-    sites = {unit: (x, y) for unit, x, y in problem.lattice.sites()}
-    places = np.array(list(sites.values()))
-    driven = [sites[unit] for unit in selected_units(problem.drive.units, problem.lattice)]
-    outward = np.mean(driven, axis=0) - places.mean(axis=0)
-    axis = int(np.argmax(np.abs(outward)))
-    kinds = []
-    for angle in getattr(problem.drive, "directions", ()) or (np.pi,):
-        pull = np.sign(outward[axis]) * (np.cos(angle), np.sin(angle))[axis]
-        kinds.append("compression" if pull < -_ALONG else "extension" if pull > _ALONG else "shear")
-    label, span = ", ".join(dict.fromkeys(kinds)).capitalize(), float(np.ptp(places[:, axis]))
+def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
+    """Yields the strain along the line from the middle to the driven side, a row for each kind."""
+    _, axis = driven_side(problem)
+    span = float(np.ptp([site[1 + axis] for site in problem.lattice.sites()]))
+    angles = np.degrees(getattr(problem.drive, "directions", ()) or (np.pi,))
     ends = ("columns", "rows")[axis]
     note = f"applied displacement over the {worded(span, 'mm', 4)} between the outermost {ends}"
-    return share("strain", label, float(path.values[-1]) / span, note=note)
+    kinds = dict.fromkeys(load_kind(problem, float(angle)) for angle in angles)
+    for place, kind in enumerate(kinds):
+        key = "strain" if place == 0 else f"strain_{kind}"
+        yield share(key, kind.capitalize(), float(path.values[-1]) / span, note=note)
 
 
 def _drive_facts(problem: Problem) -> Iterator[Fact]:
@@ -148,6 +145,14 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         label = f"{measure.label}, {display_name(study.problem, name).lower()}"
         end = float(values.sel(structure=name).isel(time=-1))
         yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=where)
+        yield from _each_load(
+            study,
+            f"{measure.key}_{name}",
+            measure.label,
+            measure.of(study.response),
+            name,
+            measure.unit,
+        )
     altered, cloaked = (values.sel(structure=name) for name in ("altered", "cloaked"))
     gain = 1.0 - cloaked / altered
     label = f"{measure.label} reduced by"
@@ -161,6 +166,20 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield number(key, label, most, measure.unit, digits=3, note=note)
 
 
+def _each_load(
+    study: StudyResults, key: str, label: str, values: xr.DataArray, name: str, unit: str
+) -> Iterator[Fact]:
+    """Yields a row for each of several load cases, whose mean the row above is."""
+    loads = load_names(study.problem, study.response)
+    part = values.sel(structure=name)
+    ends = part.isel(time=-1) if "time" in part.dims else part
+    for case, load in enumerate(loads if len(loads) > 1 else ()):
+        told = f"{label}, {display_name(study.problem, name).lower()}, {load}"
+        yield number(
+            f"{key}_case{case}", told, float(ends[case]), unit, digits=3, note="one load case"
+        )
+
+
 def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields the loss that was minimised, before and after."""
     unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
@@ -169,6 +188,7 @@ def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
         label = f"Loss, {display_name(study.problem, name).lower()}"
         yield number(f"loss_{key}", label, value, unit, digits=3)
+        yield from _each_load(study, f"loss_{key}", "Loss", study.response["loss"], name, unit)
     yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
     yield from _snap_facts(study, path, end, unit)
     yield from checks.error_facts(study.response, "relative; the largest of all structures")
@@ -224,6 +244,9 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         label = f"Reaction, {display_name(study.problem, name).lower()}"
         value = float(force.sel(structure=name))
         yield number(f"reaction_{name}", label, value, "N", digits=3, note=note)
+        yield from _each_load(
+            study, f"reaction_{name}", "Reaction", measures.reaction(study.response), name, "N"
+        )
 
 
 def robustness_facts(study: StudyResults) -> Iterator[Fact]:

@@ -56,7 +56,8 @@ def loading_path_figure(study: StudyResults) -> PanelFigure:
     problem, path = study.problem, abscissa_of(study.problem, study.response)
     grid = SnapshotLayout.of(study, path, TALLEST_SNAPSHOTS)
     top = 52.0
-    head = 11.5 if study.recordings else 8.5
+    two_lines = bool(study.recordings) or study.response.sizes["case"] > 1
+    head = 11.5 if two_lines else 8.5
     low = top + head + grid.lines * grid.side + 2.0
     colours = shade_of(problem, study.response).field.label.replace("u_y", "u<sub>y</sub>")
     symbol = "Loss (N mm)" if problem.objective.kind == "strain_energy" else r"Loss $J$"

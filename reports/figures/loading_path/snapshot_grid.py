@@ -15,6 +15,7 @@ from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
     display_name,
+    load_names,
     structures,
 )
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
@@ -31,17 +32,22 @@ Label = tuple[str, str]
 
 @dataclass(frozen=True)
 class SnapshotStructure:
-    """Holds one structure among the snapshots: its name, the colour of that, and what it does."""
+    """Holds one structure among the snapshots: its name, the colour of that, and what it does.
+
+    `case` is the load case shown.
+    """
 
     label: str
     colour: str
     part: xr.Dataset
+    case: int = 0
 
 
 def rows(study: StudyResults) -> list[SnapshotStructure]:
     """Lists the structures of a study, recordings above them, and the second design."""
     response, problem = study.response, study.problem
     along, found = abscissa_of(problem, response).values, []
+    loads = load_names(problem, response)
     for name in structures(response):
         label, colour = display_name(problem, name), style.STRUCTURE_COLOURS[name]
         filmed = [each for each in study.recordings if each.structure == name]
@@ -49,10 +55,14 @@ def rows(study: StudyResults) -> list[SnapshotStructure]:
             part = each.motion(response, along)
             found.append(SnapshotStructure(f"{label}\n{each.source}", colour, part))
         label = f"{label}\nsimulation" if filmed else label
-        found.append(SnapshotStructure(label, colour, response.sel(structure=name)))
+        for case, load in enumerate(loads):
+            told = label if len(loads) == 1 else f"{label}\n{load}"
+            found.append(SnapshotStructure(told, colour, response.sel(structure=name), case))
     if study.redesign is not None and study.redesign.changed:
         part = study.redesign.response.sel(structure="cloaked")
-        found.append(SnapshotStructure(SECOND, style.CLOAKED, part))
+        for case, load in enumerate(loads):
+            told = SECOND if len(loads) == 1 else f"{SECOND}\n{load}"
+            found.append(SnapshotStructure(told, style.CLOAKED, part, case))
     return found
 
 
@@ -115,7 +125,7 @@ def snapshots(
             axes = style.place(
                 figure, grid.left + column * side, top + line * side, side - GAP, side - GAP
             )
-            snapshot(axes, study.problem, row.part, sample, shade)
+            snapshot(axes, study.problem, row.part, sample, shade, row.case)
             if overlay is not None:
                 overlay(axes, row, sample)
     loads = [f"{grid.path.symbol} = {grid.path.at(sample)}" for sample in grid.path.shown]

@@ -68,8 +68,9 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
     others = np.where(interest, INTEREST_TINT, UNIT_TINT).tolist()
     draw_clamps(axes, structure, problem.lattice.spacing)
     draw(axes, structure, colours=tints(structure, held, altered, others), margin=12.0)
-    if name != "intact" and not np.isnan(float(response["direction"][0])):
-        _load_arrows(axes, structure, float(response["direction"][0]))
+    for direction in response["direction"].values if name != "intact" else ():
+        if not np.isnan(direction):
+            _load_arrows(axes, structure, float(direction))
 
 
 def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:

@@ -10,7 +10,7 @@ import xarray as xr
 from reports.base import Table
 from reports.facts import Columns, history, vertices
 from reports.figures.loading_path import measures, monte_carlo
-from reports.figures.loading_path.abscissa import abscissa_of, structures
+from reports.figures.loading_path.abscissa import abscissa_of, load_names, structures
 from reports.figures.loading_path.curves import over_cases
 from reports.study import StudyResults
 
@@ -25,12 +25,20 @@ def of_design(study: StudyResults) -> list[Table]:
 
 
 def by_structure(study: StudyResults, series: Mapping[str, xr.DataArray]) -> Columns:
-    """Returns a column for each series of a response and each structure, one row a sample."""
+    """Returns a column for each series of a response and each structure, one row a sample.
+
+    Of several load cases it is their mean, and each has a column besides.
+    """
     columns: Columns = {}
     for label, values in series.items():
         mean = over_cases(study.problem, values)
+        loads = load_names(study.problem, study.response)
         for name in structures(study.response):
             columns[f"{name}_{label}"] = mean.sel(structure=name).values
+            for case, load in enumerate(loads if len(loads) > 1 else ()):
+                suffix = load.replace(" ", "_").replace("°", "deg")
+                one = values.sel(structure=name).isel(case=case)
+                columns[f"{name}_{label}_{suffix}"] = one.values
     return columns
 
 

@@ -102,7 +102,7 @@ def _mark(place: MonitoredUnit, size: float) -> dict[str, Any]:
 
 def _contacts(study: StudyResults, axes: Axes, row: SnapshotStructure, sample: int) -> None:
     """Draws dots on the ligaments beside which a void is closed."""
-    part = row.part.isel(case=0)
+    part = row.part.isel(case=row.case)
     structure = from_dataset(row.part, study.problem.lattice.spacing)
     frame = part["displacement"].isel(time=sample).transpose("unit", "dof").values
     touching = closed_voids.closed(study.problem, part.isel(time=[sample]))[0]

@@ -1,0 +1,86 @@
+"""Several load cases of a slow load: each with its row, its curve and its name."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+from pipeline import problem
+from reports.facts import Fact
+from reports.figures.loading_path import (
+    abscissa,
+    curves,
+    facts,
+    measures,
+    snapshot_grid,
+    tables,
+)
+from reports.study import StudyResults
+from tests.reports.compressed_study import SHIELD, written
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
+    """A study whose second case does three times what its first does."""
+    folder: Path = tmp_path_factory.mktemp("two")
+    study = written(folder, SHIELD)
+    text = (folder / "problem.yaml").read_text(encoding="utf-8")
+    (folder / "problem.yaml").write_text(text.replace("[180 deg]", "[180 deg, 90 deg]"))
+    asked = problem.load(folder / "problem.yaml")
+    for name in ("response", "geometric_response"):
+        study.datasets[name] = _with_second_case(study.datasets[name])
+    return StudyResults(**{**vars(study), "problem": asked})
+
+
+def _with_second_case(response: xr.Dataset) -> xr.Dataset:
+    more = [
+        response[name] * 3 if name in ("displacement", "loss") else response[name]
+        for name in response.data_vars
+        if "case" in response[name].dims
+    ]
+    second = xr.merge(more, compat="override").assign_coords(direction=("case", [90.0]))
+    whole = xr.concat([response, second], "case", data_vars="minimal", coords="minimal")
+    return whole.assign_attrs(response.attrs)
+
+
+def test_each_load_case_has_its_name(two: StudyResults) -> None:
+    assert abscissa.load_names(two.problem, two.response) == ("compression 180°", "shear 90°")
+
+
+def test_each_load_case_has_its_rows(two: StudyResults) -> None:
+    path = abscissa.abscissa_of(two.problem, two.response)
+    found: dict[str, Fact] = {fact.key: fact for fact in facts.measure_facts(two, path)}
+    one, other = (found[f"rotation_altered_case{case}"].value for case in (0, 1))
+    assert other == pytest.approx(3 * one)
+    assert found["rotation_altered"].value == pytest.approx(2 * one)
+    assert "shear 90°" in found["rotation_altered_case1"].label
+
+
+def test_the_table_of_the_path_has_each_load_case(two: StudyResults) -> None:
+    columns = tables.path(two)
+    first, second = (
+        columns[f"altered_rotation_deg_{name}_{angle}deg"]
+        for name, angle in (("compression", 180), ("shear", 90))
+    )
+    np.testing.assert_allclose(second, 3 * np.asarray(first))
+
+
+def test_each_load_case_has_snapshots_and_a_curve_of_its_own(two: StudyResults) -> None:
+    shown = snapshot_grid.rows(two)
+    assert [row.case for row in shown][:4] == [0, 1, 0, 1]
+    assert len({row.label for row in shown[:4]}) == 4
+    made = Figure()
+    curves.measure_panel(
+        made.add_subplot(),
+        two,
+        abscissa.abscissa_of(two.problem, two.response),
+        measures.measure_of(two.problem),
+    )
+    drawn = {line.get_label(): line for line in made.axes[0].get_lines()}
+    one, other = (drawn[f"Cloaked, {name}"] for name in ("compression 180°", "shear 90°"))
+    assert (one.get_color(), one.get_linestyle()) != (other.get_color(), other.get_linestyle())
+    rises = (np.asarray(line.get_ydata(), dtype=float) for line in (one, other))
+    once, thrice = rises
+    np.testing.assert_allclose(thrice, 3 * once)
