@@ -29,7 +29,15 @@ OPTIONS: dict[str, dict[str, Any]] = {
     **{
         f"--{name}": _path("NC", f"the {name} dataset")
         for name in (
-            *("design", "response", "sweep", "scatter", "verification", "geometric-design"),
+            *(
+                "design",
+                "response",
+                "sweep",
+                "constants",
+                "scatter",
+                "verification",
+                "geometric-design",
+            ),
             *("geometric-response", "spectrum", "gains", "calibration", "track"),
             *("samples", "cycles", "pictures"),
         )

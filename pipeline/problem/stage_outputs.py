@@ -1,15 +1,20 @@
-"""Lists the datasets that stages make of a problem, for the rules and the report alike."""
+"""Lists the datasets that stages make of a problem, and poses it over measured constants."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
+from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.model import Problem
+from pipeline.problem.sections import Sweep, write_quantity
+from pipeline.runtime import UserError
 
 Output = Literal[
     "design",
     "response",
     "sweep",
+    "constants",
     "scatter",
     "verification",
     "geometric_design",
@@ -25,9 +30,46 @@ def outputs(problem: Problem) -> tuple[Output, ...]:
         "design": True,
         "response": True,
         "sweep": problem.sweep is not None,
+        "constants": problem.report.measured_constants is not None,
         "scatter": problem.robustness is not None,
         "verification": problem.horizon.steps is not None or wave,
         "geometric_design": by_angle,
         "geometric_response": by_angle,
     }
     return tuple(name for name, wanted in asked.items() if wanted)
+
+
+_DIMENSIONS = {
+    "axial_stiffness": units.STIFFNESS,
+    "shear_stiffness": units.STIFFNESS,
+    "bending_stiffness": units.BENDING_STIFFNESS,
+}
+
+
+def over_measured_constants(asked: Problem, folder: Path) -> Problem:
+    """Replaces the sweep of a problem by one over the constants that its report names.
+
+    Args:
+        asked: a problem whose report names measured constants.
+        folder: of its file.
+
+    Raises:
+        UserError: the file cannot be used, or has fewer draws than are asked for.
+    """
+    named = asked.report.measured_constants
+    assert named is not None
+    path = folder / named.file
+    drawn = csv_columns.read_quantities(path, _DIMENSIONS, named.samples)
+    if not (drawn > 0).all():
+        name = list(_DIMENSIONS)[int(drawn.min(axis=0).argmin())]
+        remedy = "delete the draws that have none"
+        raise UserError("a stiffness is not positive", file=path, key=name, remedy=remedy)
+    last = max(named.samples - 1, 1)
+    chosen = drawn[[round(k * (len(drawn) - 1) / last) for k in range(named.samples)]]
+    listed = {
+        f"material.{name}": tuple(
+            write_quantity(float(value), dimension.unit) for value in chosen[:, k]
+        )
+        for k, (name, dimension) in enumerate(_DIMENSIONS.items())
+    }
+    return asked.model_copy(update={"sweep": Sweep.model_validate({"list": listed})})

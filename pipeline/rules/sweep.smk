@@ -44,6 +44,31 @@ rule sweep_gather:
         "python -m pipeline sweep gather --parts {input} --out {output} --log {log}"
 
 
+# Over what measured specimens tell of the constants: a line of the report.
+rule sweep_constants:
+    input:
+        problem=ancient("experiments/{name}/problem.yaml"),
+        design="results/{name}{preset}/design.nc",
+        constants=rule_inputs.constants_file,
+    output:
+        "results/{name}{preset}/constants.nc",
+    log:
+        "results/{name}{preset}/logs/constants.log",
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=240,
+    params:
+        study=rule_inputs.options,
+        problem=rule_inputs.constants_section,
+        source=source_hash("pipeline.stages.sweep"),
+    message:
+        "Simulating measured constants of {wildcards.name}{wildcards.preset}"
+    shell:
+        "python -m pipeline sweep constants {params.study} --design {input.design}"
+        " --out {output} --log {log}"
+
+
 rule sweep_page:
     input:
         problem=ancient("experiments/{name}/problem.yaml"),

@@ -147,9 +147,18 @@ _ROWS = (
         "sweep",
         "simulate a design at many settings of parameters",
         kind="sweep",
-        datasets=("sweep",),
+        datasets=("sweep", "constants"),
         unused=(*_APART, "response", "robustness", "fabrication"),
-        parts=_IN_PARTS,
+        parts=_IN_PARTS
+        | {
+            "constants": (
+                *PROBLEM,
+                _DESIGN,
+                option("--threads", type=int, default=1, help="load cases simulated side by side"),
+                _OUT,
+            )
+        },
+        about="constants sets the measured constants that the report names, in place of the sweep.",
     ),
     Stage(
         "monte_carlo",
@@ -308,6 +317,11 @@ labelled SYNTHETIC.""",
         extra="validation",
         parts={
             "samples": (option("file", type=Path, metavar="POPULATION.yaml"), _OUT),
+            "constants": (
+                option("file", type=Path, metavar="POPULATION.yaml"),
+                option("--count", type=int, default=200, help="of the draws (200)"),
+                _file("--out", "CSV", "constants of new samples, a draw a line", required=True),
+            ),
             "cycles": (option("file", type=Path, metavar="LOAD_CYCLES.yaml"), _OUT),
             "pictures": (option("file", type=Path, metavar="PICTURES.yaml"), _OUT),
         },

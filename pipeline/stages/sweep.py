@@ -20,8 +20,11 @@ LOG = logging.getLogger(__name__)
 
 
 def work(args: argparse.Namespace) -> None:
-    """Computes a part of the cases, or joins all parts."""
-    chunked.run_or_gather(args, _run, "sweep", "case")
+    """Computes a part of the cases, or joins all parts; or computes those of measured constants."""
+    if args.command == "constants":
+        _run_constants(args)
+    else:
+        chunked.run_or_gather(args, _run, "sweep", "case")
 
 
 def _run(args: argparse.Namespace) -> None:
@@ -33,14 +36,31 @@ def _run(args: argparse.Namespace) -> None:
             key="sweep",
             remedy="add sweep.grid, sweep.list or sweep.random",
         )
+    _compute(args, asked, args.chunk, args.chunks)
+
+
+def _run_constants(args: argparse.Namespace) -> None:
+    asked = problem.load(args.problem, args.preset)
+    if asked.report.measured_constants is None:
+        raise UserError(
+            "the problem names no measured constants",
+            file=args.problem,
+            key="report.measured_constants",
+            remedy="name their file: report.measured_constants.file",
+        )
+    _compute(args, problem.over_measured_constants(asked, args.problem.parent), 0, 1)
+
+
+def _compute(args: argparse.Namespace, asked: Problem, chunk: int, chunks: int) -> None:
+    assert asked.sweep is not None
     design = read_design(asked, args.design)
     parents = {"design": args.design}
     words = (problem.section_hash(asked, "sweep"), source_hash("pipeline.stages.sweep"))
     key = hashlib.sha256(" ".join((*words, provenance.file_hash(args.design))).encode())
     folder = args.out.parent / ".journal" / f"sweep_{key.hexdigest()[:16]}"
-    here = sweep_cases.select_groups(asked.sweep, args.chunk, args.chunks)
+    here = sweep_cases.select_groups(asked.sweep, chunk, chunks)
     found = case_log.known(folder)
-    path = folder / f"part_{args.chunk}.csv"
+    path = folder / f"part_{chunk}.csv"
     with case_log.CaseLog(path, asked.sweep.keys) as book:
         LOG.info("results as they come: %s", path)
         _simulate(args, asked, design["vertices"], here, found, book)

@@ -5,23 +5,29 @@ import logging
 
 from pipeline import datasets
 from pipeline.calibration import simulation_fault, study_cycles, study_pictures
-from pipeline.calibration.inputs import KnownPictures, LoadCycles, Population
-from pipeline.calibration.population import validate_population
+from pipeline.calibration.inputs import ELASTIC_NAMES, UNITS, KnownPictures, LoadCycles, Population
+from pipeline.calibration.population import draw_constants, validate_population
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
+from pipeline.runtime import write_atomically
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
 
 
 def work(args: argparse.Namespace) -> None:
-    """Makes the part that a command line names: samples, cycles or pictures.
+    """Makes the part that a command line names: samples, constants, cycles or pictures.
 
     Raises:
         UserError: a fault of the files.
     """
     try:
-        {"samples": _samples, "cycles": _cycles, "pictures": _pictures}[args.command](args)
+        {
+            "samples": _samples,
+            "constants": _constants,
+            "cycles": _cycles,
+            "pictures": _pictures,
+        }[args.command](args)
     except SimulationError as error:
         raise simulation_fault(error, args.file) from error
 
@@ -38,6 +44,22 @@ def _samples(args: argparse.Namespace) -> None:
         "the measured curve lies %s the band of a new sample",
         "inside" if made["inside"].item() else "outside",
     )
+
+
+def _constants(args: argparse.Namespace) -> None:
+    asked = load_section(args.file, Population)
+    drawn = draw_constants(asked, args.file.parent, args.count)
+    source = asked.source
+    lines = [  # no semicolon, which would be the separator
+        f"# Constants of new samples, drawn from what {args.file.name} finds of those measured",
+        f"# Measured by {source.by}. {source.reference}",
+        f"# Licence: {source.licence}. Made by python -m pipeline validate constants",
+        ",".join(f"{name} ({UNITS[name]})" for name in ELASTIC_NAMES),
+        *(",".join(f"{value:.5g}" for value in row) for row in drawn),
+    ]
+    with write_atomically(args.out) as aside:
+        aside.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    LOG.info("%d draws: %s", len(drawn), args.out)
 
 
 def _cycles(args: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ from tempfile import NamedTemporaryFile
 
 from snakemake.iocontainers import Wildcards
 
-from pipeline.problem import Problem, outputs, section_hash
+from pipeline.problem import Problem, outputs, over_measured_constants, section_hash
 from pipeline.problem.sections import group_count
 from pipeline.runtime import RUN_MARK, WORK, UserError
 from pipeline.workflow.recordings import shown_recordings
@@ -161,6 +161,18 @@ def chunks(wildcards: Wildcards, most: int) -> list[str]:
     """Lists the parts of the sweep, at most so many and none without a case of its own."""
     sweep = problem_of(study_of(wildcards)).sweep
     return _parts(wildcards, "sweep", min(most, group_count(sweep) if sweep else 1))
+
+
+def constants_file(wildcards: Wildcards) -> list[str]:
+    """Names the file of the measured constants that the report shows the losses over."""
+    named = problem_of(study_of(wildcards)).report.measured_constants
+    return [os.path.normpath(f"experiments/{wildcards.name}/{named.file}")] if named else []
+
+
+def constants_section(wildcards: Wildcards) -> str:
+    """Hashes what the losses over measured constants depend on: the problem and the constants."""
+    folder = WORK / "experiments" / wildcards.name
+    return section_hash(over_measured_constants(problem_of(study_of(wildcards)), folder), "sweep")
 
 
 def copies(wildcards: Wildcards, most: int) -> list[str]:

@@ -89,6 +89,11 @@ class StudyResults:
         return self.datasets["sweep"]
 
     @property
+    def constants(self) -> xr.Dataset | None:
+        """Returns the losses over measured constants, if the report names any."""
+        return self.datasets.get("constants")
+
+    @property
     def scatter(self) -> xr.Dataset | None:
         """Returns imperfect copies of the design, if the problem asks for them."""
         return self.datasets.get("scatter")
@@ -129,7 +134,11 @@ def load(
         )
     read = {name: datasets.read(files[name], cast(Kind, REPORTED[name].kind)) for name in wanted}
     for name, data in read.items():
-        posed = law_comparison.geometric(chosen) if name == "geometric_response" else chosen
+        posed = chosen
+        if name == "geometric_response":
+            posed = law_comparison.geometric(chosen)
+        elif name == "constants":
+            posed = problem.over_measured_constants(chosen, path.parent)
         check_problem(posed, REPORTED[name].name, data, files[name])
     compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
     return StudyResults(

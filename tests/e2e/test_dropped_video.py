@@ -27,6 +27,7 @@ AS_FILMED = {
     "solver": {"accuracy": "draft"},
     "response": {"cycles": 0.5, "samples": 26},
     "prediction": {"samples": 4},
+    "report": {"measured_constants": None},
 }
 
 

@@ -16,6 +16,8 @@ from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.problem import Output, Problem
 from pipeline.problem.sections import HarmonicDrive, sweep_cases
+from pipeline.runtime import SweepResult
+from pipeline.stages import sweep as sweep_stage
 from reports.study import StudyResults, study_results
 from sim.structure import Lattice
 
@@ -36,7 +38,21 @@ WARNED = "units that hang on one ligament: 1, the first at [2, 1]"
 def written(folder: Path, preset: str | None = None) -> StudyResults:
     """The study with the datasets in `folder`, read back."""
     paths = write(folder, preset)
-    return study_results.load(PROBLEM, preset, dict(zip(KINDS, paths, strict=True)))
+    files = dict(zip(KINDS, paths, strict=True))
+    chosen = problem.load(PROBLEM, preset)
+    if chosen.report.measured_constants is not None:
+        posed = problem.over_measured_constants(chosen, PROBLEM.parent)
+        files["constants"] = folder / "constants.nc"
+        about = provenance.of_study(posed, "sweep")
+        datasets.write(constants(posed), files["constants"], "sweep", about)
+    return study_results.load(PROBLEM, preset, files)
+
+
+def constants(posed: Problem) -> xr.Dataset:
+    assert posed.sweep is not None
+    cases = list(enumerate(sweep_cases.list_settings(posed.sweep)))
+    found = {number: SweepResult(0.1 + 1e-3 * number, 1.0, 0.5) for number, _ in cases}
+    return sweep_stage.dataset(posed, cases, found)
 
 
 def write(folder: Path, preset: str | None = None) -> tuple[Path, Path, Path]:

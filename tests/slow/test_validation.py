@@ -7,9 +7,15 @@ import pytest
 import xarray as xr
 
 from pipeline.__main__ import run_stage
+from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import ROOT
 
 FILE = ROOT / "experiments/validation/hinges.yaml"
+CONSTANTS = {
+    "axial_stiffness": units.STIFFNESS,
+    "shear_stiffness": units.STIFFNESS,
+    "bending_stiffness": units.BENDING_STIFFNESS,
+}
 AT = (0.5, 1.0, 2.0, 3.0, 4.5)
 PREDICTED = {
     "median": (5.84, 9.13, 12.86, 14.62, 15.85),
@@ -57,3 +63,15 @@ def test_the_sampler_has_settled(found: xr.Dataset) -> None:
     assert found["r_hat"] < 1.05
     assert found["diverging"] < 0.02
     assert found["emulator_error_predicted"] < 0.005
+
+
+def test_the_stored_constants_are_those_of_the_posterior(tmp_path: Path) -> None:
+    out = tmp_path / "constants.csv"
+    assert run_stage("validate", ["constants", str(FILE), "--out", str(out), "--quiet"]) == 0
+    made, stored = (
+        np.log(csv_columns.read_quantities(path, CONSTANTS))
+        for path in (out, FILE.with_name("constants.csv"))
+    )
+    assert made.shape == stored.shape == (200, 3)
+    error = stored.std(axis=0) / np.sqrt(len(stored))  # other machines walk other ways
+    assert (np.abs(np.median(made, axis=0) - np.median(stored, axis=0)) < 4 * error).all()

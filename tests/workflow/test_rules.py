@@ -19,6 +19,7 @@ STUDY = {
     "simulate": 1,
     "sweep": 4,
     "sweep_gather": 1,
+    "sweep_constants": 1,
     "virtual_specimen": 2,
     "film_render": 2,
     "track": 2,

@@ -44,6 +44,7 @@ from pipeline.calibration.population.sample_readings import (
     stack_readings,
 )
 from pipeline.problem.fields import csv_columns, units
+from pipeline.runtime import UserError
 from sim.core import Floats, Numbers
 
 POINTS = 18
@@ -79,13 +80,10 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
         SimulationError: a specimen cannot be simulated.
     """
     random = np.random.default_rng(0)
-    curves = [read_curve(each, folder) for each in asked.data]
-    measured = read_curve(asked.predict, folder)
     begin = Constants(asked.material, None, asked.spacing)
+    curves, emulators = _emulated(asked, folder, begin)
+    measured = read_curve(asked.predict, folder)
     end = float(measured.displacement.max())
-    emulators = {
-        kind: emulate(asked.lattice, kind, begin, far) for kind, far in ends(curves).items()
-    }
     predicted = emulate(asked.predict.lattice, asked.predict.test, begin, end)
     readings, names = stack_readings(curves, emulators, asked.samples, asked.points)
     posteriors = _fits(asked, begin.logs(ELASTIC_NAMES), readings, names)
@@ -122,6 +120,46 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
         "quantile": list(QUANTILES),
     }
     return xr.Dataset(variables, labels)
+
+
+def draw_constants(asked: Population, folder: Path, count: int) -> Floats:
+    """Draws constants (count, 3) of new samples from the posterior of the whole fit.
+
+    They are in N/mm and N mm/rad, in the order of `ELASTIC_NAMES`.
+
+    Raises:
+        UserError: a file cannot be used, or more draws are asked for than there are.
+        SimulationError: a specimen cannot be simulated.
+    """
+    most = asked.sampling.chains * asked.sampling.draws
+    if count > most:
+        remedy = "ask for fewer, or raise sampling.draws"
+        raise UserError(f"only {most} draws are made", key="count", value=count, remedy=remedy)
+    begin = Constants(asked.material, None, asked.spacing)
+    curves, emulators = _emulated(asked, folder, begin)
+    readings, _ = stack_readings(curves, emulators, asked.samples, asked.points)
+    priors = prior_numbers(asked.priors, begin.logs(ELASTIC_NAMES))
+    chains = asked.sampling.chains
+    lanes = PriorNumbers(*(np.stack([part] * chains) for part in priors))
+    used = np.stack([readings.used] * chains)
+    log_force = np.broadcast_to(readings.log_force, used.shape)
+    seen = readings._replace(used=used, log_force=log_force)
+    effort = asked.sampling
+    draws = sample_posteriors(seen, lanes, warm_up=effort.warm_up, draws=effort.draws)
+    mean, spread = (draws[name].reshape(-1, 3) for name in ("mean", "spread"))
+    chosen = np.linspace(0, len(mean) - 1, count).round().astype(int)
+    random = np.random.default_rng(0)
+    return np.exp(mean[chosen] + spread[chosen] * random.normal(size=(count, 3)))
+
+
+def _emulated(
+    asked: Population, folder: Path, begin: Constants
+) -> tuple[list[SampleCurve], dict[TestKind, CurveEmulator]]:
+    """Reads the curves of the fit, and emulates every kind of test."""
+    curves = [read_curve(each, folder) for each in asked.data]
+    return curves, {
+        kind: emulate(asked.lattice, kind, begin, far) for kind, far in ends(curves).items()
+    }
 
 
 def _fits(

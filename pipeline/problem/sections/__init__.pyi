@@ -47,6 +47,7 @@ from .spectrum import Spectrum as Spectrum
 from .sweep import SettingValue as SettingValue
 from .sweep import Sweep as Sweep
 from .sweep import split_value as split_value
+from .sweep import write_quantity as write_quantity
 from .sweep_cases import DIRECTIONS as DIRECTIONS
 from .sweep_cases import DirectionGroup as DirectionGroup
 from .sweep_cases import Setting as Setting

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Ratio, Section
+from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Ratio, Samples, Section
 
 
 class Robustness(Section):
@@ -24,6 +24,19 @@ class Robustness(Section):
     geometry: tuple[Ratio, ...] = (0.03, 0.05)
     stiffness: tuple[Ratio, ...] = (0.1,)
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
+
+
+class MeasuredConstants(Section):
+    """Constants of specimens as measured, over which the losses of a design are shown as well.
+
+    Attributes:
+        file: a CSV with columns axial_stiffness, shear_stiffness and bending_stiffness, each with
+            its unit, a draw from what is known of new specimens a line.
+        samples: draws that are simulated, spread evenly over the file.
+    """
+
+    file: Annotated[str, Field(min_length=1)]
+    samples: Samples = 100
 
 
 class Paper(Section):
@@ -51,6 +64,7 @@ class ReportOptions(Section):
         places: the units nearest to these are followed over time, at most three.
         shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
             yields at about 5 %).
+        measured_constants: constants over which the losses are shown as well.
         paper: what a publication tells.
     """
 
@@ -58,4 +72,5 @@ class ReportOptions(Section):
     instants: tuple[Delay, ...] = ()
     places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
     shim_strain_limit: Positive = 0.05
+    measured_constants: MeasuredConstants | None = None
     paper: Paper | None = None

@@ -13,7 +13,16 @@ import xarray as xr
 from pipeline.comparison import middle_units
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
-from reports.facts import Fact, checks, grouped, number, recording_facts, share, worded
+from reports.facts import (
+    Fact,
+    checks,
+    constants_facts,
+    grouped,
+    number,
+    recording_facts,
+    share,
+    worded,
+)
 from reports.figures.loading_path import contact_comparison, measured, measures, monte_carlo
 from reports.figures.loading_path.abscissa import (
     Abscissa,
@@ -46,6 +55,10 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Contact", contact_comparison.contact_facts(study)),
         *grouped("Load steps", checks.variant_facts(study.verification)),
         *grouped("Imperfect copies", robustness_facts(study)),
+        *grouped(
+            "With the constants’ measured spread",
+            constants_facts(study.problem, study.constants, mean_losses(study)),
+        ),
     ]
 
 
@@ -183,8 +196,7 @@ def _each_load(
 def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields the loss that was minimised, before and after."""
     unit = "N mm" if study.problem.objective.kind == "strain_energy" else "1"
-    loss = over_cases(study.problem, study.response["loss"])
-    start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
+    start, end = mean_losses(study)
     for key, name, value in (("start", "altered", start), ("end", "cloaked", end)):
         label = f"Loss, {display_name(study.problem, name).lower()}"
         yield number(f"loss_{key}", label, value, unit, digits=3)
@@ -192,6 +204,13 @@ def loss_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield share("loss_reduction", "Loss reduced by", 1.0 - end / start)
     yield from _snap_facts(study, path, end, unit)
     yield from checks.error_facts(study.response, "relative; the largest of all structures")
+
+
+def mean_losses(study: StudyResults) -> tuple[float, float]:
+    """Returns mean losses of the altered structure and of the design over their load cases."""
+    loss = over_cases(study.problem, study.response["loss"])
+    start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
+    return start, end
 
 
 def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> Iterator[Fact]:

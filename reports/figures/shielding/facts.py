@@ -16,6 +16,7 @@ from reports.facts import (
     MEASURED,
     Fact,
     checks,
+    constants_facts,
     foil,
     grouped,
     measures,
@@ -61,6 +62,10 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         *grouped("Measured motion of the same unit", recorded_facts(study)),
         *recording_facts.recorded_facts(study.recordings),
         *grouped("Robustness", map_facts(sweep)),
+        *grouped(
+            "With the constants’ measured spread",
+            constants_facts(study.problem, study.constants, mean_losses(scene, response)),
+        ),
         *grouped("Checks", check_facts(design, response)),
         *grouped("Checks", foil.strain_facts(study.problem, response)),
         *grouped("Checks", foil.strain_facts(study.problem, response)),
@@ -100,7 +105,7 @@ def loss_facts(scene: ReportScene, response: xr.Dataset) -> Iterator[Fact]:
         note = f"mean over the region of interest, all load cases and {until:g} s"
         yield share(f"mean_reduction{suffix}", label, measures.reduction(mean), paper, note)
     note = f"time integral over {scene.horizon:g} s"
-    start, end = (mean_loss(scene, response, "loss", name) for name in ("altered", "cloaked"))
+    start, end = mean_losses(scene, response)
     yield loss_fact("loss_start", "Loss J, altered", start, note=note)
     paper = f"≈ {paper_loss(start):.2g}"
     note += "; the paper's is inferred from its 70 %, (1 − 0.7)² of ours at the start"
@@ -120,6 +125,12 @@ def loss_fact(key: str, label: str, value: float, paper: str = ABSENT, note: str
 def mean_loss(scene: ReportScene, response: xr.Dataset, variable: str, structure: str) -> float:
     """Returns mean loss of a structure over its load cases."""
     return float(scene.mean(response[variable].sel(structure=structure)))
+
+
+def mean_losses(scene: ReportScene, response: xr.Dataset) -> tuple[float, float]:
+    """Returns mean losses of the altered structure and of the design over their load cases."""
+    start, end = (mean_loss(scene, response, "loss", name) for name in ("altered", "cloaked"))
+    return start, end
 
 
 def paper_loss(start: float) -> float:

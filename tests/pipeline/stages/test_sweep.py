@@ -181,3 +181,33 @@ def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
 def test_a_faulty_sweep_is_told(tmp_path: Path, text: str, why: str) -> None:
     with pytest.raises(UserError, match=why):
         problem.load(static.write(tmp_path, static.HOLE + text))
+
+
+MEASURED = "report: { measured_constants: { file: constants.csv, samples: 2 } }\n"
+DRAWS = "# three samples\naxial_stiffness (N/mm),shear_stiffness (N/m),bending_stiffness (N mm)\n"
+
+
+def test_measured_constants_are_set_draw_by_draw(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, MEASURED)
+    (folder / "constants.csv").write_text(f"{DRAWS}120,1190,1.5\n1,1,1\n240,2380,3\n")
+    words = ["--problem", str(folder / "problem.yaml"), "--design", str(folder / "design.nc")]
+    out = folder / "constants.nc"
+    assert run_stage("sweep", ["constants", *words, "--out", str(out)]) == 0
+    made = datasets.read(out, "sweep")
+    np.testing.assert_allclose(made["value"], [[120, 1.19, 1.5], [240, 2.38, 3.0]])
+    # Motions depend on ratios of stiffness alone.
+    assert (made["status"] == "ok").all()
+    np.testing.assert_allclose(made["loss"][1], made["loss"][0], rtol=1e-6)
+    asked = problem.load(folder / "problem.yaml")
+    posed = problem.over_measured_constants(asked, folder)
+    assert made.attrs["problem_hash"] == problem.section_hash(posed, "sweep")
+
+
+@pytest.mark.parametrize(
+    ("line", "told"), [("", "only 1 lines"), ("1,-1,1\n", "a stiffness is not positive")]
+)
+def test_faulty_measured_constants_are_refused(line: str, told: str, tmp_path: Path) -> None:
+    path = static.write(tmp_path, static.HOLE + MEASURED, size=5)
+    (tmp_path / "constants.csv").write_text(f"{DRAWS}120,1190,1.5\n{line}")
+    with pytest.raises(UserError, match=told):
+        problem.over_measured_constants(problem.load(path), tmp_path)

@@ -1,0 +1,53 @@
+"""States facts on the losses over constants of specimens as measured, beside the nominal ones."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+
+from pipeline.problem import Problem
+from reports.facts.fact_records import Fact, percent, worded
+from sim.core import Floats
+
+_ENDS = (0.025, 0.975)
+
+
+def constants_facts(
+    asked: Problem, made: xr.Dataset | None, nominal: tuple[float, float]
+) -> Iterator[Fact]:
+    """Yields mean and 95 % of losses and of their reduction over the constants.
+
+    Args:
+        asked: the problem.
+        made: the losses over measured constants; none yields nothing.
+        nominal: loss of the altered structure and of the design, at the problem's own constants.
+    """
+    if made is None:
+        return
+    unit = "N mm" if asked.objective.kind == "strain_energy" else "1"
+    sound = (made["status"] == "ok").values
+    altered, cloaked = (made[name].values[sound] for name in ("loss_altered", "loss"))
+    if not len(cloaked):
+        words = str(made["status"].values[0])
+        yield Fact("constants_loss_end", "Loss, cloaked", np.nan, unit, "none", note=words)
+        return
+    failed = f", {(~sound).sum()} of them failed" if not sound.all() else ""
+    for key, label, values, own in (
+        ("start", "Loss, altered", altered, nominal[0]),
+        ("end", "Loss, cloaked", cloaked, nominal[1]),
+    ):
+        told = _quantity(values, unit)
+        note = f"nominal {worded(own, unit, 3)}; mean and 95 % of {len(sound)} draws{failed}"
+        yield Fact(f"constants_loss_{key}", label, float(values.mean()), unit, told, note=note)
+    gain = 1 - cloaked / altered
+    low, high = (percent(float(end)) for end in np.quantile(gain, _ENDS))
+    own = 1 - nominal[1] / nominal[0]
+    words, mean = f"{percent(float(gain.mean()))} ({low} to {high})", 100 * float(gain.mean())
+    note = f"nominal {percent(own)}; of each draw's own altered structure"
+    yield Fact("constants_reduction", "Loss reduced by", mean, "%", words, note=note)
+
+
+def _quantity(values: Floats, unit: str) -> str:
+    low, high = np.quantile(values, _ENDS)
+    ends = f"{worded(float(low), '1', 3)} to {worded(float(high), '1', 3)}"
+    return f"{worded(float(values.mean()), unit, 3)} ({ends})"
