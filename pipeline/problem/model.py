@@ -43,6 +43,8 @@ from pipeline.problem.sections import (
     VoidRegion,
 )
 
+_STATIC_INFILL = 0.15
+
 
 class Support(Section):
     """Units with some of their degrees of freedom held at zero.
@@ -220,6 +222,15 @@ class Problem(Section):
     def shim_thickness(self) -> float:
         """Returns the thickness of the ligaments' foil in mm."""
         return self.fabrication.shims.thickness
+
+    @property
+    def infill(self) -> float:
+        """Returns the share of the parts' inside that is printed."""
+        made = self.fabrication
+        if made.print.infill is not None:
+            return made.print.infill
+        full = self.material.density / (made.solid_density * made.thickness)
+        return _STATIC_INFILL if self.static else min(1.0, full)
 
     @property
     def static(self) -> bool:

@@ -46,7 +46,8 @@ def work(args: argparse.Namespace) -> None:
         package.write()
         write_assembly_sheet(room / "assembly.pdf", specimen, settings)
         density = posed.material.density
-        write_bill(room / "bom.csv", specimen, settings, density, package.contents)
+        printing = (package.contents, package.prints, posed.infill)
+        write_bill(room / "bom.csv", specimen, settings, density, *printing)
         built = _as_built(specimen, posed, args)
         write_manifest(room, specimen, posed, args.design, built)
         check_package(room, design, args.structure, settings, pictures, bar.update)

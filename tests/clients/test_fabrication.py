@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pipeline.fabrication.papers import read_bill
 from pipeline.fabrication.readback import read_3mf, read_drawing, read_stl
 from tests.clients.conftest import program
 from tests.pipeline.fabrication import built
@@ -83,6 +84,36 @@ def test_a_plate_is_sliced_to_its_volume(package: Path, tmp_path: Path, name: st
     told("prusa-slicer", "-g", package / name, *place, *SOLID, "-o", gcode)
     volume = sum(solid.mesh.volume for solid in read_3mf(package / name))
     assert filament(gcode) == pytest.approx(volume, rel=0.05)
+
+
+@pytest.mark.parametrize("infill", [0.15, 0.65])
+def test_print_time_and_filament_are_those_of_the_slicer(tmp_path: Path, infill: float) -> None:
+    """Of every plate of a package, within 15 %."""
+    built.write(tmp_path / "cloaked", {"print": {"infill": infill}})
+    gcode = tmp_path / "plate.gcode"
+    bill = {row["id"]: row["note"] for row in read_bill(tmp_path / "cloaked/bom.csv")}
+    plates = [name for name in bill if name.endswith(".3mf")]
+    assert len(plates) == 3
+    for name in plates:
+        place = ("--merge", "--dont-arrange", "--bed-shape", BED, "--skirts", "0")
+        density = ("--fill-density", f"{100 * infill:g}%")
+        told("prusa-slicer", "-g", tmp_path / "cloaked" / name, *place, *density, "-o", gcode)
+        words = re.search(r"about (\d+) h (\d+) min, ([\d.]+) m", bill[name])
+        assert words
+        minutes = 60 * int(words[1]) + int(words[2])
+        assert minutes == pytest.approx(print_minutes(gcode), rel=0.15)
+        volume = 1000 * float(words[3]) * np.pi / 4 * 1.75**2
+        assert volume == pytest.approx(filament(gcode), rel=0.15)
+
+
+def print_minutes(gcode: Path) -> float:
+    """Time that the slicer tells of its G-code."""
+    words = re.search(
+        r"printing time \(normal mode\) = (?:(\d+)h )?(\d+)m (\d+)s", gcode.read_text()
+    )
+    assert words
+    hours, minutes, seconds = (int(word or 0) for word in words.groups())
+    return 60 * hours + minutes + seconds / 60
 
 
 def test_cad_prints_every_drawing_with_ink(package: Path, tmp_path: Path) -> None:

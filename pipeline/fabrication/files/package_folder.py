@@ -16,7 +16,12 @@ from pipeline.fabrication.fixtures import (
     templates,
 )
 from pipeline.fabrication.parts import BuiltSpecimen, FlatPart, PrintedPart, unit_solid
-from pipeline.fabrication.plates import laser_sheets, print_plates
+from pipeline.fabrication.plates import (
+    PrintEstimate,
+    estimate_print,
+    laser_sheets,
+    print_plates,
+)
 from pipeline.problem import Problem
 
 
@@ -31,6 +36,7 @@ class PackageFolder:
         file: of the problem, for messages.
         done: called after each of the steps, two more than there are units.
         contents: ids of the parts in each sheet, plate and fixture, by its path in the folder.
+        prints: what printing each plate and fixture takes, by its path in the folder.
     """
 
     folder: Path
@@ -39,6 +45,7 @@ class PackageFolder:
     file: str
     done: Callable[[], object] = lambda: None
     contents: dict[str, list[str]] = field(default_factory=dict)
+    prints: dict[str, PrintEstimate] = field(default_factory=dict)
 
     def write(self) -> None:
         """Writes all drawings and meshes.
@@ -102,5 +109,8 @@ class PackageFolder:
         folder, _, name = kind.rpartition("/")
         bed = self.problem.fabrication.print
         for plate, parts in print_plates(name, solids, bed, self.file):
-            path = self._path(f"{folder}/{plate}.3mf", [solid.id for solid, _, _ in parts])
+            file = f"{folder}/{plate}.3mf"
+            path = self._path(file, [solid.id for solid, _, _ in parts])
+            on_plate = [solid for solid, _, _ in parts]
+            self.prints[file] = estimate_print(on_plate, self.problem.infill)
             write_3mf([(solid.id, solid.mesh, x, y) for solid, x, y in parts], path)

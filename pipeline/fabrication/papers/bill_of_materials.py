@@ -10,22 +10,12 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL, BuiltSpecimen, Ligament, Shim, Unit
+from pipeline.fabrication.plates import STRAND, PrintEstimate
 from pipeline.fabrication.readback import unreadable
 from pipeline.problem.sections import Fabrication
 
 BILL = "bom.csv"
 """Name of the file in a package."""
-
-DENSITIES = {
-    "PLA": 1.24e-9,
-    "PETG": 1.27e-9,
-    "ABS": 1.04e-9,
-    "ASA": 1.07e-9,
-    "PA12": 1.01e-9,
-    "PMMA": 1.18e-9,
-    "POM": 1.41e-9,
-}
-"""Of the solid materials, tonne/mm^3 (makers' data sheets)."""
 
 FOIL = 1.38e-9
 """Density of polyester foil, tonne/mm^3."""
@@ -69,6 +59,8 @@ def write_bill(
     settings: Fabrication,
     density: float,
     contents: Mapping[str, Sequence[str]],
+    prints: Mapping[str, PrintEstimate],
+    infill: float,
 ) -> None:
     """Writes the bill of materials of a specimen.
 
@@ -78,11 +70,13 @@ def write_bill(
         settings: of the fabrication.
         density: areal density of the units, tonne/mm^2.
         contents: ids of the parts in each sheet, plate and fixture, by its path in the package.
+        prints: what the printed ones of them take.
+        infill: share of their inside that is filled.
     """
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
     table.writerow(_HEADING.split())
-    for row in bill(specimen, settings, density, contents):
+    for row in bill(specimen, settings, density, contents, prints, infill):
         table.writerow(f"{v:.4f}" if isinstance(v, float) else v for v in astuple(row))
     path.write_text(stream.getvalue(), encoding="utf-8", newline="\n")
 
@@ -105,6 +99,8 @@ def bill(
     settings: Fabrication,
     density: float,
     contents: Mapping[str, Sequence[str]],
+    prints: Mapping[str, PrintEstimate],
+    infill: float,
 ) -> Iterator[BillRow]:
     """Yields rows: each unit, kind of shim, ligament, file to cut or print, the totals."""
     holders: dict[str, list[str]] = {}
@@ -120,10 +116,15 @@ def bill(
         note = f"shim {kinds[ligament.number]}; {prebend_words(ligament)}"
         yield BillRow("ligament", ligament.name, 1, length=ligament.length, note=note)
     for file, parts in contents.items():
-        yield BillRow(_KINDS[file.partition("/")[0]], file, 1, note=_counted(len(parts), "part"))
+        note = _counted(len(parts), "part")
+        if file.startswith("laser/units_"):
+            note += f"; {settings.laser_route}"
+        if file in prints:
+            note += f"; {_print_words(prints[file], settings)}"
+        yield BillRow(_KINDS[file.partition("/")[0]], file, 1, note=note)
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
-    solid = volume * DENSITIES[settings.material] * _GRAMS
-    fill = f"print {100 * mass / solid:.0f} % full"
+    solid = volume * settings.solid_density * _GRAMS
+    fill = f"print {100 * infill:.0f} % full"
     if mass > solid:
         fill = "less than the problem's density asks for"
     note = f"{settings.material}; {solid:.1f} g if solid: {fill}"
@@ -131,6 +132,12 @@ def bill(
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
     yield BillRow("total", "shims", count, volume=volume, mass=mass, note="polyester")
+    every = prints.values()
+    whole = PrintEstimate(sum(p.seconds for p in every), sum(p.filament for p in every))
+    volume = whole.filament * STRAND
+    mass = volume * settings.solid_density * _GRAMS
+    note = _print_words(whole, settings)
+    yield BillRow("total", "prints", len(prints), volume=volume, mass=mass, note=note)
 
 
 def _unit(unit: Unit, density: float, holders: Mapping[str, Sequence[str]]) -> BillRow:
@@ -185,6 +192,13 @@ def prebend_words(ligament: Ligament) -> str:
         f"ends turned {ends} deg; strain {100 * ligament.strain:.2f} %,"
         f" moment {ligament.moment:.2f} N mm before any load"
     )
+
+
+def _print_words(found: PrintEstimate, settings: Fabrication) -> str:
+    """Tells the time and the filament of a print."""
+    hours, minutes = divmod(round(found.seconds / 60.0), 60)
+    grams = found.filament * STRAND * settings.solid_density * _GRAMS
+    return f"about {hours} h {minutes:02} min, {found.filament / 1000.0:.1f} m or {grams:.0f} g"
 
 
 def _counted(count: int, noun: str) -> str:

@@ -18,8 +18,8 @@ from shapely import Geometry, Polygon
 from pipeline.runtime import UserError
 from sim.core import Floats
 
-THIN_WALL = 1.2
-"""Walls below this print, but break easily: they are warned of, mm."""
+THIN_WALL = 0.9
+"""Walls below this have no room for two lines of 0.45 mm side by side, and are warned of, mm."""
 
 STRAIGHT = 1e-4
 """Strain below which a shim counts as straight."""

@@ -5,3 +5,6 @@ from .layouts import print_plates as print_plates
 from .packing import Spot as Spot
 from .packing import TooLargeError as TooLargeError
 from .packing import pack as pack
+from .print_estimate import STRAND as STRAND
+from .print_estimate import PrintEstimate as PrintEstimate
+from .print_estimate import estimate_print as estimate_print

@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Gap, Length, Modulus, Ratio, Section, fault
+from pipeline.problem.fields import Gap, Length, Modulus, Positive, Ratio, Section, fault
+
+DENSITIES = {
+    "PLA": 1.24e-9,
+    "PETG": 1.27e-9,
+    "ABS": 1.04e-9,
+    "ASA": 1.07e-9,
+    "PA12": 1.01e-9,
+    "PMMA": 1.18e-9,
+    "POM": 1.41e-9,
+}
+"""Of the solid materials, tonne/mm^3 (makers' data sheets)."""
 
 _LEAST_LABEL = 2.0  # mm; smaller letters can neither be engraved nor printed
 _LEAST_RIM = 2.0  # mm around a bolt's hole
 _MOST_PLAY = 1.0  # mm beside a unit in its pocket
 _WIDEST_SLOT = 8.0  # mm
+_THINNEST_LAYER = 1.0  # mm; thinner sheets warp under the laser, and glue adds up
 
 Clearances = Annotated[tuple[Gap, ...], Field(min_length=1, max_length=20)]
 
@@ -114,6 +127,8 @@ class Laser(Section):
         margin: free rim of a sheet.
         gap: smallest distance of two parts.
         template_thickness: of the template with the tracking dots and of the spacer comb.
+        aspect_ratio: largest depth of a slot that is cut over its width; a unit that is thicker
+            is glued from layers.
     """
 
     kerf: Gap = 0.15
@@ -121,6 +136,7 @@ class Laser(Section):
     margin: Gap = 5.0
     gap: Length = 2.0
     template_thickness: Length = 1.0
+    aspect_ratio: Positive = 3.0
 
 
 class Print(Section):
@@ -132,6 +148,9 @@ class Print(Section):
         gap: smallest distance of two parts.
         first_layer_inset: how far the first layer is drawn in, against its squeezing out.
         layer: height of the first layer.
+        infill: share of the parts' inside that is printed. Left out, 0.15 for a slow load, where
+            units are to be rigid and their mass plays no part, and for motions in time the share
+            that the density asks for.
     """
 
     bed: tuple[Length, Length] = (250.0, 210.0)
@@ -139,6 +158,7 @@ class Print(Section):
     gap: Length = 2.0
     first_layer_inset: Gap = 0.0
     layer: Length = 0.2
+    infill: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
 class Fixture(Section):
@@ -222,6 +242,27 @@ class Fabrication(Section):
             what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
             raise fault(what, "give smaller clearances", "coupon")
         return self
+
+    @property
+    def laser_layers(self) -> int:
+        """Number of equal layers that a unit is cut in, for its slots to be cut through."""
+        return math.ceil(self.thickness / (self.laser.aspect_ratio * self.slot_width) - 1e-9)
+
+    @property
+    def laser_route(self) -> str:
+        """Tells in words how units can be cut by laser, if they can."""
+        layers, each = self.laser_layers, self.thickness / self.laser_layers
+        if layers == 1:
+            return f"cut from sheet of {self.thickness:g} mm"
+        slot = f"slots of {self.slot_width:g} mm are cut {self.laser.aspect_ratio:g} times as deep"
+        if each < _THINNEST_LAYER:
+            return f"print only: {slot}, which would take {layers} layers of {each:.2f} mm"
+        return f"cut {layers} times from sheet of {each:.2f} mm and glue: {slot}"
+
+    @property
+    def solid_density(self) -> float:
+        """Density of the units' material, tonne/mm^3."""
+        return DENSITIES[self.material]
 
     @property
     def slot_width(self) -> float:

@@ -64,6 +64,7 @@ def write(folder: Path, parameters: Mapping[str, object] | None = None) -> Probl
     package = PackageFolder(folder, specimen, posed, str(PROBLEM))
     package.write()
     write_assembly_sheet(folder / "assembly.pdf", specimen, settings)
-    write_bill(folder / "bom.csv", specimen, settings, posed.material.density, package.contents)
+    printing = (package.contents, package.prints, posed.infill)
+    write_bill(folder / "bom.csv", specimen, settings, posed.material.density, *printing)
     write_manifest(folder, specimen, posed, PROBLEM)
     return posed

@@ -7,6 +7,7 @@ import hashlib
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline import problem
@@ -15,6 +16,7 @@ from pipeline.fabrication.papers import read_bill, write_assembly_sheet, write_b
 from pipeline.fabrication.papers.assembly_plan import OVERLAP, tiles
 from pipeline.fabrication.papers.pdf_paper import SIZES, room
 from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.plates import PrintEstimate
 from tests.pipeline.fabrication import handmade
 from tests.pipeline.fabrication.handmade import ASKED
 
@@ -76,20 +78,23 @@ def test_neighbouring_tiles_share_a_strip_and_its_middle_line() -> None:
     assert mine[1] == pytest.approx(other[1])
 
 
+PRINTS = {"print/plate_01.3mf": PrintEstimate(3900.0, 2000.0)}
+
+
 def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     specimen = handmade.specimen()
     contents = {
         "laser/units_01_nominal.dxf": [unit.label for unit in specimen.units],
         "print/plate_01.3mf": ["A1", "B1"],
     }
-    write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents)
+    write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents, PRINTS, 0.62)
     found = read_bill(tmp_path / "bom.csv")
     assert [row["id"] for row in found if row["item"] == "unit"] == [
         unit.label for unit in specimen.units
     ]
     first = found[0]
-    assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm (thin)"
-    assert specimen.thin == {unit.label: 1.0 for unit in specimen.units}
+    assert first["note"] == "column 1 row 1; slots 3 3 mm deep; walls from 1.00 mm"
+    assert specimen.thin == {}
     assert first["files"] == "laser/units_01_nominal.dxf print/plate_01.3mf"
     area = specimen.units[0].design.area
     assert float(first["mass_g"]) == pytest.approx(area * 6.18e-3, abs=1e-4)  # kg/m^2 = mg/mm^2
@@ -101,7 +106,12 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert float(total["mass_g"]) == pytest.approx(
         sum(float(row["mass_g"]) for row in found if row["item"] == "unit"), abs=1e-3
     )
-    assert "print 6" in total["note"]  # 6.18 mg/mm^2 of 8.1 mm PLA: some 62 % full
+    assert "print 62 % full" in total["note"]
+    plate = next(row for row in found if row["item"] == "plate")
+    assert plate["note"] == "2 parts; about 1 h 05 min, 2.0 m or 6 g"
+    prints = found[-1]
+    assert (prints["id"], prints["count"]) == ("prints", "1")
+    assert float(prints["mass_g"]) == pytest.approx(2000 * np.pi / 4 * 1.75**2 * 1.24e-3, rel=1e-4)
 
 
 def test_the_manifest_holds_parameters_and_hashes(tmp_path: Path) -> None:

@@ -20,8 +20,9 @@ from pipeline.problem import (
     interest_units,
     section_hash,
 )
+from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.reading import load, overlay_keys, preset_names
-from pipeline.problem.sections import Quads
+from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES, Stage, UserError
 
 ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
@@ -312,3 +313,26 @@ def test_a_bound_of_the_strain_makes_the_design_depend_on_the_foil(
 
     assert hashed(text, "0.1 mm") == hashed(text, "0.2 mm")
     assert hashed(bound, "0.1 mm") != hashed(bound, "0.2 mm")
+
+
+@pytest.mark.parametrize(
+    ("made", "layers", "words"),
+    [
+        ({"thickness": 1.3}, 1, "cut from sheet of 1.3 mm"),
+        ({}, 6, "cut 6 times from sheet of 1.35 mm and glue"),
+        ({"shims": {"thickness": 0.1}}, 9, "print only"),
+        ({"laser": {"aspect_ratio": 20.0}}, 1, "cut from sheet of 8.1 mm"),
+    ],
+)
+def test_the_aspect_ratio_of_slots_decides_how_units_are_cut(
+    made: dict[str, object], layers: int, words: str
+) -> None:
+    settings = Fabrication.model_validate(made, context=SIM_UNITS)
+    assert settings.laser_layers == layers
+    assert settings.laser_route.startswith(words)
+
+
+def test_infill_is_little_where_mass_plays_no_part(fig2: Path) -> None:
+    moving = load(fig2)
+    assert moving.infill == pytest.approx(6.18e-9 / (1.24e-9 * 8.1))
+    assert load(fig2.parents[1] / "fig4/problem.yaml").infill == 0.15
