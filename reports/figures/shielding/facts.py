@@ -68,7 +68,6 @@ def shielding_facts(study: StudyResults) -> list[Fact]:
         ),
         *grouped("Checks", check_facts(design, response)),
         *grouped("Checks", foil.strain_facts(study.problem, response)),
-        *grouped("Checks", foil.strain_facts(study.problem, response)),
     ]
 
 
