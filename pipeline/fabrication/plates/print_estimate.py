@@ -63,7 +63,7 @@ def _part(part: PrintedPart, infill: float) -> PrintEstimate:
             max(0.0, min(layer.top, high) - max(layer.bottom, low)) * inside.intersection(area).area
             for low, high, area in surfaces
         )
-        for area in shapely.get_parts(inside):
+        for area in (each for each in shapely.get_parts(inside) if each.area > 0.0):
             share = 1.0
             if area.area > SOLID_BELOW:
                 share = min(1.0, solid / (inside.area * (layer.top - layer.bottom)))
@@ -89,7 +89,7 @@ def _loops(area: BaseGeometry) -> Iterator[tuple[Floats, float]]:
     """Yields the edges (n,) of the perimeters of an area, mm, with their speed."""
     for number in range(PERIMETERS):
         ring = area.buffer(-(number + 0.5) * PITCH, join_style="mitre").simplify(0.01)
-        for polygon in shapely.get_parts(ring):
+        for polygon in (each for each in shapely.get_parts(ring) if each.area > 0.0):
             for line in (polygon.exterior, *polygon.interiors):
                 edges = np.array([math.dist(*ends) for ends in pairwise(line.coords)])
                 usual = OUTER if number == 0 else INNER
