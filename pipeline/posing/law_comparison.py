@@ -56,9 +56,9 @@ def cloak_losses(response: xr.Dataset) -> tuple[float, float]:
     return angle, distance
 
 
-def geometric(asked: Problem) -> Problem:
-    """Sets contact on the distance of units."""
-    contact = asked.contact.model_copy(update={"law": "geometric"})
+def under(asked: Problem, law: str) -> Problem:
+    """Sets one of LAWS."""
+    contact = asked.contact.model_copy(update={"law": law})
     return asked.model_copy(update={"contact": contact})
 
 

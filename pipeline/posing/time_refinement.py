@@ -54,7 +54,7 @@ def trials(
         runs = {name: run.refined() for name, run in runs.items()}
         found[check] = _numbers(structures, runs, as_run, times)
         status[check] = "ok"
-    others = structures_of(scene_of(law_comparison.geometric(asked), folder), design)
+    others = structures_of(scene_of(law_comparison.under(asked, "geometric"), folder), design)
     try:
         runs = {name: _first(each, times) for name, each in others.items()}
         found[BY_DISTANCE] = _numbers(others, runs, as_run, times)

@@ -237,6 +237,10 @@ class Problem(Section):
         """Tells a load that grows so slowly that inertia plays no part."""
         return isinstance(self.drive, LinearRampDrive | TanhRampDrive)
 
+    def with_optimiser(self, **values: object) -> Problem:
+        """Returns the problem with other values of these keys of its optimiser."""
+        return self.model_copy(update={"optimiser": self.optimiser.model_copy(update=values)})
+
     def asks_more_than(self, own: Problem) -> bool:
         """Tells a preset of the study `own` that is to hold against more or other loads."""
         return self.objective.robust is not None or self.drive.kind != own.drive.kind

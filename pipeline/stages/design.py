@@ -17,6 +17,7 @@ from pipeline.posing import (
     design_scene,
     failures,
     lattice_of,
+    law_comparison,
     limits_of,
     loss_units,
     network_variables,
@@ -26,6 +27,7 @@ from pipeline.posing import (
     unit_coordinates,
 )
 from pipeline.problem import Problem
+from pipeline.problem.sections import Methods
 from pipeline.runtime import UserError, cli, source_hash
 from sim.constraints import KIND_NAMES, margins
 from sim.core import Floats, SimulationError
@@ -61,17 +63,48 @@ def work(args: argparse.Namespace) -> None:
         )
     scene = design_scene(asked, args.problem.parent)
     _check_symmetry(scene, args.problem)
+    start = start_vector(asked, scene, args.start, args.problem)
+    plan = _plan(scene, args)
+    results = [_descend(posed, scene, plan, start, args) for posed in _seeded(asked, args.method)]
+    made = design_dataset(asked, scene, min(results, key=_merit))
+    parents = {} if args.start is None else {"start": args.start}
+    found = plan.record() | {"descents": [each.loss for each in results]}
+    origin = provenance.of_study(asked, "design", method=args.method, parents=parents, plan=found)
+    datasets.write(made, args.out, "design_method", origin)
+
+
+def _seeded(asked: Problem, method: str) -> list[Problem]:
+    """Poses the problem with the seed of each descent; MMA has no use for any."""
+    first, count = asked.optimiser.seed, asked.optimiser.descents if method == "sqp" else 1
+    return [asked.with_optimiser(seed=seed) for seed in range(first, first + count)]
+
+
+def _merit(result: Result) -> tuple[float, float]:
+    return result.violation, result.loss
+
+
+def _plan(scene: Scene, args: argparse.Namespace) -> Plan:
     plan = make_plan(scene, threads=args.threads)
     LOG.info("%s", plan.describe())
-    start = start_vector(asked, scene, args.start, args.problem)
-    result = optimise(asked, scene, plan, args.method, args.problem, args.out.parent, start)
-    LOG.info("stopped: %s", result.reason)
-    made = design_dataset(asked, scene, result)
-    parents = {} if args.start is None else {"start": args.start}
-    origin = provenance.of_study(
-        asked, "design", method=args.method, parents=parents, plan=plan.record()
-    )
-    datasets.write(made, args.out, "design_method", origin)
+    return plan
+
+
+def _descend(
+    asked: Problem, scene: Scene, plan: Plan, start: Floats | None, args: argparse.Namespace
+) -> Result:
+    """Optimises with one seed; a design for contact on distance first by the angle law, if asked.
+
+    What the angle law lets overlap on its way ends in better designs than the distance would.
+    """
+    first, (source, results) = asked.optimiser.angle, (args.problem, args.out.parent)
+    if first is not None and asked.contact.law == "geometric" and args.method == "sqp":
+        by_angle = law_comparison.under(asked, "angle").with_optimiser(methods=Methods(sqp=first))
+        other = design_scene(by_angle, source.parent)
+        LOG.info("first by the angle law")
+        start = optimise(by_angle, other, _plan(other, args), "sqp", source, results, start).x
+    result = optimise(asked, scene, plan, args.method, source, results, start)
+    LOG.info("stopped: %s; loss %.5g", result.reason, result.loss)
+    return result
 
 
 def _check_symmetry(scene: Scene, source: Path) -> None:

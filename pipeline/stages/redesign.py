@@ -50,5 +50,4 @@ def work(args: argparse.Namespace) -> None:
 def again(asked: Problem, evaluations: int) -> Problem:
     """The problem with contact on distance and this budget."""
     methods = Methods(sqp=Method(evaluations=evaluations))
-    optimiser = asked.optimiser.model_copy(update={"methods": methods})
-    return law_comparison.geometric(asked).model_copy(update={"optimiser": optimiser})
+    return law_comparison.under(asked, "geometric").with_optimiser(methods=methods)

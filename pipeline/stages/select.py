@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 
 import xarray as xr
@@ -42,7 +43,9 @@ def work(args: argparse.Namespace) -> None:
         LOG.info("%s: loss %.5g", method, float(design["best_loss"]))
     LOG.info("shipped: the design by %s", best)
     parents = {path.stem: path for path in args.designs}
-    origin = provenance.of_study(asked, "select", parents=parents, plan={"shipped": best})
+    descents = json.loads(designs[best].attrs["plan"]).get("descents", [])
+    found: dict[str, object] = {"shipped": best, "descents": descents}
+    origin = provenance.of_study(asked, "select", parents=parents, plan=found)
     datasets.write(join(designs, best), args.out, "design", origin)
 
 

@@ -37,7 +37,7 @@ def work(args: argparse.Namespace) -> None:
         UserError: a structure could not be followed to its end; what was computed is kept.
     """
     asked = problem.load(args.problem, args.preset)
-    asked = law_comparison.geometric(asked) if args.geometric else asked
+    asked = law_comparison.under(asked, "geometric") if args.geometric else asked
     design = read_design(asked, args.design)
     scene = scene_of(asked, args.problem.parent)
     structures = structures_of(scene, design)

@@ -63,7 +63,9 @@ def written(folder: Path, more: str) -> StudyResults:
         files[kind] = folder / f"{kind}.nc"
         stage = REPORTED[kind]
         plan: dict[str, object] = {name: {"skipped": []} for name in names(chosen)}
-        posed = law_comparison.geometric(chosen) if kind == "geometric_response" else chosen
+        posed = (
+            law_comparison.under(chosen, "geometric") if kind == "geometric_response" else chosen
+        )
         about = provenance.of_study(posed, stage.name, plan=plan)
         datasets.write(made[kind], files[kind], cast(Kind, stage.kind), about)
     return study_results.load(path, None, files)

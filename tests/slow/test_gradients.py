@@ -32,7 +32,7 @@ Evaluate = Callable[[Floats], tuple[float, Floats, Floats]]
 def posed(path: Path, law: str) -> tuple[Scene, Evaluate]:
     """A study's scene under a law of contact, its equilibria to almost all digits."""
     asked = problem.load(path)
-    scene = scene_of(law_comparison.geometric(asked) if law == "geometric" else asked, path.parent)
+    scene = scene_of(law_comparison.under(asked, law), path.parent)
     plan = make_plan(scene)
     assert isinstance(plan.solver, StaticSolver)
     return scene, Evaluator(scene, replace(plan, solver=replace(plan.solver, relative=1e-13)))

@@ -45,19 +45,25 @@ class Optimiser(Section):
         start: from the initial lattice; or, in a preset, from the design of the study itself.
         geometric: the budget with which a design by the angle law of contact is optimised again
             with contact on distance, where its loss depends on the law.
+        angle: the budget with which SQP first optimises a design for contact on distance by the
+            angle law, through overlaps that would be in its way; none by default.
         symmetry: that the design is to have.
         trust_radius: at the start.
         trust_radius_max: at most.
         kick: random shifts with which an optimisation that has ended goes on, as far as its
             budget allows.
         seed: of the kicks.
+        descents: number of optimisations by SQP, with this seed and the next ones; the best is
+            shipped, the losses of all are kept.
     """
 
     methods: Methods
     start: Literal["initial", "study"] = "initial"
     geometric: Method = Method(evaluations=60)
+    angle: Method | None = None
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
     trust_radius: Length = 0.25
     trust_radius_max: Length = 1.0
     kick: Length = 0.15
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
+    descents: Annotated[int, Field(ge=1, le=100, strict=True)] = 1

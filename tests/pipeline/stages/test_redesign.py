@@ -9,6 +9,7 @@ import xarray as xr
 from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.posing import law_comparison
+from pipeline.problem.sections import Method
 from tests.pipeline.static import GEOMETRIC as BUDGET
 
 
@@ -66,9 +67,6 @@ def test_a_design_that_cannot_be_simulated_is_begun_anew(study: Path, tmp_path: 
 
 def test_the_budget_enters_the_hash_of_this_stage_only(study: Path) -> None:
     asked = problem.load(study / "problem.yaml")
-    optimiser = asked.optimiser.model_copy(
-        update={"geometric": asked.optimiser.geometric.model_copy(update={"evaluations": 9})}
-    )
-    other = asked.model_copy(update={"optimiser": optimiser})
+    other = asked.with_optimiser(geometric=Method(evaluations=9))
     assert problem.section_hash(other, "design") == problem.section_hash(asked, "design")
     assert problem.section_hash(other, "redesign") != problem.section_hash(asked, "redesign")
