@@ -4,8 +4,8 @@ SHELL := /bin/bash
 PYTHON ?= python3
 BIN := .venv/bin
 STUDIES := $(notdir $(patsubst %/,%,$(dir $(wildcard experiments/*/problem.yaml experiments/*/figure.yaml))))
-PAGES := all fig1 index movies calibrate validation benchmark
-PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains,$(addsuffix _$(product),$(STUDIES)))
+PAGES := all fig1 index movies calibrate validation benchmark any_load
+PRODUCTS := $(foreach product,fabrication recordings spectrum sweep gains certificate,$(addsuffix _$(product),$(STUDIES)))
 # A folder of packages, in place of a network: make wheels WHEELS=folder, later make setup WHEELS=folder
 WHEELS ?=
 INSTALL = $(BIN)/python pipeline/workflow/install_lock.py $(if $(WHEELS),--wheels "$(abspath $(WHEELS))")
@@ -26,6 +26,7 @@ help:
 	@echo "make fig7_spectrum      modes, transmission and waves of a study that asks for them"
 	@echo "make fig2_sweep         losses over the parameters of a study's sweep, whichever they are"
 	@echo "make fig2_gains         what designs gain that hold against more than the study asks for"
+	@echo "make any_load  a cloak for loads in ranges: certified under 1000 random and 50 searched ones"
 	@echo "make all       build every figure of the paper and the page over them: results/index.html"
 	@echo "make calibrate constants of the specimens from tests of small ones: results/calibration"
 	@echo "make validation  measured specimens beside their prediction: results/validation/index.html"

@@ -29,16 +29,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
     **{
         f"--{name}": _path("NC", f"the {name} dataset")
         for name in (
-            *(
-                "design",
-                "response",
-                "sweep",
-                "constants",
-                "scatter",
-                "verification",
-                "geometric-design",
-            ),
-            *("geometric-response", "spectrum", "gains", "calibration", "track"),
+            *("design", "response", "sweep", "constants", "scatter", "verification"),
+            *("geometric-design", "geometric-response", "spectrum", "gains", "certificate"),
+            *("calibration", "track"),
             *("samples", "cycles", "pictures"),
         )
     },

@@ -1,4 +1,4 @@
-"""Poses the scene that a design is optimised for, with all loads that it must hold."""
+"""Poses the scene that a design is optimised for, and the loads that it must hold."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pipeline.posing.to_scene import motions_of, scene_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive, Robust
-from sim.scene import Scene
+from sim.scene import DIRECTED, LoadFamily, Scene
 from sim.solvers import MotionLaw
 
 
@@ -34,6 +34,27 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
     share = np.array([load.weight for load in loads])
     weights = np.outer(share / share.sum(), scene.loads.case_weights).ravel()
     return scene.under(motions, scene.loads.duration, frequency).updated(weights=weights)
+
+
+def load_family(asked: Problem, folder: Path) -> LoadFamily | None:
+    """Builds the family of loads that a design must hold, if it is asked for.
+
+    Raises:
+        UserError: the file of a measured drive cannot be read.
+    """
+    ranges = asked.objective.loads
+    if ranges is None:
+        return None
+    motions = [motion for motion in motions_of(asked, folder) if isinstance(motion, DIRECTED)]
+    directions = [float(motion.direction) for motion in motions]
+    amplitude = float(motions[0].amplitude)
+    own = None if asked.frequency is None else (asked.frequency, asked.frequency)
+    return LoadFamily(
+        motions[0],
+        direction=ranges.directions or (min(directions), max(directions)),
+        amplitude=ranges.amplitude or (amplitude, amplitude),
+        frequency=ranges.frequency or own,
+    )
 
 
 def _under(asked: Problem, load: Load) -> Problem:

@@ -27,6 +27,12 @@ for target, built in studies.targets().items():
 
     rule:
         name:
+            f"{target}_certificate"
+        input:
+            rule_inputs.product_pages(built, "certificate"),
+
+    rule:
+        name:
             f"{target}_recordings"
         input:
             recordings.recording_pages(built),

@@ -193,6 +193,16 @@ _ROWS = (
         ),
     ),
     Stage(
+        "certify",
+        "compute the losses of designs under random and worst loads of a family",
+        kind="certificate",
+        inputs=("design",),
+        unused=_SHAPE_ONLY,
+        threads="loads",
+        options=(_file("--other", "NC", "the design of the study itself, to compare with"), _OUT),
+        about="Losses go to a journal, from which the same command resumes after any kind of end.",
+    ),
+    Stage(
         "fabricate",
         "write drawings, meshes and papers of a structure",
         extra="fabrication",

@@ -19,6 +19,7 @@ from pipeline.posing import (
     lattice_of,
     law_comparison,
     limits_of,
+    load_family,
     loss_units,
     network_variables,
     spread,
@@ -40,7 +41,16 @@ from sim.optimise import (
     Result,
     SqpOptions,
 )
-from sim.scene import Paths, Plan, Scene, constraints_of, make_plan, minimise
+from sim.scene import (
+    FamilyOptions,
+    Paths,
+    Plan,
+    Scene,
+    constraints_of,
+    make_plan,
+    minimise,
+    minimise_worst,
+)
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
 LOG = logging.getLogger(__name__)
@@ -153,11 +163,23 @@ def optimise(
             with Journal(
                 folder / f"{method}.journal", f"{key} {source_hash('pipeline.stages.design')}"
             ) as journal:
+                options, family = _options(asked, method), load_family(asked, source.parent)
+                if family is not None and isinstance(options, SqpOptions):
+                    return minimise_worst(
+                        scene,
+                        family,
+                        limits_of(asked),
+                        start,
+                        sqp=options,
+                        options=_family_options(asked),
+                        journal=journal,
+                        callback=show,
+                    )
                 return minimise(
                     scene,
                     limits_of(asked),
                     start,
-                    options=_options(asked, method),
+                    options=options,
                     plan=replace(plan, passed=times_of(asked, scene).asked),
                     journal=journal,
                     paths=Paths(folder / f"{method}.paths"),
@@ -185,6 +207,12 @@ def _options(asked: Problem, method: str) -> SqpOptions | MmaOptions:
         kick=wanted.kick,
         seed=wanted.seed,
     )
+
+
+def _family_options(asked: Problem) -> FamilyOptions:
+    ranges = asked.objective.loads
+    assert ranges is not None
+    return FamilyOptions(ranges.sharpness, ranges.nominal, ranges.search_every)
 
 
 def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:

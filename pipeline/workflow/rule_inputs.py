@@ -148,6 +148,13 @@ def start_design(wildcards: Wildcards) -> list[str]:
     return [f"results/{wildcards.name}/design.nc"] if wanted else []
 
 
+def own_design(wildcards: Wildcards) -> list[str]:
+    """Names the design of the study itself, for a preset of the same lattice and void."""
+    mine, own = problem_of(study_of(wildcards)), problem_of(Study(wildcards.name))
+    alike = (mine.lattice, mine.void) == (own.lattice, own.void)
+    return [f"results/{wildcards.name}/design.nc"] if alike and mine != own else []
+
+
 def robust_designs(wildcards: Wildcards) -> dict[str, str]:
     """Lists the study's own design ("plain") and those of its presets that ask for more."""
     own = problem_of(Study(wildcards.name))

@@ -17,7 +17,7 @@ from pipeline.problem.sections import design_count, design_name
 from pipeline.runtime import ROOT, WORK, UserError
 from pipeline.workflow.recordings import RECORDINGS
 
-PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", RECORDINGS)
+PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", "_certificate", RECORDINGS)
 """Ends of the targets of a study beside its report."""
 ALL = "all"  # the target that builds every figure of the paper
 

@@ -3,6 +3,8 @@ from .evaluation import GradientChain as GradientChain
 from .evaluation import constraints_of as constraints_of
 from .evaluation import evaluate as evaluate
 from .evaluation import minimise as minimise
+from .load_family import LoadFamily as LoadFamily
+from .load_family import LoadLosses as LoadLosses
 from .objectives import DisplacementMimicking as DisplacementMimicking
 from .objectives import StrainEnergyMimicking as StrainEnergyMimicking
 from .objectives import combined as combined
@@ -19,6 +21,7 @@ from .relaxation import AsBuilt as AsBuilt
 from .relaxation import Relaxed as Relaxed
 from .relaxation import as_built as as_built
 from .relaxation import relaxed as relaxed
+from .scene import DIRECTED as DIRECTED
 from .scene import DOFS as DOFS
 from .scene import Accuracy as Accuracy
 from .scene import Clamp as Clamp
@@ -41,3 +44,9 @@ from .time_solver import NEWTON as NEWTON
 from .time_solver import STIFFENING as STIFFENING
 from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .warm_starts import Paths as Paths
+from .worst_load import FamilyOptions as FamilyOptions
+from .worst_load import FoundLoad as FoundLoad
+from .worst_load import SearchOptions as SearchOptions
+from .worst_load import ascend as ascend
+from .worst_load import minimise_worst as minimise_worst
+from .worst_load import spread_places as spread_places

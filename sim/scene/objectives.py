@@ -51,8 +51,8 @@ class RelativeMimicking(NamedTuple):
     units: Ints
     spacing: float
     weights: Floats
-    target: Floats
-    size: Floats
+    target: Numbers
+    size: Numbers
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3).
@@ -85,9 +85,10 @@ def scales(spacing: float) -> Floats:
     return np.array([spacing, spacing, 1.0])
 
 
-def extent(motion: Floats, spacing: float) -> Floats:
+def extent(motion: Numbers, spacing: float) -> Any:  # noqa: ANN401  (arrays as those given)
     """Size |U| (n_cases, n_times) of a region's motion (n_cases, n_times, n, 3)."""
-    return np.asarray(np.linalg.norm(motion / scales(spacing), axis=(2, 3)))
+    norm = np.linalg.norm if isinstance(motion, np.ndarray) else jnp.linalg.norm
+    return norm(motion / scales(spacing), axis=(2, 3))
 
 
 def estimated_errors(

@@ -227,14 +227,21 @@ class Scene:
         cases = tuple(PrescribedMotion(self.loads.driven, motion) for motion in motions)
         return self.updated(**{"cases": cases, "weights": None, **changes})
 
-    def under(self, motions: tuple[MotionLaw, ...], duration: float, frequency: float) -> Scene:
-        """Replaces the motions of the driven units, of the reference as well."""
+    def under(
+        self,
+        motions: tuple[MotionLaw, ...],
+        duration: float,
+        frequency: float | None,
+        **changes: Any,  # noqa: ANN401
+    ) -> Scene:
+        """Replaces the motions of the driven units, of the reference as well; so with changes."""
         reference = self.objective.reference
         return self.driven_by(
             *motions,
             duration=duration,
             frequency=frequency,
-            reference=reference and reference.under(motions, duration, frequency),
+            reference=reference and reference.under(motions, duration, frequency, **changes),
+            **changes,
         )
 
     def alone(self, case: int) -> Scene:

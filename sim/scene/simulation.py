@@ -169,7 +169,7 @@ def cases_of(
 
 
 def mimicking(
-    scene: Scene, target: Floats | None = None, weights: Floats | None = None
+    scene: Scene, target: Numbers | None = None, weights: Floats | None = None
 ) -> Mimicking:
     """Builds the loss of a scene, a function of the motion and the parameters.
 

@@ -13,7 +13,7 @@ SCHEMA_VERSION = 3
 
 Kind = (
     Literal["design", "design_method", "response", "sweep", "scatter", "verification", "spectrum"]
-    | Literal["gains", "specimen", "track", "truth", "comparison", "calibration"]
+    | Literal["gains", "certificate", "specimen", "track", "truth", "comparison", "calibration"]
     | Literal["population", "load_cycles", "pictures", "benchmark", "contest", "tracking"]
 )
 Type = Literal["float64", "float32", "int64", "int8", "str"]

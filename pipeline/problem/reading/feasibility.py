@@ -14,6 +14,7 @@ from pipeline.problem.sections import (
     Quads,
     Region,
     Selector,
+    TimeSeriesDrive,
     loose_units,
     resolve_centre,
     selected_units,
@@ -133,6 +134,32 @@ def _robust(problem: Problem) -> Findings:
     if robust is not None and robust.loads and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no frequency to vary"
         yield ProblemFault(what, ("objective", "robust", "loads"), "leave them out")
+
+
+def _loads(problem: Problem) -> Findings:
+    """Finds what a family of loads cannot be of, or cannot be minimised over."""
+    objective, drive = problem.objective, problem.drive
+    if (family := objective.loads) is None:
+        return
+    place = ("objective", "loads")
+    if isinstance(drive, TimeSeriesDrive):
+        what = "a measured motion has no direction and amplitude to vary"
+        yield ProblemFault(what, place, "leave it out, or drive along a direction")
+    if family.frequency is not None and problem.frequency is None:
+        what = f"a {drive.kind} drive has no frequency to vary"
+        yield ProblemFault(what, (*place, "frequency"), "leave it out")
+    elif family.frequency is not None and problem.horizon.periods is None:
+        what = "a time does not fit loads of all frequencies"
+        yield ProblemFault(what, ("horizon", "duration"), "give `periods`")
+    if objective.robust is not None:
+        what = "loads in ranges take the place of some"
+        yield ProblemFault(what, ("objective", "robust"), "leave out one of the two")
+    if objective.snap == "avoid":
+        what = "loads in ranges have no one path to keep from snapping"
+        yield ProblemFault(what, ("objective", "snap"), "leave out one of the two")
+    if problem.optimiser.methods.mma is not None:
+        what = "the worst of many loads is minimised by sqp alone"
+        yield ProblemFault(what, ("optimiser", "methods", "mma"), "leave it out (a preset: null)")
 
 
 def _region_fits(problem: Problem, region: Region, keys: KeyPath) -> Findings:
@@ -291,6 +318,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _drive_is_free,
     _horizon,
     _robust,
+    _loads,
     _void,
     _inclusion,
     _target,

@@ -24,6 +24,7 @@ from .material import STIFFNESSES as STIFFNESSES
 from .material import Contact as Contact
 from .material import MaterialConstants as MaterialConstants
 from .objective import Load as Load
+from .objective import LoadRanges as LoadRanges
 from .objective import ObjectiveSection as ObjectiveSection
 from .objective import Robust as Robust
 from .optimiser import Method as Method

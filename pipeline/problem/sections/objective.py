@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from pipeline.problem.fields import Frequency, Length, Positive, Ratio, Section
+from pipeline.problem.fields import (
+    Angle,
+    Count,
+    Frequency,
+    Length,
+    Positive,
+    Ratio,
+    Section,
+    fault,
+)
 from pipeline.problem.sections.regions import Region
 
 
@@ -44,6 +53,38 @@ class Robust(Section):
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 
+class LoadRanges(Section):
+    """Loads of the drive's kind in ranges, each from its least to its greatest value.
+
+    The design minimises the worst loss under any of them. The loss under a load is relative to its
+    size: with the target at rest it counts with the square of the drive's amplitude over the
+    load's.
+
+    Attributes:
+        directions: of the motion; the drive's outermost ones by default.
+        amplitude: of the motion; the drive's by default.
+        frequency: of a harmonic drive, whose horizon is in periods; the drive's by default.
+        sharpness: p of the p-mean of the losses under the worst loads found so far.
+        nominal: share, in what is minimised, of the mean loss under the drive's own loads.
+        search_every: evaluations of the design, after which the worst load is searched again.
+    """
+
+    directions: tuple[Angle, Angle] | None = None
+    amplitude: tuple[Length, Length] | None = None
+    frequency: tuple[Frequency, Frequency] | None = None
+    sharpness: Annotated[float, Field(ge=1.0, le=64.0)] = 16.0
+    nominal: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    search_every: Count = 16
+
+    @model_validator(mode="after")
+    def _ascend(self) -> Self:
+        for name in ("directions", "amplitude", "frequency"):
+            given = getattr(self, name)
+            if given is not None and given[0] > given[1]:
+                raise fault("the range runs backwards", "give the least value first", name)
+        return self
+
+
 class ObjectiveSection(Section):
     """Target of the surroundings or of a region.
 
@@ -52,6 +93,7 @@ class ObjectiveSection(Section):
         target: stay at rest, or do as in the intact lattice.
         region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
         robust: what else the design is to hold against, if anything.
+        loads: all loads that it is to hold against, in ranges; in place of `robust`.
         snap: whether a static structure may snap to another branch of equilibria on its way, or is
             designed to avoid it.
         snap_margin: smallest eigenvalue of the tangent that all loads must then leave, as a share
@@ -62,5 +104,6 @@ class ObjectiveSection(Section):
     target: Literal["rest", "intact"]
     region: Literal["surroundings"] | Region = "surroundings"
     robust: Robust | None = None
+    loads: LoadRanges | None = None
     snap: Literal["allow", "avoid"] = "allow"
     snap_margin: Ratio = 0.05

@@ -25,7 +25,7 @@ from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES, Stage, UserError
 
-ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse")
+ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased")
 NAMES = ("edge3", "free", "text", *ROBUST, "quick")
 PRESETS = (None, *NAMES)
 

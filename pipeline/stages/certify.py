@@ -1,0 +1,173 @@
+"""Stage: the losses of designs over a family of loads, random ones and the worst."""
+
+import argparse
+import hashlib
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline import datasets, problem
+from pipeline.datasets import provenance
+from pipeline.posing import flat_vertices, load_family, loss_units, read_design, scene_of
+from pipeline.problem import Problem
+from pipeline.runtime import UserError, cli, source_hash
+from sim.core import Floats, SimulationError
+from sim.optimise import Journal
+from sim.scene import (
+    DIRECTED,
+    LoadFamily,
+    LoadLosses,
+    Scene,
+    ascend,
+    concrete_parameters,
+)
+
+LOADS, SEARCHES = 1000, 50
+"""Random loads, and searches of the worst one from random starts."""
+SEED = 2025
+BATCH = 20
+"""Loads between two entries of the journal."""
+EVALUATIONS = 12
+"""Of the loss and its gradient in a search, about."""
+_NOTHING: Floats = np.zeros(0)
+
+
+def work(args: argparse.Namespace) -> None:
+    """Reads the designs, computes the losses, writes the certificate.
+
+    Raises:
+        UserError: the problem asks for no family of loads, or a design is of another lattice.
+    """
+    asked = problem.load(args.problem, args.preset)
+    family = load_family(asked, args.problem.parent)
+    if family is None:
+        remedy = "add objective.loads, or name a preset that has it"
+        what = "the problem asks for no loads in ranges"
+        raise UserError(what, file=args.problem, key="objective.loads", remedy=remedy)
+    paths = {"cloaked": args.design} | ({} if args.other is None else {"study": args.other})
+    key = " ".join(
+        (
+            problem.section_hash(asked, "certify"),
+            source_hash("pipeline.stages.certify"),
+            *map(provenance.file_hash, paths.values()),
+        )
+    )
+    folder = (
+        args.out.parent / ".journal" / f"certify_{hashlib.sha256(key.encode()).hexdigest()[:16]}"
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    with Journal(folder / "losses.journal", key) as journal:
+        made = certificate(asked, family, args.problem.parent, paths, journal, args.threads)
+    origin = provenance.of_study(asked, "certify", parents=paths)
+    datasets.write(made, args.out, "certificate", origin)
+
+
+def certificate(
+    asked: Problem,
+    family: LoadFamily,
+    folder: Path,
+    paths: Mapping[str, Path],
+    journal: Journal,
+    threads: int,
+) -> xr.Dataset:
+    """The dataset ``certificate`` of designs by name."""
+    scene = scene_of(asked, folder)
+    random = np.random.default_rng(SEED)
+    loads = random.random((LOADS, family.size))
+    starts = random.random((SEARCHES, family.size))
+    own = np.array(
+        [family.place(each) for each in scene.loads.motions if isinstance(each, DIRECTED)]
+    )
+    rows = []
+    with cli.progress(len(paths) * (LOADS + SEARCHES), "loads") as bar:
+        for path in paths.values():
+            vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
+            tried = _Design(scene, family, vertices, journal, threads, bar.update)
+            rows.append((tried.losses(loads), tried.losses(own), tried.searches(starts)))
+    losses, nominal, found = (np.array(part) for part in zip(*rows, strict=True))
+    made = xr.Dataset(
+        {
+            **_numbers("load", ("load",), family, loads),
+            "loss": (("design", "load"), losses),
+            **_numbers("found", ("design", "search"), family, found[..., :-1]),
+            "found_loss": (("design", "search"), found[..., -1]),
+            "nominal_loss": (("design",), nominal @ scene.loads.case_weights),
+            "nominal_worst": (("design",), nominal.max(axis=1)),
+        },
+        {"design": list(paths)},
+    )
+    for name in ("loss", "found_loss", "nominal_loss", "nominal_worst"):
+        made[name].attrs["units"] = loss_units(asked)
+    return made
+
+
+def _numbers(
+    name: str, dims: tuple[str, ...], family: LoadFamily, places: Floats
+) -> dict[str, tuple[tuple[str, ...], Floats]]:
+    """Tells directions in degrees, amplitudes and frequencies of places (..., n)."""
+    numbers = np.asarray(family.numbers(places))
+    unknown = np.full(numbers.shape[:-1], np.nan)
+    return {
+        f"{name}_direction": (dims, np.rad2deg(numbers[..., 0])),
+        f"{name}_amplitude": (dims, numbers[..., 1]),
+        f"{name}_frequency": (dims, unknown if family.size == 2 else numbers[..., 2]),
+    }
+
+
+class _Design:
+    """Computes losses of one design under loads, in batches that a journal remembers."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        family: LoadFamily,
+        vertices: Floats,
+        journal: Journal,
+        threads: int,
+        done: Callable[[int], None],
+    ) -> None:
+        values = concrete_parameters(scene, vertices)
+        self._losses = LoadLosses(scene, family, lambda _: values)
+        self._family, self._journal, self._threads, self._done = family, journal, threads, done
+
+    def losses(self, places: Floats) -> Floats:
+        """Losses (n,) at places (n, n_numbers); NaN where the load cannot be simulated."""
+
+        def one(place: Floats) -> Floats:
+            try:
+                return np.array([self._losses.value(_NOTHING, place)])
+            except SimulationError:
+                return np.array([np.nan])
+
+        return self._in_batches(one, places)[:, 0]
+
+    def searches(self, starts: Floats) -> Floats:
+        """Places where searches end, with the loss there (n, n_numbers + 1)."""
+
+        def one(start: Floats) -> Floats:
+            found = ascend(self._loss, start, EVALUATIONS)
+            return np.append(found.place, found.loss)
+
+        return self._in_batches(one, starts)
+
+    def _loss(self, place: Floats) -> tuple[float, Floats]:
+        found = self._losses(_NOTHING, place)
+        return found.value, found.by_place
+
+    def _in_batches(self, one: Callable[[Floats], Floats], places: Floats) -> Floats:
+        """Maps over rows (n, k) of places, on threads."""
+
+        def batch(joined: Floats) -> tuple[float, Floats, Floats]:
+            with ThreadPoolExecutor(self._threads) as pool:
+                rows = list(pool.map(one, joined.reshape(-1, places.shape[1])))
+            return 0.0, _NOTHING, np.array(rows)
+
+        remembered, found = self._journal.wrap(batch), []
+        for first in range(0, len(places), BATCH):
+            part = places[first : first + BATCH]
+            found.append(remembered(part.ravel())[2])
+            self._done(len(part))
+        return np.concatenate(found)

@@ -1,0 +1,319 @@
+"""Minimises the worst loss over a family of loads, by a set of loads that grows.
+
+The design is optimised for a set of loads; then the worst load for it is searched among all of the
+family, and joins the set; loads that do no harm leave it. Both alternate until no load is found
+that is much worse than those in the set (a semi-infinite programme, solved by exchange: Hettich and
+Kortanek 1993, SIAM Rev. 35, 380).
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sim.constraints import ConstraintVector, Limits
+from sim.core import Floats, SimulationError
+from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
+from sim.optimise import minimise as minimise_loss
+from sim.scene.load_family import LoadFamily, LoadLosses
+from sim.scene.objectives import combined
+from sim.scene.plan import make_plan
+from sim.scene.scene import DIRECTED, Scene
+from sim.scene.simulation import parameters_of_design
+from sim.solvers import MotionLaw
+
+LOG = logging.getLogger(__name__)
+
+FOUND = 1.05
+"""Loss of a load found, over the worst in the set, up to which the set stands for the family."""
+HARMLESS = 0.6
+"""Loss, over the worst in the set, below which a load leaves it."""
+APART = 0.02
+"""Distance of two places along an axis of the unit cube below which they are one load."""
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """Holds how the worst load is searched.
+
+    Attributes:
+        samples: loads spread over the family, of which the losses alone are computed.
+        ascents: searches by the gradient, from the worst of these ...
+        evaluations: ... of so many losses with their gradient each, at most.
+        seed: of the samples.
+    """
+
+    samples: int = 16
+    ascents: int = 3
+    evaluations: int = 8
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class FamilyOptions:
+    """Holds how the worst loss over a family is minimised.
+
+    Attributes:
+        sharpness: p of the p-mean of the losses under the loads in the set.
+        nominal: share of the mean loss under the drive's own loads in what is minimised.
+        evaluations: of the set's losses between two searches, at most.
+        search: of the worst load.
+    """
+
+    sharpness: float = 16.0
+    nominal: float = 0.0
+    evaluations: int = 16
+    search: SearchOptions = SearchOptions()
+
+
+@dataclass(frozen=True)
+class FoundLoad:
+    """Holds a load that a search ended at.
+
+    Attributes:
+        place: (n,) in the family.
+        loss: there.
+        start: (n,) where the search started.
+    """
+
+    place: Floats
+    loss: float
+    start: Floats
+
+
+def spread_places(family: LoadFamily, count: int, seed: int) -> Floats:
+    """Spreads places (count, n) evenly over a family (Sobol' points, scrambled by the seed)."""
+    from scipy.stats import qmc
+
+    power = int(np.ceil(np.log2(max(count, 1))))
+    return qmc.Sobol(family.size, rng=seed).random_base2(power)[:count]
+
+
+def ascend(
+    loss: Callable[[Floats], tuple[float, Floats]], start: Floats, evaluations: int
+) -> FoundLoad:
+    """Searches the load of the greatest loss near a place, by projected quasi-Newton steps.
+
+    A load that cannot be simulated counts as harmless, with a warning.
+
+    Args:
+        loss: of a place, with its gradient (n,).
+        start: (n,).
+        evaluations: about so many, at most.
+    """
+    from scipy.optimize import minimize
+
+    best = FoundLoad(start, -np.inf, start)
+
+    def negative(place: Floats) -> tuple[float, Floats]:
+        nonlocal best
+        try:
+            value, slope = loss(place)
+        except SimulationError as failure:
+            LOG.warning("a load at %s cannot be simulated: %s", place, failure)
+            return 0.0, np.zeros_like(place)
+        if value > best.loss:
+            best = FoundLoad(place.copy(), value, start)
+        return -value, -slope
+
+    minimize(
+        negative, start, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(start),
+        options={"maxfun": evaluations, "ftol": 1e-4},
+    )  # fmt: skip
+    return best
+
+
+def search_worst(
+    value: Callable[[Floats], float],
+    loss: Callable[[Floats], tuple[float, Floats]],
+    family: LoadFamily,
+    options: SearchOptions,
+    known: Iterable[Floats] = (),
+) -> list[FoundLoad]:
+    """Searches the worst loads of a family, from the worst of spread ones; the worst comes first.
+
+    Args:
+        value: loss at a place (n,).
+        loss: the same with its gradient.
+        family: the loads.
+        options: of the search.
+        known: places to start from besides, if they are among the worst.
+    """
+    starts = [*known, *spread_places(family, options.samples, options.seed)]
+
+    def tried(place: Floats) -> float:
+        try:
+            return value(place)
+        except SimulationError as failure:
+            LOG.warning("a load at %s cannot be simulated: %s", place, failure)
+            return -np.inf
+
+    order = np.argsort([-tried(start) for start in starts], kind="stable")
+    chosen: list[Floats] = []
+    for start in (starts[k] for k in order):
+        if all(np.abs(start - other).max() > 10 * APART for other in chosen):
+            chosen.append(start)
+    found = [ascend(loss, start, options.evaluations) for start in chosen[: options.ascents]]
+    return sorted(found, key=lambda each: -each.loss)
+
+
+class _Search:
+    """Searches the worst loads for designs; a journal remembers all losses that it computes."""
+
+    def __init__(
+        self, losses: LoadLosses, wrap: Callable[[Evaluate], Evaluate], options: SearchOptions
+    ) -> None:
+        size, self._family, self._options = losses.family.size, losses.family, options
+
+        def value(joined: Floats) -> tuple[float, Floats, Floats]:
+            return losses.value(joined[:-size], joined[-size:]), np.zeros(0), np.zeros(0)
+
+        def loss(joined: Floats) -> tuple[float, Floats, Floats]:
+            found = losses(joined[:-size], joined[-size:])
+            return found.value, found.by_place, np.zeros(0)
+
+        self._value, self._loss = wrap(value), wrap(loss)
+
+    def __call__(self, design: Floats, known: Iterable[Floats] = ()) -> list[FoundLoad]:
+        """Searches for a design (n_variables,), from known places besides."""
+
+        def value(place: Floats) -> float:
+            return self._value(np.concatenate([design, place]))[0]
+
+        def loss(place: Floats) -> tuple[float, Floats]:
+            return self._loss(np.concatenate([design, place]))[:2]
+
+        return search_worst(value, loss, self._family, self._options, known)
+
+
+class _LoadSet:
+    """Computes what is minimised: the p-mean of the losses under a set of loads.
+
+    Args:
+        losses: of the family.
+        scene: whose load cases, the drive's own, stay in the set.
+        options: of the minimisation.
+    """
+
+    def __init__(self, losses: LoadLosses, scene: Scene, options: FamilyOptions) -> None:
+        case_of = make_plan(scene).case_of
+        simulated, self._own_of = np.unique(case_of, return_inverse=True)
+        motions = [scene.loads.motions[case] for case in simulated]
+        self.own = np.array([losses.family.place(_directed(motion)) for motion in motions])
+        self.added = np.zeros((0, losses.family.size))
+        self._losses, n_own = losses, len(self.own)
+        weights = jnp.asarray(np.bincount(self._own_of, scene.loads.case_weights))
+
+        def value(each: jax.Array) -> jax.Array:
+            alike = jnp.full(len(each), 1 / len(each))
+            worst = combined(each, alike, options.sharpness)
+            return (1 - options.nominal) * worst + options.nominal * (weights @ each[:n_own])
+
+        self._value = jax.jit(jax.value_and_grad(value))
+
+    @property
+    def places(self) -> Floats:
+        """(n_loads, n) of all loads in the set."""
+        return np.concatenate([self.own, self.added])
+
+    def __call__(self, design: Floats) -> tuple[float, Floats, Floats]:
+        """Value, gradient (n_variables,) and losses (n_cases + n_added,) of a design."""
+        found = [self._losses(design, place) for place in self.places]
+        each = np.array([one.value for one in found])
+        value, share = self._value(jnp.asarray(each))
+        gradient = np.asarray(share) @ np.array([one.by_design for one in found])
+        return float(value), gradient, np.append(each[self._own_of], each[len(self.own) :])
+
+    def exchange(self, losses: Floats, found: Sequence[FoundLoad]) -> None:
+        """Adds loads found, and removes those that do no harm by their losses (n_added,)."""
+        least = HARMLESS * max([found[0].loss, *losses])
+        self.added = self.added[losses >= least]
+        for one in found:
+            near = any(np.abs(one.place - other).max() < APART for other in self.places)
+            if one.loss >= least and not near:
+                self.added = np.concatenate([self.added, one.place[None]])
+
+
+def _directed(motion: MotionLaw) -> DIRECTED:
+    assert isinstance(motion, DIRECTED)
+    return motion
+
+
+def minimise_worst(
+    scene: Scene,
+    family: LoadFamily,
+    limits: Limits,
+    start: Floats | None = None,
+    *,
+    sqp: SqpOptions,
+    options: FamilyOptions,
+    journal: Journal | None = None,
+    callback: Callable[[Evaluation], None] | None = None,
+) -> Result:
+    """Minimises the worst loss over a family of loads; returns the design whose worst is lowest.
+
+    The losses of an evaluation, ``aux``, are those of the drive's own loads, then of the others in
+    the set; its loss is what is minimised over the set of the time.
+
+    Args:
+        scene: the scene, whose load cases are the drive's own loads.
+        family: the loads.
+        limits: what a design must keep to.
+        start: (n_variables,) design vector, mm; by default the initial structure.
+        sqp: of the descents; its evaluations are those of all of them, without the searches.
+        options: of the minimisation.
+        journal: of evaluations and searches, from which an interrupted run resumes exactly.
+        callback: called with each evaluation of the set as it is recorded.
+
+    Raises:
+        InfeasibleStartError: no feasible design near the start.
+        SimulationError: the start cannot be simulated.
+    """
+    losses = LoadLosses(scene, without_copies(family, scene), parameters_of_design(scene))
+    held = _LoadSet(losses, scene, options)
+    wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
+    search, evaluate = _Search(losses, wrap, options.search), wrap(held)
+    constraints = ConstraintVector(scene.space, limits)
+    x = np.zeros(scene.space.n_variables) if start is None else start
+    history: list[Evaluation] = []
+    best: tuple[float, Result] | None = None
+
+    def record(evaluation: Evaluation) -> None:
+        history.append(replace(evaluation, number=len(history)))
+        if callback is not None:
+            callback(history[-1])
+
+    held.exchange(np.zeros(0), search(x))
+    stands = False
+    while (left := sqp.evaluations - len(history)) > 0:
+        first = len(history)
+        # new starts from inside the feasible set are for a set that stands for the family
+        brief = replace(sqp, evaluations=min(left, options.evaluations), retreats=0)
+        descent = replace(sqp, evaluations=left) if stands else brief
+        result = minimise_loss("sqp", evaluate, constraints, x, options=descent, callback=record)
+        x, known = result.x, float(result.aux.max())
+        found = search(x, held.places)
+        LOG.info("worst of %d loads %.5g, found %.5g", len(held.places), known, found[0].loss)
+        if best is None or max(known, found[0].loss) < best[0]:
+            best = max(known, found[0].loss), replace(result, best=first + result.best)
+        stands = found[0].loss <= FOUND * known
+        held.exchange(result.aux[len(scene.loads.cases) :], found)
+    assert best is not None
+    if not stands:
+        LOG.warning("the worst load found is more than %g times those designed for", FOUND)
+    return replace(best[1], evaluations=tuple(history))
+
+
+def without_copies(family: LoadFamily, scene: Scene) -> LoadFamily:
+    """Leaves out directions whose loads are turned copies of others, by a design's symmetry."""
+    low, high = family.direction
+    quarter = low + np.pi / 2
+    turned = scene.driven_by(*(family.motion._replace(direction=a) for a in (low, quarter)))
+    if high <= quarter or len(make_plan(turned).simulated) == 2:
+        return family
+    return replace(family, direction=(low, quarter))

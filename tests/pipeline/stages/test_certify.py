@@ -1,0 +1,104 @@
+"""The certificate of a design over a family of loads, from its problem file to its page."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from pipeline import datasets
+from pipeline.__main__ import run_stage
+from pipeline.problem.reading import load, overlay_keys
+from pipeline.runtime import UserError
+from pipeline.stages import certify
+from reports.__main__ import main
+
+FAMILY = {
+    "objective": {"loads": {"directions": ["0 deg", "180 deg"], "frequency": ["1 Hz", "8 Hz"]}},
+    "optimiser": {"methods": {"mma": None}},
+}
+
+
+def write(fig2: Path, folder: Path, **changes: object) -> Path:
+    """Writes the study's draft with a family of loads laid over it."""
+    content = yaml.safe_load(fig2.read_text())
+    presets = content.pop("presets")
+    whole = overlay_keys(overlay_keys(content, presets["quick"]), FAMILY)
+    path = folder / "problem.yaml"
+    path.write_text(yaml.safe_dump(overlay_keys(whole, changes)))
+    return path
+
+
+def test_a_design_is_made_and_certified(
+    fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(certify, "LOADS", 24)
+    monkeypatch.setattr(certify, "SEARCHES", 2)
+    path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
+    words = ["--problem", str(path), "--quiet"]
+    made, chosen = str(tmp_path / "design_sqp.nc"), str(tmp_path / "design.nc")
+    assert run_stage("design", [*words, "--method", "sqp", "--out", made]) == 0
+    assert run_stage("select", [*words, "--designs", made, "--out", chosen]) == 0
+    certified = [*words, "--design", chosen, "--out", str(out)]
+    assert run_stage("certify", certified) == 0
+    data = datasets.read(out, "certificate").squeeze("design")
+    assert data["design"].item() == "cloaked"
+    assert 1.0 <= data["load_frequency"].min() < data["load_frequency"].max() <= 8.0
+    assert (data["load_amplitude"] == 4.5).all()
+    assert data["found_loss"].max() >= 0.999 * data["loss"].max() > data["nominal_loss"]
+    before = out.read_bytes()
+    monkeypatch.setattr(certify.LoadLosses, "value", None)  # the journal has them all
+    assert run_stage("certify", certified) == 0
+    assert out.read_bytes() == before
+
+    page = tmp_path / "page"
+    shown = ["certificate", *words, "--certificate", str(out), "--out-dir", str(page)]
+    assert main(shown) == 0
+    assert "this design" in (page / "index.html").read_text(encoding="utf-8")
+    table = pd.read_csv(page / "certificate.csv", comment="#")
+    np.testing.assert_allclose(table["loss (1)"], data["loss"], rtol=1e-6)
+
+
+def test_only_loads_in_ranges_are_certified(
+    fig2: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--problem", str(fig2), "--design", "d.nc", "--out", str(tmp_path / "c.nc")]
+    assert run_stage("certify", words) == 2
+    assert "objective.loads" in capsys.readouterr().err
+    assert not (tmp_path / "c.nc").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"objective": {"loads": {"amplitude": ["4 mm", "1 mm"]}}}, "objective.loads.amplitude"),
+        ({"objective": {"loads": {"sharpness": 0.5}}}, "objective.loads.sharpness"),
+        ({"objective": {"robust": {"copies": 2}}}, "objective.robust"),
+        ({"optimiser": {"methods": {"mma": {"evaluations": 3}}}}, "optimiser.methods.mma"),
+        ({"horizon": {"periods": None, "duration": "1 s"}}, "horizon.duration"),
+        (
+            {
+                "drive": {"kind": "pulse", "frequency": None, "width": "9 ms", "delay": "40 ms"},
+                "horizon": {"periods": None, "duration": "1 s"},
+                "sweep": None,
+            },
+            "objective.loads.frequency",
+        ),
+    ],
+)
+def test_ranges_without_a_meaning_are_refused(
+    fig2: Path, tmp_path: Path, changes: dict[str, object], key: str
+) -> None:
+    with pytest.raises(UserError) as caught:
+        load(write(fig2, tmp_path, **changes))
+    assert caught.value.key == key
+    assert caught.value.remedy
+
+
+def test_ranges_left_out_are_the_drives_own(fig2: Path) -> None:
+    own = load(fig2, "unbiased").objective.loads
+    assert own is not None
+    assert own.amplitude == (1.0, 4.5)
+    assert own.directions == (0.0, np.pi)
+    assert own.nominal == 0.0

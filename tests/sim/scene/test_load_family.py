@@ -1,0 +1,178 @@
+"""Losses over a family of loads, their derivatives, and the design whose worst is lowest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sim.constraints import Limits
+from sim.core import Floats, SimulationError
+from sim.optimise import Evaluation, Journal, Result, SqpOptions
+from sim.scene import (
+    FamilyOptions,
+    LoadFamily,
+    LoadLosses,
+    Scene,
+    SearchOptions,
+    ascend,
+    minimise_worst,
+    parameters_of_design,
+    simulate,
+    spread_places,
+)
+from sim.scene.worst_load import search_worst, without_copies
+from sim.solvers import Harmonic, LinearRamp
+from tests.sim.scene.test_plan import design_of, scene
+
+SHAKEN = LoadFamily(Harmonic(3.0, 5.0, 0.0), (0.0, np.pi), (1.0, 3.0), (2.0, 16.0))
+PUSHED = LoadFamily(LinearRamp(3.0, 0.2), (0.0, np.pi), (1.0, 3.0))
+
+
+def mimicked() -> Scene:
+    """Pushed along any direction, with a void whose surroundings are to move as without it."""
+    intact = scene(motions=(PUSHED.motion,), static=True, steps=3)
+    lattice = intact.lattice.without(np.array([8]))
+    region = lattice.positions(intact.lattice.id[intact.objective.region])
+    units = lattice.positions(np.array([24]))
+    return intact.updated(
+        lattice=lattice,
+        cases=tuple(case._replace(units=units) for case in intact.loads.cases),
+        supports=tuple(
+            type(each)(lattice.positions(each.units), each.dofs) for each in intact.loads.supports
+        ),
+        region=region,
+        cloak=lattice.positions(intact.design.cloak[intact.design.cloak != 8]),
+        reference=intact,
+    )
+
+
+@pytest.mark.parametrize("place", [(0.1, 0.7, 0.95), (0.4, 1.0, 0.3)])
+def test_the_loss_in_scaled_time_is_that_of_the_load_itself(
+    place: tuple[float, float, float],
+) -> None:
+    posed, at = scene(), np.array(place)
+    design = design_of(posed)
+    angle, amplitude, frequency = (float(number) for number in SHAKEN.numbers(at))
+    load = Harmonic(amplitude, frequency, angle)
+    np.testing.assert_allclose(SHAKEN.place(load), at, atol=1e-12)
+    direct = posed.under((load,), 1 / frequency, frequency, integrator="implicit")
+    assert posed.loads.duration * 5.0 == 1.0  # of one period
+    found = LoadLosses(posed, SHAKEN, parameters_of_design(posed)).value(design, at)
+    assert found == pytest.approx(float(simulate(direct, design).loss) * 9 / amplitude**2, rel=4e-3)
+
+
+@pytest.mark.parametrize(("family", "posed"), [(SHAKEN, scene), (PUSHED, mimicked)])
+def test_derivatives_by_the_design_and_by_the_load(family: LoadFamily, posed: object) -> None:
+    made: Scene = posed()  # type: ignore[operator]
+    losses = LoadLosses(made, family, parameters_of_design(made))
+    design, at = design_of(made, 0.2), np.array([0.3, 0.6, 0.9][: family.size])
+    found = losses(design, at)
+    assert found.value == losses.value(design, at)
+    way = found.by_design / np.linalg.norm(found.by_design)
+    steps = [
+        (1e-5 * way, np.zeros_like(at)),
+        *((np.zeros_like(way), 1e-5 * e) for e in np.eye(len(at))),
+    ]
+    exact = [float(found.by_design @ way), *found.by_place]
+    for (by_design, by_place), slope in zip(steps, exact, strict=True):
+        ahead = losses.value(design + by_design, at + by_place)
+        behind = losses.value(design - by_design, at - by_place)
+        assert slope == pytest.approx((ahead - behind) / 2e-5, rel=1e-4, abs=1e-6)
+
+
+def test_octaves_count_from_the_highest_frequency() -> None:
+    frequencies = (16.0, 15.9, 8.0, 7.9, 2.0)
+    places = [SHAKEN.place(Harmonic(2.0, f, 0.5)) for f in frequencies]
+    assert [SHAKEN.octave(place) for place in places] == [0, 0, 1, 1, 3]
+    switched = LoadFamily(Harmonic(1.0, 4.0, rise=0.2, delay=0.5), (0, 1), (1, 2), (1.0, 16.0))
+    fastest = switched.fastest(1)
+    assert isinstance(fastest, Harmonic)
+    assert fastest == Harmonic(2.0, 8.0, 0.0, rise=0.1, delay=0.25)
+
+
+def bell(place: Floats) -> tuple[float, Floats]:
+    """Two hills; the higher one, of height 2, at (0.8, 0.7)."""
+    value, slope = 0.0, np.zeros(2)
+    for height, top in ((1.0, (0.2, 0.2)), (2.0, (0.8, 0.7))):
+        off = place - np.array(top)
+        hill = height * np.exp(-20 * off @ off)
+        value, slope = value + hill, slope - 40 * hill * off
+    return float(value), slope
+
+
+def test_the_search_finds_the_highest_of_several_hills() -> None:
+    options = SearchOptions(samples=16, ascents=3, evaluations=20)
+    found = search_worst(lambda at: bell(at)[0], bell, PUSHED, options)
+    assert len(found) == 3
+    assert found[0].loss == pytest.approx(2.0, abs=1e-3)
+    np.testing.assert_allclose(found[0].place, [0.8, 0.7], atol=1e-2)
+
+
+def test_a_load_that_cannot_be_simulated_is_avoided(caplog: pytest.LogCaptureFixture) -> None:
+    def half(place: Floats) -> tuple[float, Floats]:
+        if place[0] > 0.75:
+            raise SimulationError("no step is short enough")
+        return bell(place)
+
+    found = ascend(half, np.array([0.6, 0.6]), 20)
+    assert bell(np.array([0.6, 0.6]))[0] < found.loss < 2.0
+    assert found.place[0] <= 0.75
+    assert "no step is short enough" in caplog.text
+
+
+def test_places_are_spread_alike_each_time() -> None:
+    places = spread_places(SHAKEN, 11, 3)
+    np.testing.assert_array_equal(places, spread_places(SHAKEN, 11, 3))
+    assert places.shape == (11, 3)
+    assert places.min() >= 0.0
+    assert (np.histogram(places[:, 0], 2, (0, 1))[0] >= 4).all()
+
+
+def test_directions_that_the_symmetry_repeats_are_left_out() -> None:
+    folded = without_copies(SHAKEN, scene().updated(symmetry="C4"))
+    assert folded.direction == (0.0, np.pi / 2)
+    assert without_copies(SHAKEN, scene()) == SHAKEN
+
+
+def minimised(
+    journal: Journal | None = None, callback: Callable[[Evaluation], None] | None = None
+) -> Result:
+    posed = scene(samples=21, accuracy="draft", symmetry="C4")
+    search = SearchOptions(samples=4, ascents=1, evaluations=4)
+    return minimise_worst(
+        posed,
+        SHAKEN,
+        Limits(edge_length=3.0, block_angle=0.5, void_angle=0.0, gap=0.2),
+        sqp=SqpOptions(evaluations=8, radius=0.5),
+        options=FamilyOptions(evaluations=4, search=search),
+        journal=journal,
+        callback=callback,
+    )
+
+
+class KilledError(Exception):
+    """Ends a run."""
+
+
+def kill(evaluation: Evaluation) -> None:
+    if evaluation.number == 5:
+        raise KilledError
+
+
+def test_the_worst_loss_is_minimised_and_resumed(tmp_path: Path) -> None:
+    """The drive's own loads, at 5 Hz, do not tell of the worst one."""
+    with Journal(tmp_path / "j", "key") as journal, pytest.raises(KilledError):
+        minimised(journal, kill)
+    with Journal(tmp_path / "j", "key") as journal:
+        result = minimised(journal)
+        assert journal.replayed > 6  # the searches' too
+    np.testing.assert_array_equal(result.x, minimised().x)
+    assert [each.number for each in result.evaluations] == list(range(8))
+    first, best = result.evaluations[0], result.evaluations[result.best]
+    np.testing.assert_array_equal(best.x, result.x)
+    assert len(first.aux) > 4  # the drive's own four, and those found
+    assert first.aux[4:].max() > first.aux[:4].max()
+    assert best.aux.max() < 0.7 * first.aux.max()
