@@ -21,6 +21,8 @@ def design_scene(asked: Problem, folder: Path) -> Scene:
         UserError: the file of a measured drive cannot be read.
     """
     robust, scene = asked.objective.robust, scene_of(asked, folder)
+    if asked.objective.reaction is not None:
+        scene = scene.updated(reaction=asked.objective.reaction)
     if robust is None:
         return scene
     copies = _copies(robust, scene) if robust.copies else None

@@ -72,6 +72,49 @@ class RelativeMimicking(NamedTuple):
         return jnp.sqrt(jnp.einsum("ctud,ctud,t->c", missed, missed, self.weights)) / self.size
 
 
+class ReactionMimicking(NamedTuple):
+    """Adds the relative error of the drive's force to that of the motion.
+
+    The force is what the ligaments of the driven units carry to the others: contact on void angles
+    turns units and pushes none.
+
+    Attributes:
+        motion: error of the motion.
+        weight: of the force's error in the sum.
+        ligaments: (n,) that join a driven unit to one that is not.
+        ligament_units: (n, 2) units that they join.
+        sign: (n,) 1 where the first of both is driven, else -1.
+        target: (n_cases, n_times, 2) force to mimic, N.
+        size: (n_cases,) what counts as 1, N.
+    """
+
+    motion: RelativeMimicking
+    weight: float
+    ligaments: Ints
+    ligament_units: Ints
+    sign: Ints
+    target: Numbers
+    size: Numbers
+
+    def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
+        missed = self.force(displacement, parameters) - self.target
+        squares = jnp.einsum("ctd,ctd,t->c", missed, missed, self.motion.weights)
+        return self.motion(displacement, parameters) + self.weight * jnp.sqrt(squares) / self.size
+
+    def force(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
+        """Force (n_cases, n_times, 2) of the drive in states (n_cases, n_times, n_units, 3), N."""
+        ends = jnp.asarray(displacement)[..., self.ligament_units, :]
+        arm, vector = parameters.arm[self.ligaments], parameters.vector[self.ligaments]
+        law, natural = LigamentLaw(*parameters.law[self.ligaments].T), parameters.natural
+        flat = ends.reshape(-1, *ends.shape[-3:])
+        pulls = _end_forces(
+            flat[:, :, 0], flat[:, :, 1], arm[:, 0], arm[:, 1], vector, law, natural[self.ligaments]
+        )
+        total = jnp.einsum("sld,l->sd", pulls[..., :2], self.sign)
+        return total.reshape(*ends.shape[:2], 2)
+
+
 def combined(losses: Array, weights: Numbers, sharpness: float) -> Array:
     """Takes the weighted p-mean of losses (n_cases,): their mean for 1, the largest for large p."""
     if sharpness == 1.0:
@@ -149,6 +192,9 @@ def strain_energies(
     flat = _energies(*ends, arm[:, 0], arm[:, 1], vector, law, natural)
     return flat.reshape(first.shape[:-1])
 
+
+_end_forces = jax.jit(jax.vmap(jax.vmap(jax.grad(ligament_energy)), in_axes=(0, 0, *(None,) * 5)))
+"""Derivatives (n_states, n, 3) of their energies by the motion of the first end's unit."""
 
 _energies = jax.jit(jax.vmap(jax.vmap(ligament_energy), in_axes=(0, 0, *(None,) * 5)))
 """Energies (n_states, n) of the ligaments between units in states (n_states, n, 3)."""

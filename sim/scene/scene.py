@@ -133,6 +133,7 @@ class Objective:
         steps: number of equal load steps that it is taken at instead; the start is none of them.
         reference: the scene whose region should move alike, its units in the same order; None to
             compare with rest.
+        reaction: weight of the relative error of the drive's force, where a reference is mimicked.
         sharpness: p of the weighted p-mean of the cases' losses that is minimised: 1 is their mean,
             a large one a smooth maximum.
         snap_margin: smallest eigenvalue of the tangent that a design must keep at all loads of a
@@ -146,6 +147,7 @@ class Objective:
     samples: int = 201
     steps: int | None = None
     reference: Scene | None = None
+    reaction: float = 0.0
     sharpness: float = 1.0
     snap_margin: float | None = None
     foil: FoilLimit | None = None

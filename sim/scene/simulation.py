@@ -12,10 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.core import Floats, Numbers
+from sim.core import Floats, Ints, Numbers
 from sim.energy import Observables, observe
 from sim.scene.objectives import (
     DisplacementMimicking,
+    ReactionMimicking,
     RelativeMimicking,
     StrainEnergyMimicking,
     combined,
@@ -28,7 +29,7 @@ from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cas
 from sim.structure import Parameters, parameters, shape
 from sim.time_integration import simpson_weights
 
-Mimicking = DisplacementMimicking | RelativeMimicking | StrainEnergyMimicking
+Mimicking = DisplacementMimicking | RelativeMimicking | ReactionMimicking | StrainEnergyMimicking
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,7 @@ def mimicking(
         scene: the scene.
         target: (n_cases, n_times, n_region, 3) what ``target_motion`` returned; it is simulated
             anew if a scene with a reference comes without.
-        weights: (n_times,) of other samples than the scene's own.
+        weights: (n_times,) of other samples than the scene's own; without the drive's force.
 
     Raises:
         ValueError: the scene has no region of interest.
@@ -199,7 +200,27 @@ def mimicking(
     aim = target_motion(scene) if target is None else target
     size = extent(aim, lattice.spacing)
     whole = size.max(axis=1) if asked.steps is None else size[:, -1] / np.sqrt(asked.steps)
-    return RelativeMimicking(asked.region, lattice.spacing, given, aim, whole)
+    motion = RelativeMimicking(asked.region, lattice.spacing, given, aim, whole)
+    return _with_reaction(scene, motion) if asked.reaction else motion
+
+
+def _with_reaction(scene: Scene, motion: RelativeMimicking) -> ReactionMimicking:
+    """Adds the force of the drive to a motion to mimic; simulates the reference for it."""
+    intact, asked = scene.objective.reference, scene.objective
+    assert intact is not None
+    of_intact = ReactionMimicking(motion, 1.0, *_cut(intact), np.zeros(2), np.ones(1))
+    moved = simulate(intact, vertices=intact.lattice.vertices)
+    target = np.asarray(of_intact.force(moved.displacement, moved.parameters))
+    size = np.linalg.norm(target, axis=2)
+    whole = size.max(axis=1) if asked.steps is None else size[:, -1] / np.sqrt(asked.steps)
+    return ReactionMimicking(motion, asked.reaction, *_cut(scene), target, whole)
+
+
+def _cut(scene: Scene) -> tuple[Ints, Ints, Ints]:
+    """Finds the ligaments between driven units and others, their units, and signs by the order."""
+    driven = np.isin(scene.lattice.ligament_units, scene.loads.driven)
+    cut = np.flatnonzero(driven[:, 0] != driven[:, 1])
+    return cut, scene.lattice.ligament_units[cut], np.where(driven[cut, 0], 1, -1)
 
 
 def _weights(scene: Scene) -> Floats:

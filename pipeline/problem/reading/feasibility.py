@@ -136,6 +136,18 @@ def _robust(problem: Problem) -> Findings:
         yield ProblemFault(what, ("objective", "robust", "loads"), "leave them out")
 
 
+def _reaction(problem: Problem) -> Findings:
+    objective, place = problem.objective, ("objective", "reaction")
+    if objective.reaction is None:
+        return
+    if objective.target == "rest":
+        what = "a structure at rest has no force of the drive to mimic"
+        yield ProblemFault(what, place, "leave it out, or give target: intact")
+    if objective.loads is not None:
+        what = "over loads in ranges motions alone are mimicked"
+        yield ProblemFault(what, place, "leave out one of the two")
+
+
 def _loads(problem: Problem) -> Findings:
     """Finds what a family of loads cannot be of, or cannot be minimised over."""
     objective, drive = problem.objective, problem.drive
@@ -318,6 +330,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _drive_is_free,
     _horizon,
     _robust,
+    _reaction,
     _loads,
     _void,
     _inclusion,

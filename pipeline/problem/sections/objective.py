@@ -92,6 +92,8 @@ class ObjectiveSection(Section):
         kind: what is compared: displacements and rotations, or the strain energy.
         target: stay at rest, or do as in the intact lattice.
         region: the units that are looked at; `surroundings` are all but void, inclusion and cloak.
+        reaction: weight of the relative error of the drive's force, added to that of the motion,
+            where the intact lattice is mimicked; none by default.
         robust: what else the design is to hold against, if anything.
         loads: all loads that it is to hold against, in ranges; in place of `robust`.
         snap: whether a static structure may snap to another branch of equilibria on its way, or is
@@ -103,6 +105,7 @@ class ObjectiveSection(Section):
     kind: Literal["displacement", "strain_energy"]
     target: Literal["rest", "intact"]
     region: Literal["surroundings"] | Region = "surroundings"
+    reaction: Positive | None = None
     robust: Robust | None = None
     loads: LoadRanges | None = None
     snap: Literal["allow", "avoid"] = "allow"

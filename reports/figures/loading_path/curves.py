@@ -163,7 +163,14 @@ def contraction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
 
 def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     """Draws force of the drive, and of the load cell where there is one."""
-    _plain_panel(axes, study.problem, path, measures.reaction(study.response), "force (N)")
+    force = measures.reaction(study.response)
+    _plain_panel(axes, study.problem, path, force, "force (N)")
+    if "intact" in structures(study.response) and path.static:
+        off = measures.reaction_error(over_cases(study.problem, force)).sel(structure="cloaked")
+        axes.text(
+            0.97, 0.05, f"cloaked off by {float(off):.1%}", color=style.CLOAKED,
+            transform=axes.transAxes, ha="right", fontsize=style.SMALL,
+        )  # fmt: skip
     if path.static:
         _eigenvalues(axes, study, path)
     measured.forces(axes, study)

@@ -257,7 +257,8 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields force of the drive at the end of the path."""
     if not path.static:
         return
-    force = over_cases(study.problem, measures.reaction(study.response)).isel(time=-1)
+    whole = over_cases(study.problem, measures.reaction(study.response))
+    force = whole.isel(time=-1)
     note = f"on the driven units, along the drive, at {path.at(-1)}"
     for name in structures(study.response):
         label = f"Reaction, {display_name(study.problem, name).lower()}"
@@ -266,6 +267,12 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         yield from _each_load(
             study, f"reaction_{name}", "Reaction", measures.reaction(study.response), name, "N"
         )
+    if "intact" in structures(study.response):
+        note = "root mean square along the path, over the intact lattice's at its end"
+        off = measures.reaction_error(whole)
+        for name in ("altered", "cloaked"):
+            label = f"Reaction, {display_name(study.problem, name).lower()}, off the intact by"
+            yield share(f"reaction_error_{name}", label, float(off.sel(structure=name)), note=note)
 
 
 def robustness_facts(study: StudyResults) -> Iterator[Fact]:

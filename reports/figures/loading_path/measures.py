@@ -109,3 +109,14 @@ def reaction(response: xr.Dataset) -> xr.DataArray:
     angle = np.radians(response["direction"])
     along: xr.DataArray = np.cos(angle) * total.sel(dof="ux") + np.sin(angle) * total.sel(dof="uy")
     return along.transpose("structure", "case", "time")
+
+
+def reaction_error(force: xr.DataArray) -> xr.DataArray:
+    """Computes how far forces of structures are off the intact one's, relative to its last.
+
+    Args:
+        force: (structure, time) of `reaction`, N; root mean squares are over the time.
+    """
+    intact = force.sel(structure="intact")
+    off: xr.DataArray = np.sqrt(((force - intact) ** 2).mean("time")) / abs(intact.isel(time=-1))
+    return off

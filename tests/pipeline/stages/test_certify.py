@@ -76,6 +76,7 @@ def test_only_loads_in_ranges_are_certified(
         ({"objective": {"loads": {"sharpness": 0.5}}}, "objective.loads.sharpness"),
         ({"objective": {"robust": {"copies": 2}}}, "objective.robust"),
         ({"optimiser": {"methods": {"mma": {"evaluations": 3}}}}, "optimiser.methods.mma"),
+        ({"objective": {"reaction": 1}}, "objective.reaction"),
         ({"horizon": {"periods": None, "duration": "1 s"}}, "horizon.duration"),
         (
             {

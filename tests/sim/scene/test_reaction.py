@@ -1,0 +1,44 @@
+"""The force of the drive as part of what is mimicked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sim.scene import Evaluator, Scene, make_plan, mimicking, simulate
+from tests.sim.scene.test_load_family import mimicked
+from tests.sim.scene.test_plan import design_of
+
+
+def posed(reaction: float = 0.5) -> Scene:
+    return mimicked().updated(reaction=reaction)
+
+
+def test_the_force_of_the_cut_ligaments_is_that_of_the_drive() -> None:
+    scene = posed()
+    response = simulate(scene, design_of(scene, 0.2))
+    measure = mimicking(scene)
+    force = measure.force(response.displacement, response.parameters)  # type: ignore[union-attr]
+    np.testing.assert_allclose(force, response.drive_force, rtol=1e-9, atol=1e-9)
+    intact = simulate(scene.objective.reference).drive_force  # type: ignore[arg-type]
+    np.testing.assert_allclose(measure.target, intact, rtol=1e-9, atol=1e-9)  # type: ignore[union-attr]
+
+
+def test_the_loss_is_the_sum_of_both_errors_and_its_gradient_exact() -> None:
+    scene = posed()
+    design = design_of(scene, 0.2)
+    evaluate = Evaluator(scene, make_plan(scene))
+    value, gradient, _ = evaluate(design)
+    alone = Evaluator(scene.updated(reaction=0.0), make_plan(scene))(design)[0]
+    forces = [
+        simulate(one).drive_force if x is None else simulate(one, x).drive_force
+        for one, x in ((scene, design), (scene.objective.reference, None))
+    ]
+    missed, size = np.linalg.norm(forces[0] - forces[1]), np.linalg.norm(forces[1][0, -1])
+    assert value == pytest.approx(alone + 0.5 * missed / size, rel=1e-9)
+    way = gradient / np.linalg.norm(gradient)
+    errors = []
+    for step in (2e-3, 1e-3):
+        ahead = evaluate(design + step * way)[0]
+        errors.append(abs(ahead - value - step * gradient @ way))
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)  # Taylor
