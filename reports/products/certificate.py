@@ -19,7 +19,7 @@ _COLUMNS = (
 )  # fmt: skip
 _COLOURS = {"cloaked": style.CLOAKED, "study": style.GREY}
 _NAMES = {"cloaked": "this design", "study": "the study's own design"}
-_TOP, _HIGH = 16.0, 55.0
+_TOP, _HIGH = 13.0, 55.0
 
 
 def report(args: argparse.Namespace) -> None:
