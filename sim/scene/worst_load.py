@@ -16,10 +16,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sim.constraints import ConstraintVector, Limits
+from sim.constraints import Limits
 from sim.core import Floats, SimulationError
 from sim.optimise import Evaluate, Evaluation, Journal, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
+from sim.scene.evaluation import constraints_of
 from sim.scene.load_family import LoadFamily, LoadLosses
 from sim.scene.objectives import combined
 from sim.scene.plan import make_plan
@@ -263,7 +264,7 @@ def minimise_worst(
     Args:
         scene: the scene, whose load cases are the drive's own loads.
         family: the loads.
-        limits: what a design must keep to.
+        limits: what a design must keep to; on paths and of foil, under the drive's own loads.
         start: (n_variables,) design vector, mm; by default the initial structure.
         sqp: of the descents; its evaluations are those of all of them, without the searches.
         options: of the minimisation.
@@ -278,7 +279,7 @@ def minimise_worst(
     held = _LoadSet(losses, scene, options)
     wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
     search, evaluate = _Search(losses, wrap, options.search), wrap(held)
-    constraints = ConstraintVector(scene.space, limits)
+    constraints = constraints_of(scene, make_plan(scene), limits)
     x = np.zeros(scene.space.n_variables) if start is None else start
     history: list[Evaluation] = []
     best: tuple[float, Result] | None = None
