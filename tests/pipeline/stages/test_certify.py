@@ -13,6 +13,7 @@ from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import UserError
 from pipeline.stages import certify
 from reports.__main__ import main
+from sim.scene import LoadLosses
 
 FAMILY = {
     "objective": {"loads": {"directions": ["0 deg", "180 deg"], "frequency": ["1 Hz", "8 Hz"]}},
@@ -48,7 +49,7 @@ def test_a_design_is_made_and_certified(
     assert (data["load_amplitude"] == 4.5).all()
     assert data["found_loss"].max() >= 0.999 * data["loss"].max() > data["nominal_loss"]
     before = out.read_bytes()
-    monkeypatch.setattr(certify.LoadLosses, "value", None)  # the journal has them all
+    monkeypatch.setattr(LoadLosses, "value", None)  # the journal has them all
     assert run_stage("certify", certified) == 0
     assert out.read_bytes() == before
 
