@@ -166,7 +166,7 @@ def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     force = measures.reaction(study.response)
     _plain_panel(axes, study.problem, path, force, "force (N)")
     if "intact" in structures(study.response) and path.static:
-        off = measures.reaction_error(over_cases(study.problem, force)).sel(structure="cloaked")
+        off = over_cases(study.problem, measures.reaction_error(force)).sel(structure="cloaked")
         axes.text(
             0.97, 0.05, f"cloaked off by {float(off):.1%}", color=style.CLOAKED,
             transform=axes.transAxes, ha="right", fontsize=style.SMALL,

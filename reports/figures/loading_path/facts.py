@@ -257,19 +257,17 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     """Yields force of the drive at the end of the path."""
     if not path.static:
         return
-    whole = over_cases(study.problem, measures.reaction(study.response))
-    force = whole.isel(time=-1)
+    every = measures.reaction(study.response)
+    force = over_cases(study.problem, every).isel(time=-1)
     note = f"on the driven units, along the drive, at {path.at(-1)}"
     for name in structures(study.response):
         label = f"Reaction, {display_name(study.problem, name).lower()}"
         value = float(force.sel(structure=name))
         yield number(f"reaction_{name}", label, value, "N", digits=3, note=note)
-        yield from _each_load(
-            study, f"reaction_{name}", "Reaction", measures.reaction(study.response), name, "N"
-        )
+        yield from _each_load(study, f"reaction_{name}", "Reaction", every, name, "N")
     if "intact" in structures(study.response):
         note = "root mean square along the path, over the intact lattice's at its end"
-        off = measures.reaction_error(whole)
+        off = over_cases(study.problem, measures.reaction_error(every))
         for name in ("altered", "cloaked"):
             label = f"Reaction, {display_name(study.problem, name).lower()}, off the intact by"
             yield share(f"reaction_error_{name}", label, float(off.sel(structure=name)), note=note)

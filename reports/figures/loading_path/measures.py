@@ -115,7 +115,7 @@ def reaction_error(force: xr.DataArray) -> xr.DataArray:
     """Computes how far forces of structures are off the intact one's, relative to its last.
 
     Args:
-        force: (structure, time) of `reaction`, N; root mean squares are over the time.
+        force: (structure, case, time) of `reaction`, N; root mean squares are over the time.
     """
     intact = force.sel(structure="intact")
     squares: xr.DataArray = ((force - intact) ** 2).mean("time")
