@@ -32,8 +32,10 @@ LOG = logging.getLogger(__name__)
 
 FOUND = 1.05
 """Loss of a load found, over the worst in the set, up to which the set stands for the family."""
-HARMLESS = 0.6
-"""Loss, over the worst in the set, below which a load leaves it."""
+HARMLESS, IDLE = 0.6, 3
+"""Loss, over the worst, below which a load does no harm; searches in a row of which it leaves."""
+RESTARTS = 3
+"""Evaluations between two searches, over those asked for, where descents start again."""
 APART = 0.02
 """Distance of two places along an axis of the unit cube below which they are one load."""
 
@@ -192,7 +194,7 @@ class _Search:
         return search_worst(value, loss, self._family, self._options, known)
 
 
-class _LoadSet:
+class LoadSet:
     """Computes what is minimised: the p-mean of the losses under a set of loads.
 
     Args:
@@ -207,6 +209,7 @@ class _LoadSet:
         motions = [scene.loads.motions[case] for case in simulated]
         self.own = np.array([losses.family.place(_directed(motion)) for motion in motions])
         self.added = np.zeros((0, losses.family.size))
+        self._idle = np.zeros(0, dtype=np.int64)
         self._losses, n_own = losses, len(self.own)
         weights = jnp.asarray(np.bincount(self._own_of, scene.loads.case_weights))
 
@@ -231,13 +234,16 @@ class _LoadSet:
         return float(value), gradient, np.append(each[self._own_of], each[len(self.own) :])
 
     def exchange(self, losses: Floats, found: Sequence[FoundLoad]) -> None:
-        """Adds loads found, and removes those that do no harm by their losses (n_added,)."""
+        """Adds loads found, and removes those that did no harm for long by losses (n_added,)."""
         least = HARMLESS * max([found[0].loss, *losses])
-        self.added = self.added[losses >= least]
+        self._idle = np.where(losses < least, self._idle + 1, 0)
+        kept = self._idle < IDLE
+        self.added, self._idle = self.added[kept], self._idle[kept]
         for one in found:
             near = any(np.abs(one.place - other).max() < APART for other in self.places)
             if one.loss >= least and not near:
                 self.added = np.concatenate([self.added, one.place[None]])
+                self._idle = np.append(self._idle, 0)
 
 
 def _directed(motion: MotionLaw) -> DIRECTED:
@@ -276,7 +282,7 @@ def minimise_worst(
         SimulationError: the start cannot be simulated.
     """
     losses = LoadLosses(scene, without_copies(family, scene), parameters_of_design(scene))
-    held = _LoadSet(losses, scene, options)
+    held = LoadSet(losses, scene, options)
     wrap: Callable[[Evaluate], Evaluate] = (lambda f: f) if journal is None else journal.wrap
     search, evaluate = _Search(losses, wrap, options.search), wrap(held)
     constraints = constraints_of(scene, make_plan(scene), limits)
@@ -295,7 +301,8 @@ def minimise_worst(
         first = len(history)
         # new starts from inside the feasible set are for a set that stands for the family
         brief = replace(sqp, evaluations=min(left, options.evaluations), retreats=0)
-        descent = replace(sqp, evaluations=left) if stands else brief
+        longer = replace(sqp, evaluations=min(left, RESTARTS * options.evaluations))
+        descent = longer if stands else brief
         result = minimise_loss("sqp", evaluate, constraints, x, options=descent, callback=record)
         x, known = result.x, float(result.aux.max())
         found = search(x, held.places)

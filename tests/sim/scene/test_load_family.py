@@ -13,6 +13,7 @@ from sim.core import Floats, SimulationError
 from sim.optimise import Evaluation, Journal, Result, SqpOptions
 from sim.scene import (
     FamilyOptions,
+    FoundLoad,
     LoadFamily,
     LoadLosses,
     Scene,
@@ -23,7 +24,7 @@ from sim.scene import (
     simulate,
     spread_places,
 )
-from sim.scene.worst_load import search_worst, without_copies
+from sim.scene.worst_load import IDLE, LoadSet, search_worst, without_copies
 from sim.solvers import Harmonic, LinearRamp
 from tests.sim.scene.test_plan import design_of, scene
 
@@ -135,6 +136,20 @@ def test_directions_that_the_symmetry_repeats_are_left_out() -> None:
     folded = without_copies(SHAKEN, scene().updated(symmetry="C4"))
     assert folded.direction == (0.0, np.pi / 2)
     assert without_copies(SHAKEN, scene()) == SHAKEN
+
+
+def test_a_load_leaves_the_set_when_it_did_no_harm_for_long() -> None:
+    posed = scene(samples=21, accuracy="draft")
+    losses = LoadLosses(posed, SHAKEN, parameters_of_design(posed))
+    held = LoadSet(losses, posed, FamilyOptions())
+    one, other = np.full(3, 0.2), np.full(3, 0.9)
+    held.exchange(np.zeros(0), [FoundLoad(one, 1.0, one), FoundLoad(one + 0.01, 0.9, one)])
+    np.testing.assert_array_equal(held.added, [one])
+    held.exchange(np.array([0.1]), [FoundLoad(other, 1.0, one)])
+    for _ in range(IDLE - 1):
+        np.testing.assert_array_equal(held.added, [one, other])
+        held.exchange(np.array([0.1, 1.0]), [FoundLoad(other, 1.0, one)])
+    np.testing.assert_array_equal(held.added, [other])
 
 
 def minimised(
