@@ -27,7 +27,11 @@ rule certificate_page:
         certificate="results/{name}{preset}/certificate.nc",
     output:
         multiext(
-            "results/{name}{preset}/certificate/certificate", ".pdf", ".svg", ".png", ".csv"
+            "results/{name}{preset}/certificate/certificate",
+            ".pdf",
+            ".svg",
+            ".png",
+            ".csv",
         ),
         "results/{name}{preset}/certificate/searches.csv",
         page="results/{name}{preset}/certificate/index.html",
