@@ -23,6 +23,7 @@ from .start_design import start_vector as start_vector
 from .structure_variables import CLAMPED as CLAMPED
 from .structure_variables import DRIVEN as DRIVEN
 from .structure_variables import Variables as Variables
+from .structure_variables import design_hash as design_hash
 from .structure_variables import flat_vertices as flat_vertices
 from .structure_variables import network_variables as network_variables
 from .structure_variables import read_design as read_design

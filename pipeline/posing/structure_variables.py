@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,12 @@ def network_variables(problem: Problem, scene: Scene) -> Variables:
         "ligament_unit": (("ligament", "end"), intact.ligament_units),
         "ligament_vertex": (("ligament", "end"), local),
     }
+
+
+def design_hash(design: xr.Dataset) -> str:
+    """Hashes the vertices of a design to their last bit: the first 16 hex digits of SHA-256."""
+    values = np.ascontiguousarray(design["vertices"].transpose("unit", "vertex", "xy"), "<f8")
+    return hashlib.sha256(values.tobytes()).hexdigest()[:16]
 
 
 def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:

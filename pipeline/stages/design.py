@@ -104,11 +104,13 @@ def _descend(
 ) -> Result:
     """Optimises with one seed; a design for contact on distance first by the angle law, if asked.
 
-    What the angle law lets overlap on its way ends in better designs than the distance would.
+    That may overlap and snap on its way, and ends in better designs than what may not.
     """
     first, (source, results) = asked.optimiser.angle, (args.problem, args.out.parent)
     if first is not None and asked.contact.law == "geometric" and args.method == "sqp":
         by_angle = law_comparison.under(asked, "angle").with_optimiser(methods=Methods(sqp=first))
+        free = asked.objective.model_copy(update={"snap": "allow"})
+        by_angle = by_angle.model_copy(update={"objective": free})
         other = design_scene(by_angle, source.parent)
         LOG.info("first by the angle law")
         start = optimise(by_angle, other, _plan(other, args), "sqp", source, results, start).x

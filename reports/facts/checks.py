@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
+from pipeline.posing import design_hash
 from pipeline.problem import Problem
 from reports.facts import foil, measures
-from reports.facts.fact_records import Fact, number, percent, within
+from reports.facts.fact_records import Fact, number, percent, within, worded
 from reports.study import RigidUnits
+from sim.core import instruction_set
 
 JUMPED = 2
 """Least flag of a stable state that the path came to by a jump or on a branch."""
@@ -24,8 +27,12 @@ _MARGINS = {
 }
 
 
-def history_facts(design: xr.Dataset) -> Iterator[Fact]:
-    """Yields evaluations, best feasible loss and optimality of every method."""
+def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
+    """Yields evaluations, best feasible loss and optimality of every method, and of descents."""
+    first = problem.optimiser.angle
+    if first is not None and problem.contact.law == "geometric":
+        note = "by the angle law of contact; those below start from there, with contact on distance"
+        yield number("evaluations_angle", "First, SQP: at most", first.evaluations, note=note)
     for method in design["method"].values:
         history = design.sel({"method": method})
         loss = history["loss"].values
@@ -43,6 +50,12 @@ def history_facts(design: xr.Dataset) -> Iterator[Fact]:
         yield number(f"violation_{method}", label, violation, digits=2, note="scaled; 0: feasible")
         residual = float(history["kkt_residual"])
         yield number(f"kkt_{method}", f"KKT residual, {name}", residual, digits=2)
+    losses = json.loads(design.attrs["plan"]).get("descents", [])
+    if len(losses) > 1:
+        unit, label = design["best_loss"].attrs["units"], f"Losses of {len(losses)} descents"
+        words = f"{worded(min(losses), unit, 3)} to {worded(max(losses), unit, 3)}"
+        note = "with other seeds; the best is shipped"
+        yield Fact("descents", label, max(losses) / min(losses), "1", words, note=note)
 
 
 def error_facts(response: xr.Dataset, note: str) -> Iterator[Fact]:
@@ -63,7 +76,7 @@ def bias_fact(initial: RigidUnits) -> Fact:
 
 
 def design_facts(design: xr.Dataset) -> Iterator[Fact]:
-    """Yields margins of the constraints, gaps and overlaps of the design at rest."""
+    """Yields margins of the constraints, gaps, overlaps and hash of the design at rest."""
     margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
     for name, margin in margins:
         label = f"{_MARGINS[str(name)]}: margin to the bound"
@@ -74,6 +87,11 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     rest, gap = "at rest, by geometry", float(design["smallest_gap"])
     yield number("gap", "Smallest gap between units", gap, "mm", digits=3, note=rest)
     yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)
+    found = json.loads(design.attrs["packages"])["instructions"]
+    note = f"of its vertices; the same on every processor with {instruction_set.LEVEL}"
+    if found != instruction_set.LEVEL:
+        note = f"of its vertices; by the instructions {found}, elsewhere it may be another design"
+    yield Fact("design_hash", "Hash of the design", np.nan, "1", design_hash(design), note=note)
 
 
 def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:

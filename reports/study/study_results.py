@@ -134,15 +134,11 @@ def load(
         )
     read = {name: datasets.read(files[name], cast(Kind, REPORTED[name].kind)) for name in wanted}
     for name, data in read.items():
-<<<<<<< HEAD
         posed = chosen
         if name == "geometric_response":
-            posed = law_comparison.geometric(chosen)
+            posed = law_comparison.under(chosen, "geometric")
         elif name == "constants":
             posed = problem.over_measured_constants(chosen, path.parent)
-=======
-        posed = law_comparison.under(chosen, "geometric") if name == "geometric_response" else chosen
->>>>>>> 2793070 (Ship static designs that obey contact on distance)
         check_problem(posed, REPORTED[name].name, data, files[name])
     compared = {file.parent.name: _comparison(chosen, file) for file in comparisons}
     return StudyResults(

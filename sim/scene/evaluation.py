@@ -20,7 +20,7 @@ from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
-from sim.scene.path_constraints import PathConstraints
+from sim.scene.path_constraints import PathConstraints, check_unsnapped
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.simulation import mimicking, parameters_of_design
@@ -214,7 +214,8 @@ def minimise(
     Args:
         scene: the scene, with an objective and a design.
         limits: what a design must keep to.
-        start: (n_variables,) design vector, mm; by default the initial structure.
+        start: (n_variables,) design vector, mm; by default the initial structure. One that snaps
+            where it is not to is drawn back towards that.
         options: of the method, which they choose; by default SQP with its own.
         plan: of `make_plan`; by default one from the initial structure.
         journal: of evaluations, from which an interrupted run resumes exactly.
@@ -226,7 +227,10 @@ def minimise(
         SimulationError: the start cannot be simulated.
     """
     made = plan or make_plan(scene)
-    computed = Evaluator(scene, made, paths)
+    computed, constraints = Evaluator(scene, made, paths), constraints_of(scene, made, limits)
+    begin = np.zeros(scene.space.n_variables) if start is None else start
+    if isinstance(constraints, PathConstraints):
+        begin = constraints.drawn_back(begin)
 
     def record(evaluation: Evaluation) -> None:
         if paths is not None:
@@ -237,8 +241,8 @@ def minimise(
     result = minimise_loss(
         "mma" if isinstance(options, MmaOptions) else "sqp",
         computed if journal is None else journal.wrap(computed),
-        constraints_of(scene, made, limits),
-        np.zeros(scene.space.n_variables) if start is None else start,
+        constraints,
+        begin,
         options=options,
         callback=record,
         confirm=_from_rest(scene, made),
@@ -287,12 +291,31 @@ def constraints_of(scene: Scene, plan: Plan, limits: Limits) -> ConstraintVector
 def _from_rest(scene: Scene, plan: Plan) -> Evaluator | None:
     """Evaluates by a path followed anew, over the loads of the plan; None of a motion in time.
 
-    A path that starts from that of a similar design may pass where it should end.
+    A path that starts from that of a similar design may pass where it should end. Where the design
+    is to avoid snaps, one on that path is an error.
     """
     if not isinstance(plan.solver, StaticSolver):
         return None
+    memory = None if scene.objective.snap_margin is None else _Unsnapped(scene.loads.duration)
     if plan.passed is None:
-        return Evaluator(scene, replace(plan, solver=replace(plan.solver, substeps=CONFIRMING)))
+        finer = replace(plan.solver, substeps=CONFIRMING)
+        return Evaluator(scene, replace(plan, solver=finer), memory)
     solver = replace(plan.solver, output_times=plan.passed)
     at = np.searchsorted(plan.passed, sample_times(scene) * (1 - 1e-9))
-    return Evaluator(scene, replace(plan, solver=solver), at=at)
+    return Evaluator(scene, replace(plan, solver=solver), memory, at=at)
+
+
+class _Unsnapped:
+    """Remembers nothing, and refuses a path on which the structure snaps (``Memory``)."""
+
+    def __init__(self, load: float) -> None:
+        self._load = load
+
+    def start(self) -> None:
+        """See ``Memory``."""
+
+    def keep(self, design: Floats, records: Sequence[StaticRecord]) -> None:
+        """Raises SimulationError where the structure snaps."""
+        del design
+        for record in records:
+            check_unsnapped(record, self._load)

@@ -27,6 +27,25 @@ Slope = tuple[float, ConcreteParameters]
 """A constraint value, and its derivatives by all parameters."""
 
 
+SHARES = np.linspace(1.0, 0.1, 10)
+"""Of a start that snaps, the larger ones first, that may serve in its place."""
+
+
+def check_unsnapped(record: StaticRecord, load: float) -> None:
+    """Checks that a path goes on without a snap.
+
+    Args:
+        record: of the path.
+        load: parameter of the full load.
+
+    Raises:
+        SimulationError: the structure snaps.
+    """
+    if record.jumped.any():
+        share = np.nanmin(record.snapped) / load
+        raise SimulationError(f"the structure snaps at {share:.4g} of the load")
+
+
 class PathConstraints:
     """Evaluates what a design must keep to, at rest and under its loads.
 
@@ -82,6 +101,16 @@ class PathConstraints:
         values, slopes = self._under_load(design)
         return np.append(geometric, values), sp.csr_array(sp.vstack([jacobian, slopes]))
 
+    def drawn_back(self, start: Floats) -> Floats:
+        """Shortens a design vector until its structure does not snap."""
+        for share in SHARES:
+            try:
+                self(share * start)
+            except SimulationError:
+                continue
+            return np.asarray(share * start)
+        return np.zeros_like(start)
+
     def named(self, number: int) -> tuple[str, str]:
         """Names the kind of one of the values, and what it is about."""
         if number < self.geometry.n_constraints:
@@ -112,15 +141,10 @@ class PathConstraints:
         if self.bound is None:
             return
         for record in records.records:
-            self._refuse_snaps(record)
+            check_unsnapped(record, self._solver.output_times[-1])
             for state in record.states:
                 value, bar = eigenvalue_and_slopes(record.topology, values, state)
                 yield value / self.bound - 1.0, Parameters(*(part / self.bound for part in bar))
-
-    def _refuse_snaps(self, record: StaticRecord) -> None:
-        if record.jumped.any():
-            load = np.nanmin(record.snapped) / self._solver.output_times[-1]
-            raise SimulationError(f"the structure snaps at {load:.4g} of the load")
 
     def _strains(
         self, values: ConcreteParameters, motion: Floats, records: Records

@@ -36,17 +36,6 @@ def build(problem: Path, preset: str | None, folder: Path) -> Built:
     return Built(datasets.read(shipped, "design"), datasets.read(response, "response"))
 
 
-def build_again(problem: Path, preset: str | None, folder: Path) -> Built:
-    """The design for contact on distance of a study that was built in the folder."""
-    study = _options(problem, preset)
-    first = ["--design", str(folder / "design.nc"), "--response", str(folder / "response.nc")]
-    second, response = folder / "geometric_design.nc", folder / "geometric_response.nc"
-    assert run_stage("redesign", [*study, *first, "--out", str(second)]) == 0
-    moved = ["--design", str(second), "--geometric", "--out", str(response)]
-    assert run_stage("simulate", [*study, *moved]) == 0
-    return Built(datasets.read(second, "design"), datasets.read(response, "response"))
-
-
 def build_verification(problem: Path, preset: str | None, folder: Path) -> xr.Dataset:
     """The checks of a design that was built in the folder."""
     out = folder / "verification.nc"

@@ -46,7 +46,7 @@ class Optimiser(Section):
         geometric: the budget with which a design by the angle law of contact is optimised again
             with contact on distance, where its loss depends on the law.
         angle: the budget with which SQP first optimises a design for contact on distance by the
-            angle law, through overlaps that would be in its way; none by default.
+            angle law, whether it overlaps and snaps or not; none by default.
         symmetry: that the design is to have.
         trust_radius: at the start.
         trust_radius_max: at most.

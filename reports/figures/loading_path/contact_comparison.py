@@ -1,4 +1,4 @@
-"""Compares both laws of contact: every structure under either, and the second design."""
+"""Compares both laws of contact: every structure under either, and a second design."""
 
 from __future__ import annotations
 
@@ -15,19 +15,22 @@ from reports.study import RedesignResults, StudyResults
 
 
 def contact_facts(study: StudyResults) -> Iterator[Fact]:
-    """Loss, overlaps and gap of every structure under either law; then the second design's.
+    """Loss, overlaps and gap of every structure under either law; then a second design's.
 
-    None of a motion in time, which is run under one law.
+    The paper's law is that on void angles. None of a motion in time, which is run under one law.
     """
     if not study.problem.static:
         return
     names = [name for name in structures(study.response) if name != "intact"]
-    yield from _by_law(study.response, names)
+    yield from _by_law(study.response, names, study.problem.contact.law)
     if study.redesign is not None:
         yield from _again(study, study.redesign)
 
 
-def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iterator[Fact]:
+def _by_law(
+    response: xr.Dataset, names: Sequence[str], own: str, whose: str = ""
+) -> Iterator[Fact]:
+    """Yields a row for every structure and law; the other law's tells the change from `own`."""
     losses = response["loss_by_contact"].mean("case")
     unit = response["loss_by_contact"].attrs["units"]
     for name in names:
@@ -42,12 +45,14 @@ def _by_law(response: xr.Dataset, names: Sequence[str], whose: str = "") -> Iter
             count = int(part["overlaps_by_contact"].max())
             gap = worded(float(part["gap_by_contact"].min()), "mm", 2)
             note = f"{overlapping(count)}, smallest gap {gap}, by geometry"
-            if law != "angle":
-                change = loss / float(losses.sel(structure=name, contact_law="angle")) - 1.0
+            if law != own:
+                change = loss / float(losses.sel(structure=name, contact_law=own)) - 1.0
                 snaps = response["snaps_by_contact"].sel(structure=name)
-                apart = (snaps != snaps.sel(contact_law="angle")).any()
+                apart = (snaps != snaps.sel(contact_law=own)).any()
                 other = ", on another branch: one of them snaps" if apart else ""
-                note = f"{percent(change)} against the angle law{other}; {note}"
+                note = f"{percent(change)} against the {own} law{other}; {note}"
+            if law == "angle":
+                note += "; the paper's law"
             yield number(key, label, loss, unit, digits=3, note=note)
 
 
@@ -66,7 +71,7 @@ def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
         words = f"optimised again, {again.evaluations} evaluations"
     yield Fact("second_design", "Second design", np.nan, "1", words, note=note)
     if again.changed:
-        yield from _by_law(again.response, ["cloaked"], "second")
+        yield from _by_law(again.response, ["cloaked"], "angle", "second")
     loss = over_cases(study.problem, again.response["loss"])
     start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
     note = "from that of the altered lattice, both with contact on distance"

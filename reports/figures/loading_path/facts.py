@@ -49,7 +49,7 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Loss", loss_facts(study, path)),
         *grouped("Lateral contraction", contraction_facts(study, path)),
         *grouped("Reaction", reaction_facts(study, path)),
-        *grouped("Optimisation", checks.history_facts(study.design)),
+        *grouped("Optimisation", checks.history_facts(study.problem, study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
         *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
         *grouped("Contact", contact_comparison.contact_facts(study)),

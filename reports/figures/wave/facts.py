@@ -32,7 +32,7 @@ def wave_facts(study: StudyResults) -> list[Fact]:
         *grouped("Marked places", place_facts(study)),
         *grouped("Contact on the edges", edge_facts(study)),
         *grouped("Time steps", step_facts(study.verification)),
-        *grouped("Optimisation", checks.history_facts(study.design)),
+        *grouped("Optimisation", checks.history_facts(study.problem, study.design)),
         *grouped("Checks of the design", checks.design_facts(study.design)),
         *grouped("Checks over time", checks.path_facts(study.problem, study.response)),
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import jax.numpy as jnp
@@ -25,6 +26,7 @@ from sim.scene import (
     minimise,
     simulate,
 )
+from sim.scene.evaluation import _from_rest
 from sim.solvers import Harmonic, LinearRamp, PrescribedMotion
 from sim.structure import FoilLimit
 from tests.sim.structures import rotating_squares
@@ -103,6 +105,26 @@ def test_a_start_that_snaps_is_refused() -> None:
     snapping = minimise(scene(None), LIMITS, options=SqpOptions(evaluations=25, retreats=0))
     with pytest.raises(SimulationError, match="snaps at"):
         constraint(snapping.x)
+
+
+def test_a_start_that_snaps_is_drawn_back() -> None:
+    options = SqpOptions(evaluations=25, retreats=0)
+    snapping = minimise(scene(None), LIMITS, options=options)
+    posed = scene(0.2)
+    shipped = minimise(posed, LIMITS, snapping.x, options=replace(options, evaluations=5))
+    first = shipped.evaluations[0].x
+    assert 0.0 < np.linalg.norm(first) < np.linalg.norm(snapping.x)
+    assert not simulate(posed, shipped.x).records[0].jumped.any()
+
+
+def test_a_design_that_snaps_between_the_loads_of_the_loss_is_not_shipped() -> None:
+    posed = scene(0.2)
+    snapping = minimise(scene(None), LIMITS, options=SqpOptions(evaluations=25, retreats=0)).x
+    confirm = _from_rest(posed, make_plan(posed))
+    assert confirm is not None
+    assert np.isfinite(confirm(np.zeros_like(snapping))[0])
+    with pytest.raises(SimulationError, match="snaps at"):
+        confirm(snapping)
 
 
 def largest_strain(posed: Scene, design: Floats) -> float:

@@ -1,0 +1,71 @@
+"""Designs for contact on distance: by the angle law first, and the best of several descents."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import datasets
+from pipeline.__main__ import run_stage
+from pipeline.posing import design_hash
+from pipeline.problem import Problem
+from pipeline.problem.sections import Method, Methods
+from pipeline.stages import design
+from sim.optimise import Result
+from tests.pipeline.static import HOLE, write
+
+
+def designed(folder: Path, angle: str, descents: int = 1, seed: int = 0) -> xr.Dataset:
+    """The design by SQP, six evaluations of contact on distance."""
+    folder.mkdir()
+    path = write(folder, HOLE, size=5, amplitude=3.0)
+    more = f"angle: {angle}, descents: {descents}, seed: {seed}, geometric:"
+    text = (
+        path.read_text()
+        .replace("law: angle", "law: geometric")
+        .replace("geometric: {", more + " {")
+    )
+    path.write_text(text.replace("sqp: { evaluations: 4 }", "sqp: { evaluations: 6 }"))
+    options = ["--problem", str(path), "--quiet", "--out"]
+    made, chosen = str(folder / "sqp.nc"), folder / "design.nc"
+    assert run_stage("design", [*options, made, "--method", "sqp"]) == 0
+    assert run_stage("select", [*options, str(chosen), "--designs", made]) == 0
+    return datasets.read(chosen, "design")
+
+
+def losses(design: xr.Dataset) -> list[float]:
+    """Of all descents."""
+    found: list[float] = json.loads(design.attrs["plan"])["descents"]
+    return found
+
+
+def test_a_design_by_the_angle_law_is_where_it_starts(hole: list[str], tmp_path: Path) -> None:
+    by_angle = datasets.read(Path(hole[1]).with_name("design.nc"), "design")
+    after = designed(tmp_path / "a", "{ evaluations: 4 }")
+    first, second = (each["design_vector"].values[0] for each in (by_angle, after))
+    np.testing.assert_array_equal(second[0], first[int(by_angle["best_evaluation"][0])])
+    initial = designed(tmp_path / "b", "null")
+    assert not initial["design_vector"].values[0, 0].any()
+
+
+def test_the_best_of_several_descents_is_shipped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    optimise, budgets = design.optimise, {4: 2, 5: 6, 6: 4}
+
+    def limited(asked: Problem, *more: Any) -> Result:  # noqa: ANN401
+        """As many evaluations as the seed is given."""
+        method = Method(evaluations=budgets[asked.optimiser.seed])
+        return optimise(asked.with_optimiser(methods=Methods(sqp=method)), *more)
+
+    monkeypatch.setattr(design, "optimise", limited)
+    shipped = designed(tmp_path / "all", "null", descents=3, seed=4)
+    first, second, third = losses(shipped)
+    assert second < third < first
+    assert float(shipped["best_loss"][0]) == second
+    assert shipped.sizes["evaluation"] == 6
+    alone = designed(tmp_path / "alone", "null", seed=5)
+    assert design_hash(alone) == design_hash(shipped)
