@@ -10,10 +10,11 @@ from contextlib import ExitStack, contextmanager, suppress
 from threading import RLock
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import jit, njit
 from numba.core import event
 
-from sim.core import compile_time, loop_cache
+from sim.core import code_library, compile_time, loop_cache
+from sim.core.code_library import Loop
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -22,6 +23,7 @@ LOG = logging.getLogger(__name__)
 _SECONDS_BETWEEN_LINES = 10.0
 _HOW: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 loop_cache.install()
+code_library.install()
 
 _WITHIN = RLock()
 _mine: set[str] = set()
@@ -57,7 +59,13 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
 
     A process that wants a loop while another compiles it waits, and finds it in the cache.
     """
-    loop: Any = njit(cache=True, **_HOW, **how)(function)
+    loop = _in_turn(function, _HOW | how)
+    loop.__class__, loop.compiler = Loop, _in_turn
+    return cast(F, loop)
+
+
+def _in_turn(function: Callable[..., Any], how: dict[str, Any]) -> Any:  # noqa: ANN401
+    loop: Any = jit(cache=True, **how)(function)
     compile_one, name = loop.compile, f"{function.__module__}.{function.__qualname__}"
 
     def compile_in_turn(signature: object) -> object:
@@ -65,7 +73,7 @@ def compiled(function: F, **how: Any) -> F:  # noqa: ANN401  (options of Numba)
             return compile_one(signature)
 
     loop.compile = compile_in_turn
-    return cast(F, loop)
+    return loop
 
 
 def inlined(function: F, **how: Any) -> F:  # noqa: ANN401

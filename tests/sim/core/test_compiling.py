@@ -72,3 +72,24 @@ def test_compiling_is_told_once_and_does_not_count_as_work(tmp_path: Path) -> No
     passed, worked = map(float, first[-1].split())
     assert worked < 0.1 * passed
     assert len(second) == 1  # found in the cache
+
+
+MACHINE_CODE = """
+import loops
+print(loops.outer(3), loops.outer.stats.cache_misses.total())
+(part,) = loops.inner.callee.overloads.values() if loops.inner.callee.overloads else [None]
+print(part and part.library._has_machine_code, bool(loops.inner.overloads))
+print(loops.inner(3), loops.inner.overloads[loops.inner.signatures[0]].library._has_machine_code)
+"""
+
+
+def test_only_what_python_calls_has_machine_code(tmp_path: Path) -> None:
+    (tmp_path / "loops.py").write_text(LOOPS)
+    places = {"PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}", "NUMBA_CACHE_DIR": str(tmp_path)}
+    ask = [sys.executable, "-c", MACHINE_CODE]
+    first, second = (
+        subprocess.check_output(ask, env=os.environ | places, text=True, timeout=120).splitlines()
+        for _ in range(2)
+    )
+    assert first == ["9.0 1", "False False", "3.0 True"]
+    assert second == ["9.0 0", "None False", "3.0 True"]  # none of it is even read

@@ -1,0 +1,95 @@
+"""Postpones machine code until somebody asks for it: what only loops call never has any.
+
+Numba optimises every function with all that it calls, and makes machine code of it, though a loop
+takes a copy of what it calls and optimises that again. Here a library stays LLVM's intermediate
+code, inlined at little cost, until somebody asks for the address of a function in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from types import FunctionType
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.registry import CPUDispatcher, cpu_target
+
+
+class Loop(CPUDispatcher):
+    """Runs a loop that Python calls; loops that call it take a copy without wrappers for Python.
+
+    Attributes:
+        compiler: compiles a function with options of Numba.
+    """
+
+    compiler: Callable[[FunctionType, dict[str, Any]], Any]
+
+    @property
+    def _numba_type_(self) -> Any:  # noqa: ANN401
+        return self.callee._numba_type_
+
+    @cached_property
+    def callee(self) -> Any:  # noqa: ANN401  (a dispatcher would be taken for a method)
+        """The same loop, as those that call it take it: intermediate code, cached as such."""
+        loop: Any = self.py_func
+        known = (loop.__globals__, loop.__name__, loop.__defaults__, loop.__closure__)
+        copied = FunctionType(loop.__code__, *known)
+        copied.__qualname__, copied.__module__ = f"{loop.__qualname__}.callee", loop.__module__
+        bare = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        return self.compiler(copied, self.targetoptions | bare)
+
+
+class DeferredLibrary(JITCodeLibrary):
+    """Holds the code of one loop, in full optimised and made machine code when that is called."""
+
+    _has_machine_code = False
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Returns the address of a function of this library; 0 where it has none of that name."""
+        self._ensure_finalized()
+        if not self._has_machine_code:
+            if name not in {function.name for function in self.get_defined_functions()}:
+                return 0
+            super()._optimize_final_module()
+            self._make_machine_code()
+        return int(super().get_pointer_to_function(name))
+
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
+        """Returns what is cached: intermediate code, with machine code where there is any."""
+        if self._has_machine_code:
+            return super().serialize_using_object_code()
+        return self.serialize_using_bitcode()
+
+    def _optimize_final_module(self) -> None:
+        """Inlines, and prunes counts of references: what calls it optimises it in full."""
+        passes, builder = self._codegen._module_pass_manager(
+            loop_vectorize=False, slp_vectorize=False, opt=0, cost="cheap"
+        )
+        passes.run(self._final_module, builder)
+
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled and self._compiled_object:  # comes from the cache
+            self._make_machine_code()
+        else:
+            self._finalize_dynamic_globals()
+            self._verify_declare_only_symbols()
+            self._finalized = True
+
+    def _make_machine_code(self) -> None:
+        self._has_machine_code = True
+        self._dynamic_globals = []
+        super()._finalize_final_module()
+
+
+def install() -> None:
+    """Makes Numba keep the code of this process so."""
+    codegen: Any = cpu_target.target_context.codegen()
+    codegen._library_class = DeferredLibrary
+    codegen.set_env = _set_env.__get__(codegen)
+
+
+def _set_env(codegen: JITCPUCodegen, name: str, environment: object) -> None:
+    """Sets the environment of a function that has machine code."""
+    if codegen._engine.is_symbol_defined(name):
+        JITCPUCodegen.set_env(codegen, name, environment)
