@@ -29,24 +29,26 @@ STAGES = (
 )
 
 
-PLANNER = """
+SERVER = """
 import os, sys
 import pint, pydantic, snakemake.cli, yaml
 for line in sys.stdin:
     root, told, *words = line.rstrip("\\n").split("\\t")
     if not (child := os.fork()):
-        out = os.open(told, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
-        os.dup2(out, 1), os.dup2(out, 2), os.chdir(root)
+        for stream, name in ((1, "out"), (2, "err")):
+            os.dup2(os.open(f"{told}.{name}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), stream)
+        os.chdir(root)
+        sys.argv[1:] = words
         snakemake.cli.main(words)
     print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
-"""Snakemake in a process that has imported it once, and makes each plan in a fork of its own."""
+"""Snakemake in a process that has imported it once, and obeys each command in a fork of its own."""
 
 
 @cache
-def _planner() -> subprocess.Popen[str]:
+def _server() -> subprocess.Popen[str]:
     pipe = subprocess.PIPE
-    return subprocess.Popen([sys.executable, "-c", PLANNER], stdin=pipe, stdout=pipe, text=True)
+    return subprocess.Popen([sys.executable, "-c", SERVER], stdin=pipe, stdout=pipe, text=True)
 
 
 @dataclass
@@ -65,39 +67,37 @@ class Sandbox:
         assert old in text
         self.problem.write_text(text.replace(old, new, 1))
 
-    def command(self, *words: str) -> list[str]:
-        return [str(Path(sys.executable).with_name("snakemake")), "--cores", "2", *words]
-
     def environment(self) -> dict[str, str]:
         return os.environ | {"STAGE_SECONDS": str(self.stage_seconds)}
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return self._ended(self.command(*words))
-
-    def resume(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return self._ended([sys.executable, "-m", "pipeline", "run", *words])
-
-    def planned(self, *words: str) -> Counter[str]:
-        """How often each rule would run."""
-        told = self.root.with_name("plan.txt")
-        server = _planner()
+        """What snakemake says to a command, and how it ends."""
+        told = self.root.with_name("told")
+        given = ["--cores", "2", *words]
+        server = _server()
         assert server.stdin
         assert server.stdout
-        print(self.root, told, "--cores", "2", "--dry-run", *words, sep="\t", file=server.stdin)
-        server.stdin.flush()
-        assert server.stdout.readline() == "0\n", told.read_text()
-        table = told.read_text().partition("\n---")[2].partition("\ntotal")[0].splitlines()[1:]
-        return Counter({rule: int(count) for rule, count in map(str.split, table)})
+        print(self.root, told, *given, sep="\t", file=server.stdin, flush=True)
+        code = int(server.stdout.readline())
+        out, err = (told.with_suffix(f".{name}").read_text() for name in ("out", "err"))
+        return subprocess.CompletedProcess(given, code, out, err)
 
-    def _ended(self, command: list[str]) -> subprocess.CompletedProcess[str]:
+    def resume(self, *words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            command,
+            [sys.executable, "-m", "pipeline", "run", *words],
             cwd=self.root,
             env=self.environment(),
             text=True,
             capture_output=True,
             check=False,
         )
+
+    def planned(self, *words: str) -> Counter[str]:
+        """How often each rule would run."""
+        ended = self.run("--dry-run", *words)
+        assert ended.returncode == 0, ended.stdout + ended.stderr
+        table = ended.stdout.partition("\n---")[2].partition("\ntotal")[0].splitlines()[1:]
+        return Counter({rule: int(count) for rule, count in map(str.split, table)})
 
 
 @pytest.fixture

@@ -33,10 +33,13 @@ def jobs(root: Path) -> list[psutil.Process]:
     return found
 
 
+DESIGN = "results/fig2/design.nc"
+
+
 def start(sandbox: Sandbox) -> subprocess.Popen[bytes]:
-    """Starts the study and waits until its first jobs are at work."""
+    """Starts the design of a study and waits until its first jobs are at work."""
     run = subprocess.Popen(
-        [sys.executable, "-m", "pipeline", "run", "fig2"],
+        [sys.executable, "-m", "pipeline", "run", DESIGN],
         cwd=sandbox.root,
         env=sandbox.environment(),
         stdout=subprocess.DEVNULL,
@@ -55,16 +58,16 @@ def test_run_goes_on_after_a_kill(sandbox: Sandbox) -> None:
     run.wait()
     assert any((sandbox.root / ".snakemake/locks").iterdir())
     sandbox.stage_seconds = 0.0
-    ended = sandbox.resume("fig2")
+    ended = sandbox.resume(DESIGN)
     assert ended.returncode == 0, ended.stderr
     assert not psutil.wait_procs(left, timeout=0)[1]
-    assert "Nothing to be done" in sandbox.run("fig2").stderr
+    assert "Nothing to be done" in sandbox.run(DESIGN).stderr
 
 
 def test_second_run_beside_a_living_one_is_refused(sandbox: Sandbox) -> None:
     sandbox.stage_seconds = 60.0
     run = start(sandbox)
-    ended = sandbox.resume("fig2")
+    ended = sandbox.resume(DESIGN)
     assert ended.returncode != 0
     assert f"already at work in this folder (process {run.pid})" in ended.stderr
     assert len(jobs(sandbox.root)) >= 2
