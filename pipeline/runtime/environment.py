@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import os
 
+import platformdirs
+
 from pipeline.runtime.locations import CACHE
 from sim.core import instruction_set
 
@@ -30,7 +32,8 @@ BOUNDED = {
     "OPENCV_IO_MAX_IMAGE_PIXELS": str(1 << 27),  # of a picture: more are refused, not allocated
 }
 CACHES = {
-    "JAX_COMPILATION_CACHE_DIR": str(CACHE / "jax"),
+    # found by content, so from any checkout
+    "JAX_COMPILATION_CACHE_DIR": str(platformdirs.user_cache_path("metacloak") / "jax"),
     "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
     "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
     "MPLCONFIGDIR": str(CACHE / "matplotlib"),
