@@ -9,6 +9,7 @@ from .report import publish as publish
 from .report import rendered as rendered
 from .report import write_page as write_page
 from .study_pages import PageText as PageText
+from .study_pages import RobustTable as RobustTable
 from .study_pages import sources as sources
 from .study_pages import study_page as study_page
 from .study_pages import study_text as study_text

@@ -26,10 +26,22 @@ LARGEST_PAGE = 6_000_000
 
 
 @dataclass(frozen=True)
+class RobustTable:
+    """Holds a measure of the cloak as designed and of imperfect copies, in words.
+
+    `rows` are the specimens, the middle of their values and the value that 95 % of them keep to.
+    """
+
+    measure: str
+    rows: Sequence[tuple[str, str, str]]
+
+
+@dataclass(frozen=True)
 class PageText:
     """Holds what a page says of itself.
 
-    `caption` is HTML; `headline` are the facts above all others, `note` is told of the animation.
+    `caption` is HTML; `headline` are the facts above all others, `note` is told of the animation;
+    `robust` stands below the headline, if there is one.
     """
 
     title: str
@@ -39,6 +51,7 @@ class PageText:
     caption: str
     headline: Sequence[Fact]
     note: str = ""
+    robust: RobustTable | None = None
 
 
 def study_text(
@@ -50,13 +63,14 @@ def study_text(
     headline: Sequence[str],
     figure_title: str = "",
     note: str = "",
+    robust: RobustTable | None = None,
 ) -> PageText:
     """Returns the text of one study; `headline` are keys of facts, as far as there are such."""
     by_key = {fact.key: fact for fact in facts}
     title = study.problem.title or study.name
     shown = [by_key[key] for key in headline if key in by_key]
     lead = study.problem.doc.strip()
-    return PageText(title, lead, credit, figure_title or title, caption, shown, note)
+    return PageText(title, lead, credit, figure_title or title, caption, shown, note, robust)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from pipeline.comparison import middle_units
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Quads, RampHarmonicDrive, Region
 from reports.facts import (
+    ABSENT,
     Fact,
     checks,
     constants_facts,
@@ -35,6 +36,7 @@ from reports.figures.loading_path.abscissa import (
     structures,
 )
 from reports.figures.loading_path.curves import over_cases
+from reports.page import RobustTable
 from reports.study import StudyResults, from_dataset
 
 
@@ -54,7 +56,7 @@ def loading_path_facts(study: StudyResults) -> list[Fact]:
         *grouped("Checks along the path", checks.path_facts(study.problem, study.response)),
         *grouped("Contact", contact_comparison.contact_facts(study)),
         *grouped("Load steps", checks.variant_facts(study.verification)),
-        *grouped("Imperfect copies", robustness_facts(study)),
+        *grouped("Imperfect copies", [*worst_copy_fact(study), *robustness_facts(study)]),
         *grouped(
             "With the constants’ measured spread",
             constants_facts(study.problem, study.constants, mean_losses(study)),
@@ -288,6 +290,40 @@ def robustness_facts(study: StudyResults) -> Iterator[Fact]:
         )
         label = f"{measure.label}, median, {_in_words(spread.noise)}"
         yield number(f"copies_{key}", label, spread.middle, measure.unit, digits=3, note=note)
+
+
+def robust_table(study: StudyResults) -> RobustTable | None:
+    """Lists the measure at the end of the path of the cloak as designed, and of its copies."""
+    copies = study.scatter
+    if copies is None:
+        return None
+    measure = measures.measure_of(study.problem)
+    ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
+    nominal = worded(float(ends.sel(structure="cloaked")), measure.unit, 3)
+    rows = [("as designed", nominal, ABSENT)]
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
+    for spread in monte_carlo.spreads(values, copies):
+        failed = f", {spread.failed} failed" if spread.failed else ""
+        name = f"{_in_words(spread.noise)} ({spread.count} copies{failed})"
+        middle, high = (worded(x, measure.unit, 3) for x in (spread.middle, spread.high))
+        rows.append((name, middle, high))
+    return RobustTable(measure.label, rows)
+
+
+def worst_copy_fact(study: StudyResults) -> Iterator[Fact]:
+    """Yields the value that 95 % of the copies keep to, under their most harmful imperfection."""
+    copies = study.scatter
+    if copies is None:
+        return
+    measure = measures.measure_of(study.problem)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
+    found = [each for each in monte_carlo.spreads(values, copies) if np.isfinite(each.high)]
+    if found:
+        worst = max(found, key=lambda each: each.high)
+        label = f"{measure.label}, cloaked, in 95 % of copies at most"
+        note = f"{_in_words(worst.noise)}; the most harmful of what was tried"
+        key = f"{measure.key}_cloaked_copies"
+        yield number(key, label, worst.high, measure.unit, digits=3, note=note)
 
 
 def _in_words(noise: str) -> str:

@@ -20,6 +20,7 @@ from reports.figures.loading_path.abscissa import (
     lattice_size,
     structures,
 )
+from reports.figures.loading_path.facts import robust_table
 from reports.figures.loading_path.snapshot_grid import SnapshotLayout, snapshots
 from reports.figures.loading_path.structure_panels import rest_panel, shade_of
 from reports.page import PageText, study_text
@@ -206,9 +207,14 @@ def fields(study: StudyResults) -> list[ColourField]:
 def loading_path_text(study: StudyResults, caption: str, facts: Sequence[Fact]) -> PageText:
     """Returns what the page says of itself."""
     key = measures.measure_of(study.problem).key
-    headline = (f"{key}_reduction", f"{key}_altered", f"{key}_cloaked", "loss_reduction", "snaps")
+    measured = (f"{key}_altered", f"{key}_cloaked", f"{key}_cloaked_copies")
     return study_text(
-        study, caption, facts, credit=credit(study.problem.report.paper), headline=headline
+        study,
+        caption,
+        facts,
+        credit=credit(study.problem.report.paper),
+        headline=(f"{key}_reduction", *measured, "loss_reduction", "snaps"),
+        robust=robust_table(study),
     )
 
 

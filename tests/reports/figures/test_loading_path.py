@@ -121,6 +121,16 @@ def test_failed_copies_are_counted_and_left_out(shield: StudyResults) -> None:
     assert "1 failed" in values(shield)["copies_geometry_5"].note
 
 
+def test_the_copies_stand_in_a_table_of_their_own(shield: StudyResults) -> None:
+    table = path_facts.robust_table(shield)
+    assert table is not None
+    assert table.rows[0][0] == "as designed"
+    assert table.rows[0][1] == values(shield)["rotation_cloaked"].ours
+    worst = values(shield)["rotation_cloaked_copies"]
+    assert worst.ours in {high for _, _, high in table.rows[1:]}
+    assert worst.value > values(shield)["rotation_cloaked"].value
+
+
 def test_a_paper_is_quoted_by_the_keys_of_the_facts(
     shield: StudyResults, smile: StudyResults
 ) -> None:
@@ -241,4 +251,5 @@ def test_the_page_is_whole(shield: StudyResults, tmp_path: Path) -> None:
     html = (tmp_path / "index.html").read_text(encoding="utf-8")
     assert "After Figure 4 of Bordiga et al." in html
     assert "as run" in html
+    assert "vertices off by up to ±3 % of s (5 copies)" in html
     assert len(html.encode()) < 6_000_000
