@@ -160,6 +160,12 @@ class _Run:
             except UnsolvedError as error:
                 self.reason = str(error)
                 return
+            except SimulationError:  # of the constraints: they know of no design so far away
+                self.distance *= SLOWER**2
+                if self.distance.max() < self.options.step_min:
+                    self.reason = "no further progress"
+                    return
+                continue
             if trial is None or self._length(trial.place) < self.options.step_min:
                 self.reason = "no further progress"
                 return

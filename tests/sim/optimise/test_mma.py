@@ -180,3 +180,20 @@ def test_subproblem_slopes_and_curvature_agree_with_differences() -> None:
 def test_replacements_touch_the_functions_at_the_centre() -> None:
     problem = separable(7, 4)
     np.testing.assert_allclose(problem.values(problem.centre), problem.at_centre)
+
+
+def test_designs_whose_constraints_cannot_be_evaluated_are_avoided() -> None:
+    """Beyond 0.6 there is no design; the optimum without that lies at 1."""
+
+    def loss(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        return float(((x - 1.0) ** 2).sum()), 2.0 * (x - 1.0), np.zeros(0)
+
+    def constraints(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        if x[0] > 0.6:
+            raise SimulationError("it snaps")
+        return np.array([2.0 - x.sum()]), -np.ones((1, 2))
+
+    options = MmaOptions(evaluations=60)
+    found = minimise("mma", loss, constraints, np.zeros(2), (-2.0, 2.0), options)
+    assert 0.5 < found.x[0] <= 0.6
+    assert found.loss < 0.2 * found.evaluations[0].loss
