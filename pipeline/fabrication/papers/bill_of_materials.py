@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
+from pipeline.fabrication.fixtures import strips
 from pipeline.fabrication.parts import STRAIGHT, THIN_WALL, BuiltSpecimen, Ligament, Shim, Unit
 from pipeline.fabrication.plates import STRAND, PrintEstimate
 from pipeline.fabrication.readback import unreadable
@@ -131,7 +132,8 @@ def bill(
     yield BillRow("total", "units", len(units), volume=volume, mass=mass, note=note)
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
-    yield BillRow("total", "shims", count, volume=volume, mass=mass, note="polyester")
+    note = f"polyester; {_counted(len(list(strips(specimen))), 'strip')} in the place of all"
+    yield BillRow("total", "shims", count, volume=volume, mass=mass, note=note)
     every = prints.values()
     whole = PrintEstimate(sum(p.seconds for p in every), sum(p.filament for p in every))
     volume = whole.filament * STRAND
