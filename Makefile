@@ -16,7 +16,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup dev reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup dev publish reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -33,6 +33,7 @@ help:
 	@echo "make index     that page alone, over what is there"
 	@echo "make movies    the paper's movies: results/movies"
 	@echo "make reproduce build fig2@quick (or STUDY=...) twice from nothing, and compare all bytes"
+	@echo "make publish   build fig2 (or STUDY=...) and write it as an RO-Crate: results/fig2_crate"
 	@echo "make test      run the tests"
 	@echo "make nightly   run what takes longer: the four below, with a table of them (PARTS=clients: one)"
 	@echo "make test-slow run the tests that take minutes: two builds from nothing, kills at random"
@@ -89,6 +90,9 @@ $(PRODUCTS): setup
 # a study with a preset: make fig2@edge3
 $(foreach study,$(STUDIES),$(study)@%): setup
 	@exec $(BIN)/python -m pipeline run "$$TARGET"
+
+publish: setup
+	@$(BIN)/python -m pipeline run $(or $(STUDY),fig2) && $(BIN)/python -m pipeline publish $(or $(STUDY),fig2)
 
 reproduce: setup
 	@$(BIN)/python -m pipeline reproduce $(STUDY)

@@ -22,6 +22,8 @@ from sim.core import instruction_set
 if TYPE_CHECKING:
     import xarray as xr
 
+COMMIT_FILE = "COMMIT"
+"""Names the commit of sources that were published without their history."""
 PACKAGES = ("jax", "jaxlib", "netCDF4", "numba", "numpy", "piqp", "scipy", "shapely", "xarray")
 
 
@@ -122,6 +124,8 @@ def git_commit() -> str:
     """The commit of the sources, or "unknown" outside a git checkout."""
     if INSTALLED:
         return "unknown"  # a folder above site-packages may be a checkout of something else
+    if (ROOT / COMMIT_FILE).is_file():
+        return (ROOT / COMMIT_FILE).read_text().strip()
     command = ["git", "-C", str(ROOT), "rev-parse", "--verify", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)

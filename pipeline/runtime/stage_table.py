@@ -389,6 +389,17 @@ labelled SYNTHETIC.""",
         options=(option("target", nargs="?", default="fig2@quick", help="(%(default)s)"),),
     ),
     Stage(
+        "publish",
+        "write a built study as an RO-Crate, from which it can be built again",
+        home="pipeline.workflow",
+        extra="publish",
+        options=(
+            option("target", help="a study that is built, such as fig2 or fig2@quick"),
+            _file("--out-dir", "DIR", "the crate (default: results/TARGET_crate)"),
+        ),
+        about="Sources, locks, problem, datasets, figures and licences, as a Workflow Run Crate.",
+    ),
+    Stage(
         "schema",
         "write the JSON schema of problem files, for editors",
         home="pipeline.workflow",

@@ -32,11 +32,15 @@ SMALLER = {
     "report": {"measured_constants": None},
     "presets": {},
 }
-ROOMS = ("benchmarks", "experiments", "pipeline", "profiles", "reports", "sim")
+ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")
 FILES = (
     "Snakefile",
     "Makefile",
     "CITATION.cff",
+    "LICENSE",
+    "README.md",
+    "pyproject.toml",
+    "setup.py",
     "requirements.lock",
     "requirements-dev.lock",
     ".gitignore",
