@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from pipeline.problem.reading import explain_error, yaml_file
 from pipeline.runtime import UserError
+from pipeline.tracking.frames.video import rendered
 from sim.core import Floats, Ints
 
 _WANTED = {"name", "grid", "spacing_mm", "ligament_gap_mm", "bias_angle_deg"}
@@ -69,12 +70,12 @@ def video_of(path: Path) -> Path:
 
 
 def recording_text(described: dict[str, Any], video: Path, design: str) -> str:
-    """Writes the recording's YAML."""
+    """Writes the recording's YAML; without a word on it, the file tells whether it is synthetic."""
     lines = [
         f"title: {described.get('kind', described['name'])!r}",
         f"video: {str(video)!r}",
         f"design: {design}",
-        f"synthetic: {str(described.get('synthetic', True)).lower()}",
+        f"synthetic: {str(described.get('synthetic', rendered(video))).lower()}",
     ]
     if scale := described.get("approx_px_per_mm"):
         lines.append(f"pixel_size: {1 / scale:.4g} mm")

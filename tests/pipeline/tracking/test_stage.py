@@ -151,3 +151,23 @@ def test_a_command_that_lacks_something_is_told_what(
 ) -> None:
     assert run_stage("track", words) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("comment", [None, "SYNTHETIC"])
+def test_an_imported_video_is_synthetic_if_its_file_says_so(
+    comment: str | None, tmp_path: Path
+) -> None:
+    lines = (CLIPS / "f_silhouette.yaml").read_text(encoding="utf-8").splitlines()
+    told = [line for line in lines if not line.startswith("synthetic")]
+    (tmp_path / "run.yaml").write_text("\n".join(told), encoding="utf-8")
+    with av.open(VIDEO) as clip, av.open(str(tmp_path / "run.mp4"), "w") as copy:
+        copy.metadata.update({} if comment is None else {"comment": comment})
+        stream = copy.add_stream_from_template(clip.streams.video[0])
+        for packet in clip.demux(video=0):
+            if packet.dts is not None:
+                packet.stream = stream
+                copy.mux(packet)
+    words = ["import", str(tmp_path / "run.yaml"), "--out-dir", str(tmp_path)]
+    assert run_stage("track", words) == 0
+    made = (tmp_path / "run_recording.yaml").read_text(encoding="utf-8")
+    assert f"synthetic: {str(comment is not None).lower()}\n" in made
