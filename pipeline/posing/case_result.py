@@ -21,7 +21,14 @@ from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
 from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver
-from sim.scene import estimated_errors, mimicking, sample_times, scales, strain_energies
+from sim.scene import (
+    drive_force,
+    estimated_errors,
+    mimicking,
+    sample_times,
+    scales,
+    strain_energies,
+)
 from sim.solvers import solve_case
 from sim.structure import clearance
 
@@ -126,7 +133,7 @@ def measure(
             displacement=shown,
             velocity=solved.velocity[times.shown],
             observables=seen,
-            drive_force=seen.force_on(scene.loads.driven),
+            drive_force=drive_force(scene, seen, case.drive, times.asked[times.shown]),
             roi_energy=_roi_energy(scene, case, shown),
             gap=_at_stride(found.gap, stride, len(shown)),
             overlapping=_at_stride(found.overlaps, stride, len(shown)),

@@ -64,12 +64,13 @@ def simulation_failure(
     what = f"the {tried.name} structure cannot be simulated"
     if scene.loads.static and error.step is not None:
         reached = 0.0 if error.step == 0 else float(tried.asked[error.step - 1])
-        driven = np.stack(
-            [np.asarray(motion(np.array([reached])))[0, :2] for motion in scene.loads.motions]
-        )
-        length = float(np.linalg.norm(driven, axis=1).max())
-        what += f" beyond a driven displacement of {length:.3g} mm"
-        what += f" ({reached / scene.loads.duration:.0%} of the load)"
+        share = f"{reached / scene.loads.duration:.0%} of the load"
+        if any(case.control is not None for case in scene.loads.cases):
+            what += f" beyond {share}"
+        else:
+            driven = [np.asarray(law(np.array([reached])))[..., :2] for law in scene.loads.motions]
+            length = max(float(np.linalg.norm(each, axis=-1).max()) for each in driven)
+            what += f" beyond a driven displacement of {length:.3g} mm ({share})"
     if error.unit is not None:
         i, j = scene.lattice.index[error.unit]
         what += f", look at unit [{i}, {j}]"

@@ -17,6 +17,7 @@ from pipeline.posing.structure_variables import (
 )
 from pipeline.posing.to_scene import contact_laws, lattice_of
 from pipeline.problem import Problem
+from pipeline.problem.sections import single_drives
 from sim.core import Floats
 
 _MOTION = ("structure", "case", "time", "unit", "dof")
@@ -67,7 +68,7 @@ def loss_units(asked: Problem) -> str:
 
 
 def case_directions(asked: Problem) -> list[float]:
-    """Lists the direction of each load case in rad; zero for a measured drive."""
+    """Lists the direction of each load case in rad; zero for a drive that has none."""
     return list(getattr(asked.drive, "directions", (0.0,)))
 
 
@@ -124,23 +125,32 @@ def _over_cases(measured: Table) -> Variables:
 
 
 def _drive(structures: dict[str, PosedStructure], times: Floats) -> Floats:
-    """Computes the mean displacement (n_cases, n_times, 2) of the driven units, mm."""
+    """Computes the mean displacement (n_cases, n_times, 2) of the driven units, mm.
+
+    Degrees of freedom that are not displaced count as at rest.
+    """
     scene = structures["altered"].scene
-    dofs = (3 * scene.loads.driven[:, None] + np.arange(2)).ravel()
-    place = np.searchsorted(scene.loads.held, dofs)
-    held = np.stack([drive.values(scene.loads.held, times) for drive in scene.loads.cases])
-    return np.asarray(held[:, :, place].reshape(*held.shape[:2], -1, 2).mean(axis=2))
+    of_units = np.zeros((len(scene.loads.cases), len(times), 3 * scene.lattice.n_units))
+    held, top = scene.loads.held, scene.topology
+    for case, drive in enumerate(scene.loads.cases):
+        of_units[case][:, held] = drive.values(top.held, times)[:, : len(held)]
+    moved = of_units.reshape(*of_units.shape[:2], -1, 3)[:, :, scene.loads.driven, :2]
+    return np.asarray(moved.mean(axis=2))
 
 
 def _coordinates(asked: Problem, structures: dict[str, PosedStructure], times: Floats) -> Variables:
-    directions = case_directions(asked)
+    directions, drive = case_directions(asked), single_drives(asked.drive)[0]
     frequency = np.nan if asked.frequency is None else asked.frequency
     return {
         **unit_coordinates(lattice_of(asked)),
         "structure": (("structure",), list(structures)),
         "direction": (("case",), np.rad2deg(directions)),
         "frequency": (("case",), [frequency] * len(directions)),
-        "amplitude": (("case",), [getattr(asked.drive, "amplitude", np.nan)] * len(directions)),
+        "amplitude": (
+            ("case",),
+            [getattr(drive, "amplitude", np.nan)] * len(directions),
+            {"units": drive.unit},
+        ),
         "time": (("time",), times),
         "dof": (("dof",), ["ux", "uy", "theta"]),
         "contact_law": (("contact_law",), list(LAWS)),

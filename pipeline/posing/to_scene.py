@@ -14,20 +14,27 @@ from pipeline.problem import Problem
 from pipeline.problem.fields import csv_columns, units
 from pipeline.problem.sections import (
     STIFFNESSES,
+    ForceDrive,
     HarmonicDrive,
     LinearRampDrive,
     ListedNetwork,
     PulseDrive,
     RampHarmonicDrive,
+    RotationDrive,
     Selector,
+    SingleDrive,
     TanhRampDrive,
     TimeSeriesDrive,
+    TorqueDrive,
+    selected_units,
+    single_drives,
 )
 from pipeline.runtime import UserError
 from sim.constraints import Limits
 from sim.core import Numbers
 from sim.energy import activation_distance
 from sim.scene import (
+    DOFS,
     Clamp,
     Design,
     Loads,
@@ -38,7 +45,7 @@ from sim.scene import (
     Structure,
     check_scene,
 )
-from sim.solvers import PrescribedMotion, loads
+from sim.solvers import DISPLACEMENT, FORCE, FREE, PrescribedMotion, loads
 from sim.structure import (
     ContactModel,
     DistanceContact,
@@ -48,6 +55,9 @@ from sim.structure import (
     VoidAngleContact,
 )
 
+DirectedDrive = (
+    HarmonicDrive | RampHarmonicDrive | PulseDrive | TanhRampDrive | LinearRampDrive | ForceDrive
+)
 TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "theta": units.ANGLE}
 """Columns of a measured drive, whose heading names each with its unit in brackets."""
 
@@ -124,9 +134,9 @@ def _loads(
     motions: tuple[loads.MotionLaw, ...],
     weights: NDArray[np.float64] | None,
 ) -> Loads:
-    driven = driven_units(problem, lattice)
+    driven, control = driven_units(problem, lattice), control_of(problem)
     return Loads(
-        cases=tuple(PrescribedMotion(driven, motion) for motion in motions),
+        cases=tuple(PrescribedMotion(driven, motion, control) for motion in motions),
         supports=tuple(
             Clamp(_selected(problem, support.units, lattice), support.clamp)
             for support in problem.supports
@@ -170,8 +180,25 @@ def limits_of(problem: Problem) -> Limits:
 
 
 def driven_units(problem: Problem, lattice: Lattice) -> NDArray[np.int64]:
-    """Finds the places of the units of a network that follow the drive."""
-    return _selected(problem, problem.drive.units, lattice)
+    """Finds the places of the units of a network that any drive moves."""
+    return lattice.positions(np.array(problems.driven_units(problem), dtype=np.int64))
+
+
+def control_of(problem: Problem) -> NDArray[np.int64] | None:
+    """Tells what (n_driven, 3) the drives prescribe of each driven unit: see `PrescribedMotion`.
+
+    None where they displace all degrees of freedom.
+    """
+    driven = problems.driven_units(problem)
+    control = np.full((len(driven), 3), DISPLACEMENT)
+    for drive in single_drives(problem.drive):
+        rows = np.isin(driven, selected_units(drive.units, problem.lattice))
+        for dof, name in enumerate(DOFS):
+            if name in drive.free:
+                control[rows, dof] = FREE
+            elif isinstance(drive, ForceDrive | TorqueDrive) and name in drive.acting:
+                control[rows, dof] = FORCE
+    return None if (control == DISPLACEMENT).all() else control
 
 
 def foil_limit(problem: Problem) -> FoilLimit | None:
@@ -227,32 +254,59 @@ def _stiffened(problem: Problem, lattice: Lattice) -> Material:
 
 
 def motions_of(problem: Problem, folder: Path) -> tuple[loads.MotionLaw, ...]:
-    """Builds the motion of every load case."""
-    drive = problem.drive
+    """Builds the motion of every load case, or the forces, of the driven units in their order."""
+    drives = single_drives(problem.drive)
+    if len(drives) == 1 and not isinstance(drives[0], ForceDrive | TorqueDrive):
+        return _motions(drives[0], problem.horizon_time, folder)
+    driven, count = problems.driven_units(problem), len(problem.drive.case_weights)
+    shares, motions = np.zeros((len(driven), len(drives))), []
+    for k, drive in enumerate(drives):
+        rows = np.isin(driven, selected_units(drive.units, problem.lattice))
+        loads_them = isinstance(drive, ForceDrive | TorqueDrive)
+        shares[rows, k] = 1.0 / np.count_nonzero(rows) if loads_them else 1.0
+        found = _motions(drive, problem.horizon_time, folder)
+        motions.append(found * count if len(found) == 1 else found)
+    return tuple(loads.Together(each, shares) for each in zip(*motions, strict=True))
+
+
+def _motions(drive: SingleDrive, horizon: float, folder: Path) -> tuple[loads.MotionLaw, ...]:
+    """Builds the motion of a drive, or its force, in every load case."""
+    if isinstance(drive, TimeSeriesDrive):
+        return (_measured(folder / drive.file),)
+    if isinstance(drive, TorqueDrive | RotationDrive):
+        return (loads.Turning(_course(drive, 0.0, horizon)),)
+    return tuple(_course(drive, angle, horizon) for angle in drive.directions)
+
+
+def _course(
+    drive: DirectedDrive | TorqueDrive | RotationDrive, direction: float, horizon: float
+) -> loads.MotionLaw:
+    """Builds the course of a drive along a direction, rad; of a moment, as if it were a force."""
+    size = drive.amplitude
     match drive:
-        case TimeSeriesDrive():
-            return (_measured(folder / drive.file),)
         case RampHarmonicDrive():
-            return tuple(
-                loads.Harmonic(drive.amplitude, drive.frequency, a, drive.rise_time, drive.delay)
-                for a in drive.directions
-            )
+            return loads.Harmonic(size, drive.frequency, direction, drive.rise_time, drive.delay)
         case HarmonicDrive():
-            return tuple(
-                loads.Harmonic(drive.amplitude, drive.frequency, a) for a in drive.directions
-            )
+            return loads.Harmonic(size, drive.frequency, direction)
         case PulseDrive():
-            return tuple(
-                loads.Pulse(drive.amplitude, drive.width, a, drive.delay) for a in drive.directions
-            )
+            return loads.Pulse(size, drive.width, direction, drive.delay)
         case TanhRampDrive():
-            return tuple(
-                loads.TanhRamp(drive.amplitude, drive.duration, a) for a in drive.directions
-            )
+            return loads.TanhRamp(size, drive.duration, direction)
         case LinearRampDrive():
-            return tuple(
-                loads.LinearRamp(drive.amplitude, drive.duration, a) for a in drive.directions
-            )
+            return loads.LinearRamp(size, drive.duration, direction)
+    return _load_course(drive, direction, horizon)
+
+
+def _load_course(
+    drive: ForceDrive | TorqueDrive | RotationDrive, direction: float, horizon: float
+) -> loads.MotionLaw:
+    """Builds the course of a load that may be a pulse, a wave or a path."""
+    if drive.width is not None:
+        return loads.Pulse(drive.amplitude, drive.width, direction, drive.delay)
+    if drive.frequency is not None:
+        rise, delay = drive.rise_time, drive.delay
+        return loads.Harmonic(drive.amplitude, drive.frequency, direction, rise, delay)
+    return loads.LinearRamp(drive.amplitude, horizon, direction)
 
 
 def _measured(path: Path) -> loads.TimeSeries:

@@ -9,6 +9,7 @@ from .stage_outputs import Output as Output
 from .stage_outputs import outputs as outputs
 from .stage_outputs import over_measured_constants as over_measured_constants
 from .unit_roles import cloak_units as cloak_units
+from .unit_roles import driven_units as driven_units
 from .unit_roles import inclusion_units as inclusion_units
 from .unit_roles import interest_units as interest_units
 from .unit_roles import source_units as source_units

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -16,6 +17,7 @@ from pipeline.problem.fields import (
     Samples,
     Section,
     exactly_one,
+    fault,
 )
 from pipeline.problem.sections import (
     STIFFNESSES,
@@ -24,14 +26,12 @@ from pipeline.problem.sections import (
     Designs,
     Drive,
     Fabrication,
-    HarmonicDrive,
     Lattice,
     LinearRampDrive,
     MaterialConstants,
     ObjectiveSection,
     Optimiser,
     Prediction,
-    RampHarmonicDrive,
     Region,
     ReportOptions,
     Robustness,
@@ -41,6 +41,7 @@ from pipeline.problem.sections import (
     TanhRampDrive,
     Tolerances,
     VoidRegion,
+    single_drives,
 )
 
 _STATIC_INFILL = 0.15
@@ -150,7 +151,7 @@ class Problem(Section):
         material: of units and ligaments.
         contact: of units.
         supports: what holds the structure.
-        drive: what moves it.
+        drive: what moves it; a list of what moves it at once may stand under `drives` instead.
         horizon: over which the loss is taken.
         void: what is cut out.
         inclusion: what is made rigid.
@@ -223,6 +224,21 @@ class Problem(Section):
         """Returns the thickness of the ligaments' foil in mm."""
         return self.fabrication.shims.thickness
 
+    @model_validator(mode="before")
+    @classmethod
+    def _several_drives(cls, data: object) -> object:
+        if not isinstance(data, Mapping):
+            return data
+        if isinstance(data.get("drive"), list):
+            remedy = "write them below it, or several drives in a list under `drives`"
+            raise fault("keys and values are wanted here", remedy, "drive")
+        if "drives" not in data:
+            return data
+        if "drive" in data:
+            raise fault("drive and drives exclude each other", "give one of them", "drives")
+        others = {key: value for key, value in data.items() if key != "drives"}
+        return {**others, "drive": {"kind": "several", "drives": data["drives"]}}
+
     @property
     def infill(self) -> float:
         """Returns the share of the parts' inside that is printed."""
@@ -235,7 +251,10 @@ class Problem(Section):
     @property
     def static(self) -> bool:
         """Tells a load that grows so slowly that inertia plays no part."""
-        return isinstance(self.drive, LinearRampDrive | TanhRampDrive)
+        return all(
+            isinstance(drive, LinearRampDrive | TanhRampDrive) or getattr(drive, "static", False)
+            for drive in single_drives(self.drive)
+        )
 
     def with_optimiser(self, **values: object) -> Problem:
         """Returns the problem with other values of these keys of its optimiser."""
@@ -247,12 +266,9 @@ class Problem(Section):
 
     @property
     def frequency(self) -> float | None:
-        """Returns the frequency of the drive in Hz, where it has one."""
-        return (
-            self.drive.frequency
-            if isinstance(self.drive, HarmonicDrive | RampHarmonicDrive)
-            else None
-        )
+        """Returns the frequency of the drive in Hz, where it has one; the highest of several."""
+        every = (getattr(drive, "frequency", None) for drive in single_drives(self.drive))
+        return max((each for each in every if each is not None), default=None)
 
     @property
     def horizon_time(self) -> float:

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from pipeline.problem.model import Problem
-from pipeline.problem.sections import Region, loose_units, selected_units, units_near, units_within
+from pipeline.problem.sections import (
+    Region,
+    loose_units,
+    selected_units,
+    single_drives,
+    units_near,
+    units_within,
+)
 
 
 def void_units(problem: Problem) -> tuple[int, ...]:
@@ -27,15 +34,20 @@ def altered_units(problem: Problem) -> set[int]:
     return {*void_units(problem), *inclusion_units(problem)}
 
 
+def driven_units(problem: Problem) -> tuple[int, ...]:
+    """Lists the ids of the units that any drive moves, ascending."""
+    every = (selected_units(drive.units, problem.lattice) for drive in single_drives(problem.drive))
+    return tuple(sorted(set().union(*every)))
+
+
 def source_units(problem: Problem) -> tuple[int, ...]:
     """Lists the ids of driven units within the cloak: they keep their shape to fit the drive."""
-    driven = selected_units(problem.drive.units, problem.lattice)
-    return tuple(sorted(set(driven) & set(_cloak_inside(problem))))
+    return tuple(sorted(set(driven_units(problem)) & set(_cloak_inside(problem))))
 
 
 def cloak_units(problem: Problem) -> tuple[int, ...]:
     """Lists the ids of the units to design: the cloak's that nothing else claims."""
-    taken = {*selected_units(problem.drive.units, problem.lattice), *altered_units(problem)}
+    taken = {*driven_units(problem), *altered_units(problem)}
     if isinstance(problem.objective.region, Region):
         taken |= set(units_within(problem.objective.region, problem.lattice))
     return tuple(unit for unit in _cloak_inside(problem) if unit not in taken)
@@ -69,5 +81,5 @@ def interest_units(problem: Problem) -> tuple[int, ...]:
         return tuple(unit for unit in inside if unit not in taken)
     taken |= set(cloak_units(problem))
     if problem.objective.target == "rest":
-        taken |= set(selected_units(problem.drive.units, problem.lattice))
+        taken |= set(driven_units(problem))
     return tuple(unit for unit, _, _ in problem.lattice.sites() if unit not in taken)

@@ -15,6 +15,7 @@ def schema() -> dict[str, Any]:
     """Builds the schema of a problem file, presets included."""
     whole = _without_working_units(Problem.model_json_schema(mode="validation"))
     sections = whole.pop("$defs")
+    _offer_drives(whole, sections)
     overlay = _overlaid({key: value for key, value in whole.items() if key != "title"})
     overlays = {name + _OVERLAY: _overlaid(section) for name, section in sections.items()}
     whole["properties"]["presets"] = {
@@ -27,6 +28,14 @@ def schema() -> dict[str, Any]:
         **whole,
         "$defs": {**sections, **overlays, f"Problem{_OVERLAY}": overlay},
     }
+
+
+def _offer_drives(whole: dict[str, Any], sections: dict[str, Any]) -> None:
+    """Adds `drives`, a list that stands for a drive of the kind `several`."""
+    told = {"description": "what moves it at once, instead of `drive`"}
+    whole["properties"]["drives"] = sections["SeveralDrives"]["properties"]["drives"] | told
+    whole["required"].remove("drive")
+    whole["oneOf"] = [{"required": ["drive"]}, {"required": ["drives"]}]
 
 
 def text() -> str:

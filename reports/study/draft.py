@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from pipeline.problem import Problem
-from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive, case_count
+from pipeline.problem.sections import HarmonicDrive, RampHarmonicDrive, case_count, single_drives
 from reports.base import ALTERED
 
 
@@ -24,12 +24,14 @@ def reasons(problem: Problem, study: Problem) -> list[str]:
 def _sizes(problem: Problem) -> dict[str, float]:
     drive, sweep, robustness = problem.drive, problem.sweep, problem.robustness
     directions = drive.directions if isinstance(drive, HarmonicDrive | RampHarmonicDrive) else ()
+    first = single_drives(drive)[0]
+    moved = {"mm": "displacement", "rad": "rotation"}.get(first.unit, "load")
     sqp = problem.optimiser.methods.sqp
     static = problem.static
     return {
         "units": problem.lattice.n_units,
         "load angles": len(directions),
-        "mm of driven displacement": getattr(drive, "amplitude", 0.0) if static else 0.0,
+        f"{first.unit} of driven {moved}": getattr(first, "amplitude", 0.0) if static else 0.0,
         "load steps in the loss": problem.horizon.steps or 0,
         "evaluations of the design": sqp.evaluations if sqp else 0,
         "drive cycles": 0 if static else problem.response.cycles,

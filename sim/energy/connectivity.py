@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,10 +27,12 @@ class Topology:
     Attributes:
         ligament_units: (n_ligaments, 2).
         site: (n_units, 2) where the units are, mm.
-        held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending.
+        held: (n_held,) ids (3 unit + dof) of the prescribed dofs, ascending; those of the loads are
+            numbered after all units'.
         designed: (n_designed,) ligaments whose parameters may be differentiated by.
         rotation_scale: length that makes rotations comparable with displacements, mm.
         contact: the law on void angles, or the pairs of units that the law on distances acts on.
+        loaded: (n_loaded,) units under dead loads, forces and a moment, ascending.
     """
 
     ligament_units: Ints
@@ -39,11 +41,21 @@ class Topology:
     designed: Ints
     rotation_scale: float
     contact: VoidAngleContact | CandidatePairs
+    loaded: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @cached_property
     def numbering(self) -> tuple[Ints, Pattern]:
         """Number of each dof among the free ones (-1 if held), and the tangent's pattern."""
-        return number_free_dofs(self.site, self.coupled_units, self.held)
+        free, pattern = number_free_dofs(self.site, self.coupled_units, self.unloaded.held)
+        return np.append(free, np.full(3 * len(self.loaded), -1)), pattern
+
+    @property
+    def unloaded(self) -> Topology:
+        """Returns the structure whose loads are no coordinates."""
+        if len(self.loaded) == 0:
+            return self
+        held = self.held[: len(self.held) - 3 * len(self.loaded)]
+        return replace(self, held=held, loaded=self.loaded[:0])
 
     @property
     def coupled_units(self) -> Ints:
@@ -70,8 +82,8 @@ class Topology:
 
     @property
     def n_dofs(self) -> int:
-        """Number of all dofs."""
-        return 3 * self.n_units
+        """Number of all dofs, those of the loads included."""
+        return 3 * (self.n_units + len(self.loaded))
 
     @property
     def n_free(self) -> int:
@@ -103,8 +115,12 @@ class Topology:
 
     @cached_property
     def scale(self) -> Floats:
-        """(n_dofs,) weights that make displacements and rotations comparable, mm."""
-        return np.tile([1.0, 1.0, self.rotation_scale], self.n_units)
+        """(n_dofs,) weights that make displacements and rotations comparable, mm.
+
+        A load of 1 N counts as 1 mm.
+        """
+        of_unit, of_load = ([1.0, 1.0, r] for r in (self.rotation_scale, 1 / self.rotation_scale))
+        return np.append(np.tile(of_unit, self.n_units), np.tile(of_load, len(self.loaded)))
 
     def smallest_void_angle(self, void: Floats, motion: Floats) -> Floats:
         """Smallest void angle (...) of states ``motion`` (..., n_units, 3), rad."""
@@ -118,9 +134,13 @@ class Topology:
 
 
 def topology(
-    lattice: Lattice, held: Ints, contact: ContactModel, designed_units: Ints | None = None
+    lattice: Lattice,
+    held: Ints,
+    contact: ContactModel,
+    designed_units: Ints | None = None,
+    loaded: Ints | None = None,
 ) -> Topology:
-    """Joins the units of a lattice whose dofs ``held`` are prescribed.
+    """Joins the units of a lattice whose dofs ``held`` are prescribed, and which are ``loaded``.
 
     Without ``designed_units`` every ligament's parameters can be differentiated by; with them only
     those of the ligaments of these units, which must be all units with a vertex that the design
@@ -132,13 +152,16 @@ def topology(
         if designed_units is None
         else np.flatnonzero(np.isin(units, designed_units).any(axis=1))
     )
+    under = np.zeros(0, dtype=np.int64) if loaded is None else np.unique(loaded)
+    loads = 3 * lattice.n_units + np.arange(3 * len(under))
     return Topology(
         ligament_units=np.ascontiguousarray(units),
         site=lattice.site,
-        held=np.unique(held),
+        held=np.append(np.unique(held), loads),
         designed=designed,
         rotation_scale=lattice.spacing / 2,
         contact=find_candidate_pairs(lattice, contact.distance)
         if isinstance(contact, DistanceContact)
         else contact,
+        loaded=under,
     )

@@ -42,8 +42,8 @@ class Observables(NamedTuple):
     bend: Floats
 
     def force_on(self, units: Ints) -> Floats:
-        """Sums the reactions on units to a force (n_states, 2), N."""
-        return np.asarray(self.reaction[:, units, :2].sum(axis=1))
+        """Sums the reactions on units to a force (n_states, 2), N; there is none on free dofs."""
+        return np.asarray(np.nansum(self.reaction[:, units, :2], axis=1))
 
 
 @compiled
@@ -56,6 +56,7 @@ def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pai
 
 def observe(topology: Topology, values: ConcreteParameters, motion: Floats) -> Observables:
     """Computes observables of states ``motion`` (n_states, n_units, 3) of a structure."""
+    topology = topology.unloaded
     states = np.ascontiguousarray(motion.reshape(len(motion), topology.n_dofs))
     energies, forces = np.empty((len(states), 2)), np.empty_like(states)
     near = np.zeros(len(states), dtype=np.int64)

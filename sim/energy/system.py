@@ -23,7 +23,8 @@ class System(NamedTuple):
         mass, damping: (n_dofs,) diagonal.
         free: (n_dofs,) number of each dof among the free ones, negative where held.
         dofs: (n_free,) ids of the free dofs in the tangent's order.
-        held: (n_held,) ids of the prescribed dofs.
+        held: (n_held,) ids of the prescribed dofs, those of the loads last.
+        loaded: (n_loaded,) units under dead loads, whose three components are the last dofs.
         scale: (n_dofs,) weights that make rotations comparable with displacements, mm.
         pattern: of the tangent.
     """
@@ -35,6 +36,7 @@ class System(NamedTuple):
     free: Ints
     dofs: Ints
     held: Ints
+    loaded: Ints
     scale: Floats
     pattern: Pattern
 
@@ -97,14 +99,16 @@ def system_of(
 ) -> System:
     """Lays out the system of parameters, with contact in ``touching`` ligaments (default all)."""
     free, pattern = topology.numbering
+    loads = np.ones(3 * len(topology.loaded))  # of no mass that counts
     return System(
         net=topology.network(values, touching),
-        contacts=contact_arrays(topology.contact, values, topology.n_units),
-        mass=np.array(values.mass, dtype=float, order="C").ravel(),
-        damping=np.array(values.damping, dtype=float, order="C").ravel(),
+        contacts=contact_arrays(topology.contact, values, topology.n_dofs // 3),
+        mass=np.concatenate([np.ravel(values.mass), loads]),
+        damping=np.concatenate([np.ravel(values.damping), 0.0 * loads]),
         free=free,
         dofs=topology.free_dofs,
         held=topology.held,
+        loaded=topology.loaded,
         scale=topology.scale,
         pattern=pattern,
     )
@@ -127,7 +131,7 @@ def empty_bars(system: System, drive_shape: tuple[int, ...]) -> Bars:
     return Bars(sensitivity, zero, zero.copy(), np.zeros(drive_shape))
 
 
-def as_values(bars: Bars) -> ConcreteParameters:
-    """Shapes the derivatives by all parameters as they are."""
-    mass, damping = bars.mass.reshape(-1, 3), bars.damping.reshape(-1, 3)
+def as_values(bars: Bars, n_units: int) -> ConcreteParameters:
+    """Shapes the derivatives by all parameters as they are, those of ``n_units`` units."""
+    mass, damping = (part.reshape(-1, 3)[:n_units] for part in (bars.mass, bars.damping))
     return ConcreteParameters(*bars.sensitivity, mass=mass, damping=damping)

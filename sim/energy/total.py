@@ -1,4 +1,7 @@
-"""Sums the energy of a system: its ligaments, and contact by the law of its structure.
+"""Sums the energy of a system: its ligaments, contact by the law of its structure, and dead loads.
+
+A load q on a degree of freedom u adds -q u. It is a prescribed coordinate of the motion like a held
+displacement, so that solvers follow it, and adjoints differentiate by it, as they do by that one.
 
 The solvers see the energy and the admissible states through these functions alone.
 """
@@ -23,12 +26,19 @@ from sim.linalg import Matrix
 def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple[float, float]:
     """Fills the energy gradient ``out`` (n_dofs,); returns strain and contact energy, N mm.
 
-    The contact energy of a state that is not admissible is infinite.
+    The work of the loads is taken from the strain energy; the gradient by them is left at zero. The
+    contact energy of a state that is not admissible is infinite.
     """
     strain = ligament_kernels.gradient(motion, system.net, turn, out)
     contact = void_contact_kernels.add_gradient(motion, system.net, out)
     if len(system.contacts.pairs) > 0:
         contact += add_gradient(motion, system.contacts, out)
+    first = len(out) - 3 * len(system.loaded)
+    for k in range(len(system.loaded)):
+        for m in range(3):
+            d, load = 3 * system.loaded[k] + m, motion[first + 3 * k + m]
+            out[d] -= load
+            strain -= load * motion[d]
     return strain, contact
 
 
@@ -50,6 +60,12 @@ def hessian_product(
     void_contact_kernels.add_hessian_product(motion, system.net, direction, out)
     if len(system.contacts.pairs) > 0:
         add_hessian_product(motion, system.contacts, direction, out)
+    first = len(out) - 3 * len(system.loaded)
+    for k in range(len(system.loaded)):
+        for m in range(3):
+            d, load = 3 * system.loaded[k] + m, first + 3 * k + m
+            out[d] -= direction[load]
+            out[load] -= direction[d]
 
 
 @compiled

@@ -85,4 +85,4 @@ def eigenvalue_and_slopes(
         hessian_product(moved, system, turn, direction, product)
         bar += product
     adjoint(state[None], bar[None], system, topology.designed, bars)
-    return value, as_values(bars)
+    return value, as_values(bars, topology.n_units)

@@ -173,7 +173,7 @@ class StaticSolver:
                 " gradient to follow; try another design or more load steps",
                 step=unstable,
             )
-        return as_values(bars), self.output_times, bars.drive
+        return as_values(bars, top.n_units), self.output_times, bars.drive
 
 
 def _empty_branch(n_loads: int, n_dofs: int) -> Branch:

@@ -34,6 +34,7 @@ from .scene import Structure as Structure
 from .simulation import Mimicking as Mimicking
 from .simulation import Response as Response
 from .simulation import cases_of as cases_of
+from .simulation import drive_force as drive_force
 from .simulation import mimicking as mimicking
 from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate

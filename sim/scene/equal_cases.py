@@ -49,7 +49,9 @@ def equal_cases(scene: Scene, vertices: Floats, values: ConcreteParameters) -> I
     """
     loads = scene.loads
     every = np.arange(len(loads.cases))
-    directed = all(isinstance(motion, DIRECTED) for motion in loads.motions)
+    directed = all(
+        isinstance(case.motion, DIRECTED) and case.control is None for case in loads.cases
+    )
     if len(every) == 1 or not directed or scene.objective.reference is not None:
         return every
     image = quarter_turn(scene.lattice, vertices)

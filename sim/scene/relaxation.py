@@ -13,7 +13,7 @@ from sim.core import Floats
 from sim.energy import ligament_strain
 from sim.scene.scene import Scene
 from sim.scene.simulation import Response, mimicking, simulate
-from sim.solvers import LinearRamp, PrescribedMotion
+from sim.solvers import LinearRamp
 from sim.structure import Parameters
 
 
@@ -60,7 +60,7 @@ def relaxed(scene: Scene, vertices: Floats | None = None) -> Relaxed:
     Raises:
         SimulationError: there is no equilibrium.
     """
-    still = PrescribedMotion(scene.loads.driven, LinearRamp(0.0, 1.0, 0.0))
+    still = scene.loads.following(LinearRamp(0.0, 1.0, 0.0))
     posed = scene.updated(cases=(still,), weights=None, static=True, duration=1.0, reference=None)
     network = scene.lattice.vertices if vertices is None else vertices
     found = simulate(posed, vertices=network, times=np.ones(1))

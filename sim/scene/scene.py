@@ -10,7 +10,16 @@ import numpy as np
 
 from sim.core import Floats, Ints
 from sim.energy import Topology, topology
-from sim.solvers import Harmonic, LinearRamp, MotionLaw, PrescribedMotion, Pulse, TanhRamp
+from sim.solvers import (
+    DISPLACEMENT,
+    Harmonic,
+    LinearRamp,
+    MotionLaw,
+    PrescribedMotion,
+    Pulse,
+    TanhRamp,
+    single_motions,
+)
 from sim.structure import (
     ContactModel,
     DesignSpace,
@@ -35,6 +44,12 @@ AUTHORS_CONTACT = VoidAngleContact(float(np.deg2rad(-15.0)), float(np.deg2rad(-1
 
 def _none() -> Ints:
     return np.zeros(0, dtype=np.int64)
+
+
+def _displaced(case: PrescribedMotion) -> Ints:
+    """Ids of the dofs whose displacement or rotation a load case prescribes."""
+    dofs = 3 * case.units[:, None] + np.arange(3)
+    return dofs.ravel() if case.control is None else dofs[case.control == DISPLACEMENT]
 
 
 @dataclass(frozen=True)
@@ -70,8 +85,8 @@ class Loads:
     """Holds what acts on a structure, one load case after the other.
 
     Attributes:
-        cases: what acts in each load case: a motion and the units that follow it with all three
-            degrees of freedom; units that any case drives are held in all.
+        cases: what acts in each load case: a motion, or forces, and the units that follow it; dofs
+            that any case displaces are held in all, and all load the same units.
         supports: units that rest in all cases.
         duration: s; the length of the load path in a static scene.
         frequency: highest frequency of the drive, Hz; by default that of its harmonic motions,
@@ -96,8 +111,8 @@ class Loads:
     @property
     def drive_frequency(self) -> float | None:
         """Highest frequency of the drive, Hz; None if it has none."""
-        harmonic = [case.motion for case in self.cases if isinstance(case.motion, Harmonic)]
-        found = [float(motion.frequency) for motion in harmonic]
+        every = [one for motion in self.motions for one in single_motions(motion)]
+        found = [float(one.frequency) for one in every if isinstance(one, Harmonic)]
         return max(found, default=None) if self.frequency is None else self.frequency
 
     @property
@@ -111,6 +126,24 @@ class Loads:
         return np.unique(np.concatenate([_none(), *(case.units for case in self.cases)]))
 
     @cached_property
+    def loaded(self) -> Ints:
+        """(n,) units under forces, ascending.
+
+        Raises:
+            ValueError: load cases put forces on different units.
+        """
+        first, *others = (case.loaded for case in self.cases)
+        if any(not np.array_equal(first, other) for other in others):
+            raise ValueError("all load cases must put forces on the same units, if only of zero")
+        return first
+
+    def following(self, motion: MotionLaw) -> PrescribedMotion:
+        """Prescribes another motion of the driven units, or forces on them."""
+        if any(case.control is not None for case in self.cases):
+            return self.cases[0]._replace(motion=motion)
+        return PrescribedMotion(self.driven, motion)
+
+    @cached_property
     def clamped(self) -> Ints:
         """(n,) ids (3 unit + dof) of the dofs that rest by a support, ascending."""
         dofs = [3 * each.units + DOFS.index(dof) for each in self.supports for dof in each.dofs]
@@ -118,8 +151,9 @@ class Loads:
 
     @cached_property
     def held(self) -> Ints:
-        """(n_held,) ids of all prescribed dofs, ascending."""
-        return np.union1d(self.clamped, (3 * self.driven[:, None] + np.arange(3)).ravel())
+        """(n_held,) ids of all dofs whose motion is prescribed, ascending."""
+        driven = [_displaced(case) for case in self.cases]
+        return np.unique(np.concatenate([self.clamped, *driven]))
 
 
 @dataclass(frozen=True)
@@ -226,7 +260,7 @@ class Scene:
 
     def driven_by(self, *motions: MotionLaw, **changes: Any) -> Scene:  # noqa: ANN401
         """Replaces the motions of the driven units, weighted equally; changes as of `updated`."""
-        cases = tuple(PrescribedMotion(self.loads.driven, motion) for motion in motions)
+        cases = tuple(self.loads.following(motion) for motion in motions)
         return self.updated(**{"cases": cases, "weights": None, **changes})
 
     def under(
@@ -268,7 +302,8 @@ class Scene:
     def topology(self) -> Topology:
         """Joins the fixed structure; differentiable by what the design can change."""
         moved = np.unique(self.lattice.unit[self.space.free_vertices])
-        return topology(self.lattice, self.loads.held, self.structure.contact, moved)
+        loads, contact = self.loads, self.structure.contact
+        return topology(self.lattice, loads.held, contact, moved, loads.loaded)
 
     @cached_property
     def region_ligaments(self) -> Ints:

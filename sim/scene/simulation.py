@@ -25,7 +25,7 @@ from sim.scene.objectives import (
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_units
-from sim.solvers import Case, Solver, concrete, differentiable_motion, solve_cases
+from sim.solvers import Case, PrescribedMotion, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters, parameters, shape
 from sim.time_integration import simpson_weights
 
@@ -69,8 +69,13 @@ class Response:
     @cached_property
     def drive_force(self) -> Floats:
         """(n_cases, n_times, 2) force on the driven units, N."""
-        driven = self.scene.loads.driven
-        return np.stack([each.force_on(driven) for each in self.observables])
+        drives = [self.scene.loads.cases[case] for case in self.cases]
+        return np.stack(
+            [
+                drive_force(self.scene, seen, drive, self.times)
+                for seen, drive in zip(self.observables, drives, strict=True)
+            ]
+        )
 
     @cached_property
     def losses(self) -> Array:
@@ -144,6 +149,12 @@ def simulate(
         check_units(scene.lattice, np.asarray(scene.space.vertices(design)))
     empty = Response(scene, made, concrete(values), chosen, np.empty(0), np.empty(0))
     return _solved(empty, (made.solver,) * len(chosen))
+
+
+def drive_force(scene: Scene, seen: Observables, drive: PrescribedMotion, times: Floats) -> Floats:
+    """Sums the forces (n_times, 2) on the driven units: held in place, and put on, N."""
+    put_on = drive.forces(times)[..., :2].sum(axis=1)
+    return np.asarray(seen.force_on(scene.loads.driven) + put_on)
 
 
 def _solved(response: Response, solvers: tuple[Solver, ...]) -> Response:

@@ -13,7 +13,7 @@ import shapely
 
 from sim.core import Floats, SimulationError
 from sim.scene.scene import Scene
-from sim.solvers import MotionLaw, TimeSeries
+from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
 
 LOG = logging.getLogger(__name__)
@@ -66,9 +66,9 @@ def check_scene(
     check_units(scene.lattice, scene.lattice.vertices if vertices is None else vertices)
     _check_ids(scene)
     found = [*_loose_units(scene), *_size(scene, len(asked))]
-    for number, motion in enumerate(scene.loads.motions):
-        if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(motion)):
-            found += _drive(scene, motion, f"load case {number}", float(asked[-1]))
+    for number, drive in enumerate(scene.loads.cases):
+        if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):
+            found += _drive(scene, drive, f"load case {number}", float(asked[-1]))
     for warning in found:
         _warn(warning)
     return tuple(found)
@@ -153,18 +153,21 @@ def _size(scene: Scene, n_times: int) -> Iterator[str]:
     yield f"{told}{time}"
 
 
-def _drive(scene: Scene, motion: MotionLaw, case: str, end: float) -> Iterator[str]:
-    """Checks the motion of a load case up to a time.
+def _drive(scene: Scene, drive: PrescribedMotion, case: str, end: float) -> Iterator[str]:
+    """Checks what moves in a load case up to a time.
 
     Raises:
         SceneError: it is no series, leads beyond the lattice, starts with a jump, or moves the
             structure as a rigid body.
     """
-    if isinstance(motion, TimeSeries):
-        _series(motion, case, end)
+    for one in single_motions(drive.motion):
+        if isinstance(one, TimeSeries):
+            _series(one, case, end)
     instants = np.linspace(0.0, end, INSTANTS)
     with jax.ensure_compile_time_eval():  # under jax.jit, which is refused further on
-        course = np.asarray(motion(instants)).reshape(INSTANTS, -1, 3)
+        course = np.asarray(drive.motion(instants)).reshape(INSTANTS, -1, 3)
+    if drive.control is not None:
+        course = np.where(drive.control == DISPLACEMENT, course, 0.0)
     far = float(np.hypot(course[..., 0], course[..., 1]).max(initial=0.0))
     size = np.ptp(scene.lattice.vertices, axis=0)
     if not far <= size.max():
@@ -175,6 +178,8 @@ def _drive(scene: Scene, motion: MotionLaw, case: str, end: float) -> Iterator[s
         )
     if scene.loads.static:
         _held_back(scene, course, case)
+        if len(drive.loaded) > 0:
+            _supported(scene, case)
         return
     whole = np.abs(course * [1.0, 1.0, scene.lattice.spacing / 2]).max(axis=(1, 2))
     jump = whole[0] / max(whole.max(), 1e-300)
@@ -199,6 +204,20 @@ def _series(motion: TimeSeries, case: str, end: float) -> None:
             f"{case} is known from {times[0]:.6g} to {times[-1]:.6g} s, and is asked for from 0 to"
             f" {end:.6g} s; give a longer series, or a shorter horizon",
             "drive.file",
+        )
+
+
+def _supported(scene: Scene, case: str) -> None:
+    """Refuses static forces on a structure that is free to move or turn as a rigid body."""
+    unit, dof = np.divmod(scene.loads.held, 3)
+    x, y = ((scene.lattice.site - scene.lattice.site.mean(axis=0)) / scene.lattice.spacing)[unit].T
+    turned = np.select([dof == 0, dof == 1], [-y, x], 1.0)
+    modes = np.stack([dof == 0, dof == 1, turned], axis=1)
+    if np.linalg.matrix_rank(modes) < modes.shape[1]:
+        raise SceneError(
+            f"nothing holds the structure against the forces of {case}: it can move or turn as one;"
+            " clamp some units",
+            "supports",
         )
 
 

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
 from sim.scene.scene import DIRECTED, Accuracy, Scene
-from sim.solvers import PrescribedMotion, Pulse, breakpoints, solve_case
+from sim.solvers import PrescribedMotion, Pulse, breakpoints, single_motions, solve_case
 from sim.structure import ConcreteParameters
 from sim.time_integration import (
     BLANES_MOAN,
@@ -27,7 +28,7 @@ from sim.time_integration import (
     adapted,
     time_grid,
 )
-from sim.vibration import highest_frequency, lowest_frequency
+from sim.vibration import highest_frequency, linearised, lowest_frequency
 
 LOG = logging.getLogger(__name__)
 
@@ -143,7 +144,8 @@ def _implicit_first(scene: Scene, values: ConcreteParameters, decisions: list[st
     if scene.numerics.accuracy == "tight":
         decisions.append("explicit: a tight tolerance needs every frequency resolved")
         return False
-    bells = [0.5 / float(m.width) for m in scene.loads.motions if isinstance(m, Pulse)]
+    every = [one for motion in scene.loads.motions for one in single_motions(motion)]
+    bells = [0.5 / float(one.width) for one in every if isinstance(one, Pulse)]
     driven = scene.loads.drive_frequency or max(bells, default=None)
     if driven is None:
         decisions.append("the drive has no frequency of its own")
@@ -208,7 +210,8 @@ def different_drives(scene: Scene) -> list[PrescribedMotion]:
     for drive in scene.loads.cases:
         motion = drive.motion
         besides = motion._replace(direction=0.0) if isinstance(motion, DIRECTED) else id(motion)
-        found.setdefault((type(motion), tuple(drive.units), besides), drive)
+        control = None if drive.control is None else drive.control.tobytes()
+        found.setdefault((type(motion), tuple(drive.units), control, besides), drive)
     return list(found.values())
 
 
@@ -288,18 +291,28 @@ def _first_grid(
     if frequency is not None:
         return replace(solver, times=time_grid.through(steps, stops))
     grids = [
-        adapted(solver, values, drive, rule.per_step * _size(solver, drive, stops), rule.first,
-                largest, stops, most).times
+        adapted(solver, values, drive, rule.per_step * _size(solver, values, drive, stops),
+                rule.first, largest, stops, most).times
         for drive in drives
     ]  # fmt: skip
     return replace(solver, times=time_grid.through(grids[0], np.concatenate(grids)))
 
 
-def _size(solver: ImplicitSolver, drive: PrescribedMotion, stops: Floats) -> float:
-    """Finds how far a drive goes, mm (rotations times the rotation scale)."""
-    held = solver.topology.held
+def _size(
+    solver: ImplicitSolver, values: ConcreteParameters, drive: PrescribedMotion, stops: Floats
+) -> float:
+    """Finds how far a drive goes, or its forces push slowly, mm (rotations times their scale)."""
+    top, held = solver.topology, solver.topology.unloaded.held
     at = np.union1d(np.linspace(0.0, float(solver.times[-1]), SAMPLES), stops)
-    return float(np.abs(drive.values(held, at) * solver.topology.scale[held]).max()) or 1.0
+    size = np.abs(drive.values(top.held, at)[:, : len(held)] * top.scale[held]).max(initial=0.0)
+    if len(drive.loaded) > 0:
+        most = drive.forces(at)
+        most = most[np.abs(most[..., :2]).max(axis=(1, 2)).argmax()]
+        of, right = linearised(top, values), np.zeros(3 * top.n_units)
+        np.add.at(right, 3 * drive.units[:, None] + np.arange(3), most)
+        pushed = spla.spsolve(of.stiffness, right[of.free])
+        size = max(size, np.abs(pushed * top.scale[of.free]).max(initial=0.0))
+    return float(size) or 1.0
 
 
 def _explicit(

@@ -20,7 +20,7 @@ from jax.custom_derivatives import SymbolicZero
 
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import Topology
-from sim.solvers.loads import MotionLaw, held_values
+from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
 from sim.solvers.validation import (
     check_free_dofs,
     check_masses,
@@ -45,19 +45,36 @@ class CaseMotions(NamedTuple):
 
 
 class PrescribedMotion(NamedTuple):
-    """Prescribes the motion of units, all their dofs; all other held dofs rest.
+    """Prescribes the motion of units, or the forces on them; all other held dofs rest.
 
     Attributes:
         units: (n,) ids.
-        motion: of them, mm, mm, rad.
+        motion: of them, mm, mm, rad; N, N, N mm where it is a force.
+        control: (n, 3) whether each component is a DISPLACEMENT, a FORCE, or the dof is FREE; by
+            default all dofs are displaced.
     """
 
     units: Ints
     motion: MotionLaw
+    control: Ints | None = None
+
+    @property
+    def loaded(self) -> Ints:
+        """(n_loaded,) units under a force, ascending."""
+        return self.units[:0] if self.control is None else loaded_units(self.units, self.control)
+
+    def forces(self, times: Floats) -> Floats:
+        """Forces (n_times, n, 3) that it puts on its units, N and N mm; zero where it puts none."""
+        shape = (len(times), len(self.units), 3)
+        if self.control is None:
+            return np.zeros(shape)
+        every = np.asarray(self.motion(_padded(times)))[: len(times)]
+        each = np.broadcast_to(every.reshape(len(times), -1, 3), shape)
+        return np.where(self.control == FORCE, each, 0.0)
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
-        every = held_values(held, self.units, self.motion, _padded(times))
+        every = held_values(held, self.units, self.motion, _padded(times), self.control)
         return np.asarray(every)[: len(times)]
 
     def start(self, topology: Topology, time: float) -> Floats:
@@ -68,7 +85,7 @@ class PrescribedMotion(NamedTuple):
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """Their rates of change, per s."""
-        every = _held_rates(held, self.units, self.motion, _padded(times))
+        every = _held_rates(held, self, self.motion, _padded(times))
         return np.asarray(every)[: len(times)]
 
 
@@ -77,9 +94,13 @@ def _padded(times: Floats) -> Floats:
     return np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
 
 
-def _held_rates(held: Ints, units: Ints, motion: MotionLaw, times: Floats) -> Array:
+def _held_rates(held: Ints, drive: PrescribedMotion, motion: MotionLaw, times: Floats) -> Array:
     at = jnp.asarray(times)
-    return jax.jvp(lambda t: held_values(held, units, motion, t), (at,), (jnp.ones_like(at),))[1]
+
+    def values(t: Array) -> Array:
+        return held_values(held, drive.units, motion, t, drive.control)
+
+    return jax.jvp(values, (at,), (jnp.ones_like(at),))[1]
 
 
 class Solver(Protocol):
@@ -131,7 +152,7 @@ class Solver(Protocol):
 def solve_case(
     solver: Solver, values: ConcreteParameters, drive: PrescribedMotion
 ) -> tuple[Floats, Floats, Any]:
-    """Solves one case: displacement and velocity (n_times, n_dofs), and the solver's record.
+    """Solves one case: displacement and velocity (n_times, 3 n_units), and the solver's record.
 
     Raises:
         SimulationError: a step failed, or there is nothing meaningful to start from.
@@ -146,7 +167,8 @@ def solve_case(
     held = solver.topology.held
     displacement[:, held] = drive.values(held, solver.output_times)
     velocity[:, held] = drive.rates(held, solver.output_times)
-    return displacement, velocity, record
+    of_units = slice(3 * solver.topology.n_units)
+    return displacement[:, of_units], velocity[:, of_units], record
 
 
 @jax.tree_util.register_static
@@ -216,9 +238,7 @@ def solve_cases(
 def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats) -> Gradients:
     """Sweeps back through ``solve_cases``, from loss derivatives shaped as its outputs."""
     # copies, as jax's arrays are read only: loops would be compiled once more for these
-    flat_u, flat_v = (
-        np.array(bar).reshape(len(bar), -1, solver.topology.n_dofs) for bar in (bar_u, bar_v)
-    )
+    flat_u, flat_v = (_with_loads(solver.topology, bar) for bar in (bar_u, bar_v))
     results = _spread(
         lambda case: solver.backward(
             records.values, records.records[case], flat_u[case], flat_v[case]
@@ -229,6 +249,12 @@ def adjoint_cases(solver: Solver, records: Records, bar_u: Floats, bar_v: Floats
     parts, times, drive = zip(*results, strict=True)
     summed = ConcreteParameters(*(np.asarray(sum(part)) for part in zip(*parts, strict=True)))
     return Gradients(summed, list(times), list(drive))
+
+
+def _with_loads(topology: Topology, bar: Floats) -> Floats:
+    """Appends zeros for the loads to derivatives by motions: (n_cases, n_times, n_dofs)."""
+    flat = np.asarray(bar).reshape(len(bar), -1, 3 * topology.n_units)
+    return np.pad(flat, ((0, 0), (0, 0), (0, 3 * len(topology.loaded))))
 
 
 def everywhere(solver: Any) -> Any:
@@ -312,8 +338,8 @@ def _backward_rule(
     total = Parameters(*(jnp.asarray(part) for part in pulled.parameters))
     if not driven:
         return total, jax.tree.map(_zero, records.drives)
-    held, n_dofs = solver.topology.held, solver.topology.n_dofs
-    held_u, held_v = (part.reshape(len(part), -1, n_dofs)[..., held] for part in (bar_u, bar_v))
+    held = solver.topology.held
+    held_u, held_v = (_with_loads(solver.topology, part)[..., held] for part in (bar_u, bar_v))
     return total, tuple(
         _drive_cotangent(
             held,
@@ -357,18 +383,20 @@ def _drive_cotangent(
         bars: derivatives by the held values at both, and by their rates at the output.
     """
     within, outputs = times
-    units = np.asarray(drive.units)
+    units, control = np.asarray(drive.units), drive.control
 
     def prescribed(motion: MotionLaw) -> tuple[Array, Array, Array]:
         return (
-            held_values(held, units, motion, within),
-            held_values(held, units, motion, outputs),
-            _held_rates(held, units, motion, outputs),
+            held_values(held, units, motion, within, control),
+            held_values(held, units, motion, outputs, control),
+            _held_rates(held, drive, motion, outputs),
         )
 
     _, pull_back = jax.vjp(prescribed, drive.motion)
     return PrescribedMotion(
-        _zero(drive.units), pull_back(tuple(jnp.asarray(bar) for bar in bars))[0]
+        _zero(drive.units),
+        pull_back(tuple(jnp.asarray(bar) for bar in bars))[0],
+        None if control is None else _zero(control),
     )
 
 

@@ -10,6 +10,9 @@ from jax import Array
 
 from sim.core import Floats, Ints, Numbers
 
+DISPLACEMENT, FORCE, FREE = 0, 1, -1
+"""What a component of a drive prescribes of its degree of freedom: a displacement or rotation, a
+force or moment (a dead load), or nothing."""
 NOTICED = 1e-3
 """Least kink of a series that steps stop at: how far its point lies off its neighbours' line, over
 the series's range."""
@@ -29,6 +32,21 @@ def _along(direction: float | Array, displacement: Array) -> Array:
     return jnp.stack(
         [displacement * jnp.cos(direction), displacement * jnp.sin(direction), still], axis=-1
     )
+
+
+class Turning(NamedTuple):
+    """Turns by the course of a motion along x, its displacement in mm read as an angle in rad.
+
+    Of a force, in N, it makes a moment, in N mm.
+    """
+
+    course: MotionLaw
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, 3) at the given times, s."""
+        along = self.course(times)[:, 0]
+        still = jnp.zeros_like(along)
+        return jnp.stack([still, still, along], axis=-1)
 
 
 class Harmonic(NamedTuple):
@@ -98,6 +116,23 @@ class LinearRamp(NamedTuple):
         return _along(self.direction, self.amplitude * jnp.asarray(times) / self.duration)
 
 
+class Together(NamedTuple):
+    """Moves each driven unit by a sum of motions.
+
+    Attributes:
+        motions: (n_motions,) of one course for all units each.
+        shares: (n_units, n_motions) of each motion in that of each unit.
+    """
+
+    motions: tuple[MotionLaw, ...]
+    shares: Floats | Array
+
+    def __call__(self, times: Numbers) -> Array:
+        """Motion (n_times, n_units, 3) at the given times, s."""
+        each = jnp.stack([motion(times) for motion in self.motions])
+        return jnp.einsum("um,mtd->tud", self.shares, each)
+
+
 class TimeSeries(NamedTuple):
     """Follows a measured motion, interpolated linearly.
 
@@ -122,6 +157,10 @@ def breakpoints(motion: MotionLaw, end: float) -> Floats:
     A bell or a switch, whose extent is infinite, counts as eight widths long.
     """
     match motion:
+        case Together():
+            found = np.concatenate([breakpoints(one, end) for one in motion.motions])
+        case Turning():
+            found = breakpoints(motion.course, end)
         case Pulse():
             found = motion.delay + motion.width * np.arange(-4.0, 5.0)
         case Harmonic(rise=float(rise)):
@@ -144,25 +183,57 @@ def _kinks(times: Floats, motion: Floats) -> Floats:
     return np.asarray(times[noticed])
 
 
+def single_motions(motion: MotionLaw) -> tuple[MotionLaw, ...]:
+    """Lists the motions that one is made of."""
+    match motion:
+        case Together():
+            return tuple(one for each in motion.motions for one in single_motions(each))
+        case Turning():
+            return single_motions(motion.course)
+        case _:
+            return (motion,)
+
+
 def held_dofs(clamped: Ints, driven: Ints) -> Ints:
     """Ids of all dofs of the clamped and driven units, ascending."""
     units = np.unique(np.concatenate([clamped, driven]))
     return (3 * units[:, None] + np.arange(3)).ravel()
 
 
-def held_values(held: Ints, driven: Ints, motion: MotionLaw, times: Numbers) -> Array:
+def held_values(
+    held: Ints, driven: Ints, motion: MotionLaw, times: Numbers, control: Ints | None = None
+) -> Array:
     """Values (n_times, n_held) of the held dofs when ``driven`` follow ``motion``; the others rest.
+
+    Args:
+        held: (n_held,) ids, those of the loads last: three of each loaded unit, in their order.
+        driven: (n_driven,) units.
+        motion: of them.
+        times: (n_times,) s.
+        control: (n_driven, 3) what each component of the motion is; by default a displacement.
 
     Raises:
         ValueError: a driven dof is not among the held ones.
     """
-    dofs = (3 * np.asarray(driven)[:, None] + np.arange(3)).ravel()
-    place = np.searchsorted(held, dofs)
-    if not np.array_equal(held[np.minimum(place, len(held) - 1)], dofs):
+    units = np.asarray(driven)
+    dofs = 3 * units[:, None] + np.arange(3)
+    kinds = np.full(dofs.shape, DISPLACEMENT) if control is None else np.asarray(control)
+    loaded = loaded_units(units, kinds)
+    first = len(held) - 3 * len(loaded)
+    place = np.searchsorted(held[:first], dofs)
+    found = held[np.minimum(place, len(held) - 1)] == dofs
+    if not found[kinds == DISPLACEMENT].all():
         raise ValueError("every dof of a driven unit must be held")
+    load = first + 3 * np.searchsorted(loaded, units)[:, None] + np.arange(3)
     values = jnp.asarray(motion(jnp.asarray(times)))
     if values.ndim == 2:
-        values = jnp.broadcast_to(values[:, None, :], (len(times), len(driven), 3))
-    selection = np.zeros((len(dofs), len(held)))
-    selection[np.arange(len(dofs)), place] = 1.0
+        values = jnp.broadcast_to(values[:, None, :], (len(times), len(units), 3))
+    selection, acts = np.zeros((dofs.size, len(held))), (kinds != FREE).ravel()
+    columns = np.where(kinds == FORCE, load, place).ravel()
+    selection[np.flatnonzero(acts), columns[acts]] = 1.0
     return values.reshape(len(times), -1) @ selection
+
+
+def loaded_units(units: Ints, control: Ints) -> Ints:
+    """Finds the units (n_loaded,) under a force or a moment, ascending."""
+    return np.unique(units[(control == FORCE).any(axis=1)])

@@ -60,7 +60,7 @@ def check_connected(topology: Topology) -> None:
     one, other = topology.ligament_units.T
     joined = coo_array((np.ones(len(one)), (one, other)), shape=(topology.n_units,) * 2)
     _, piece = connected_components(joined, directed=False)
-    floating = np.flatnonzero(~np.isin(piece, piece[topology.held // 3]))
+    floating = np.flatnonzero(~np.isin(piece, piece[topology.unloaded.held // 3]))
     if len(floating) > 0:
         raise SimulationError(
             f"unit {floating[0]} ({len(floating)} units in all) is joined to no unit that is held,"

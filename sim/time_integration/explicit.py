@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
-from sim.energy import Topology, as_values, empty_bars, observe, system_of
+from sim.energy import System, Topology, as_values, empty_bars, observe, system_of
 from sim.solvers import PrescribedMotion, check_masses, check_start
 from sim.structure import ConcreteParameters, VoidAngleContact
 from sim.time_integration import time_grid
@@ -89,7 +89,7 @@ class ExplicitSolver:
         check_start(top, values, system.contacts, drive.start(top, 0.0))
         stable = self._steps_for(MOVING * highest_frequency(top, values, touching=NONE))
         for _ in range(MAX_REFINEMENTS):
-            steps = self._steps(values, drive, stable)
+            steps = self._steps(system, drive, stable)
             checkpoints = np.empty((-(-steps.n_steps // steps.segment), 2, top.n_dofs))
             u, v = (np.zeros((len(self.output_times), top.n_dofs)) for _ in range(2))
             outputs = self._outputs(steps.n_steps)
@@ -123,7 +123,11 @@ class ExplicitSolver:
 
     def _steps_in_motion(self, values: ConcreteParameters, states: Floats) -> int:
         """Counts the steps that are stable in the one of the states whose energy is greatest."""
-        seen = observe(self.topology, values, states.reshape(len(states), -1, 3))
+        seen = observe(
+            self.topology,
+            values,
+            states[:, : 3 * self.topology.n_units].reshape(len(states), -1, 3),
+        )
         fullest = states[(seen.strain_energy + seen.contact_energy).argmax()]
         return self._steps_for(highest_frequency(self.topology, values, fullest, NONE))
 
@@ -147,13 +151,13 @@ class ExplicitSolver:
             bars, bar_decay, bar_gain,
         )  # fmt: skip
         lengths = self.splitting.kicks * steps.h
-        by_mass, by_damping = _kicks_transposed(values, lengths, steps, bar_decay, bar_gain)
+        by_mass, by_damping = _kicks_transposed(system, lengths, steps, bar_decay, bar_gain)
         bars.mass[:] += by_mass
         bars.damping[:] = by_damping
         by_drive = bars.drive.reshape(-1, len(top.held))
-        return as_values(bars), self._kick_times(steps.n_steps), by_drive
+        return as_values(bars, top.n_units), self._kick_times(steps.n_steps), by_drive
 
-    def _steps(self, values: ConcreteParameters, drive: PrescribedMotion, n_steps: int) -> Steps:
+    def _steps(self, system: System, drive: PrescribedMotion, n_steps: int) -> Steps:
         h, n_kicks = self.duration / n_steps, len(self.splitting.kicks)
         needed = np.dtype(float).itemsize * n_steps * n_kicks * len(self.topology.held)
         if needed > MOST_MEMORY:
@@ -167,7 +171,7 @@ class ExplicitSolver:
             n_steps,
             h,
             Pace(self.splitting.drifts, self.splitting.kicks, FINER * self.splitting.stability),
-            *_kicks(values, self.splitting.kicks * h),
+            *_kicks(system, self.splitting.kicks * h),
             held.reshape(n_steps, n_kicks, -1),
             _segment(n_steps),
         )
@@ -188,9 +192,9 @@ def _segment(n_steps: int) -> int:
     return max(1, int(np.sqrt(n_steps)))
 
 
-def _kicks(values: ConcreteParameters, lengths: Floats) -> tuple[Floats, Floats]:
+def _kicks(system: System, lengths: Floats) -> tuple[Floats, Floats]:
     """Decay and gain (n_kicks, n_dofs) of kicks of the given lengths (s)."""
-    mass, damping = values.mass.ravel(), values.damping.ravel()
+    mass, damping = system.mass, system.damping
     x = lengths[:, None] * damping / mass
     return np.exp(-x), lengths[:, None] / mass * _mean_decay(x)
 
@@ -202,10 +206,10 @@ def _mean_decay(x: Floats) -> Floats:
 
 
 def _kicks_transposed(
-    values: ConcreteParameters, lengths: Floats, steps: Steps, bar_decay: Floats, bar_gain: Floats
+    system: System, lengths: Floats, steps: Steps, bar_decay: Floats, bar_gain: Floats
 ) -> tuple[Floats, Floats]:
     """Derivatives by mass and damping (n_dofs,) from those by decay and gain."""
-    mass, damping = values.mass.ravel(), values.damping.ravel()
+    mass, damping = system.mass, system.damping
     x = lengths[:, None] * damping / mass
     # gain = length / mass * f(x) with f the mean decay; f'(x) = (decay - f) / x
     f = steps.gain * mass / lengths[:, None]

@@ -113,7 +113,8 @@ class ImplicitSolver:
         law = self.topology.contact
         if not isinstance(law, VoidAngleContact):
             return False
-        stages = record.u[:-1].reshape(-1, self.topology.n_units, 3)
+        n_units = self.topology.n_units
+        stages = record.u[:-1, :, : 3 * n_units].reshape(-1, n_units, 3)
         closest = self.topology.smallest_void_angles(values.void, stages).min(axis=0)
         closest[record.touching] = np.inf
         return bool(closest.min() < law.cutoff_angle)
@@ -172,4 +173,4 @@ class ImplicitSolver:
             raise SimulationError(
                 "a stage's tangent is indefinite in the adjoint; try shorter steps"
             )
-        return as_values(bars), stage_times, bars.drive
+        return as_values(bars, top.n_units), stage_times, bars.drive

@@ -65,6 +65,7 @@ def linearised(
     topology: Topology, values: ConcreteParameters, motion: Floats | None = None
 ) -> Linear:
     """Linearises a structure about a state ``motion`` (n_units, 3); by default about rest."""
+    topology = topology.unloaded
     whole = replace(topology, held=np.zeros(0, dtype=np.int64))
     place, pattern = number_free_dofs(
         topology.site, topology.coupled_units, whole.held, by_fronts=False

@@ -43,6 +43,15 @@ def test_a_mistake_is_told_as_the_page_says(block: Block, told: Block, tmp_path:
     assert f"  file:   {shown}, line " in told.text
 
 
+@pytest.mark.parametrize("block", yaml_of("docs/loads.md"), ids=lambda each: each.text[:60])
+def test_drives_are_as_the_page_says(block: Block, tmp_path: Path) -> None:
+    (series,) = [each.text for each in blocks("docs/loads.md") if each.language == "text"]
+    (tmp_path / "shaker.csv").write_text(series)
+    problem = tmp_path / "problem.yaml"
+    shutil.copy(ROOT / block.place.removeprefix(LAID_OVER), problem)
+    checked(block, problem)
+
+
 @pytest.mark.parametrize(
     ("phrase", "module"),
     [

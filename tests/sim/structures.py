@@ -17,7 +17,14 @@ from sim.core import Floats, Ints
 from sim.energy import Topology, topology
 from sim.energy.network_arrays import NetworkArrays
 from sim.linalg import Matrix
-from sim.solvers import MotionLaw, PrescribedMotion, Solver, differentiable_motion, held_dofs
+from sim.solvers import (
+    DISPLACEMENT,
+    MotionLaw,
+    PrescribedMotion,
+    Solver,
+    differentiable_motion,
+    held_dofs,
+)
 from sim.structure import (
     DesignSpace,
     DistanceContact,
@@ -137,6 +144,7 @@ class Rig:
         clamped, driven: units.
         motion: of the driven units.
         distance: activation distance of contact between units, mm; None for that on void angles.
+        control: (n_driven, 3) which dofs of the driven units are displaced, loaded or free.
     """
 
     lattice: Lattice
@@ -144,6 +152,7 @@ class Rig:
     driven: Ints
     motion: MotionLaw
     distance: float | None = None
+    control: Ints | None = None
 
     @cached_property
     def space(self) -> DesignSpace:
@@ -151,10 +160,13 @@ class Rig:
 
     @cached_property
     def topology(self) -> Topology:
-        held = held_dofs(self.clamped, self.driven)
         angles = VoidAngleContact(BARRIER, CUTOFF)
         contact = angles if self.distance is None else DistanceContact(self.distance)
-        return topology(self.lattice, held, contact)
+        held = held_dofs(self.clamped, self.driven)
+        if self.control is not None:
+            dofs = 3 * self.driven[:, None] + np.arange(3)
+            held = np.setdiff1d(held, dofs[self.control != DISPLACEMENT])
+        return topology(self.lattice, held, contact, loaded=self.drive.loaded)
 
     @property
     def numbers(self) -> Numbers:
@@ -197,11 +209,14 @@ class Rig:
 
     @property
     def drive(self) -> PrescribedMotion:
-        return PrescribedMotion(self.driven, self.motion)
+        return self.driven_by(self.motion)
+
+    def driven_by(self, motion: MotionLaw) -> PrescribedMotion:
+        return PrescribedMotion(self.driven, motion, self.control)
 
     def loss(self, solver: Solver, numbers: Numbers) -> Array:
         """A smooth function of displacement and velocity without any symmetry."""
-        drive = PrescribedMotion(self.driven, numbers.drive)
+        drive = self.driven_by(numbers.drive)
         response = differentiable_motion(solver, self.parameters(numbers), (drive,))
         return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
 

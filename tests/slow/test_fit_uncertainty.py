@@ -58,7 +58,7 @@ def by_changes(fit: Fit, unknowns: Floats) -> Floats:
     (each,) = fit.model.experiments
     assert isinstance(each, full_field.FullFieldExperiment)
     assert each.drive is not None
-    constants, (units, motion) = fit.model.constants(unknowns), each.drive
+    constants, units, motion = fit.model.constants(unknowns), each.drive.units, each.drive.motion
     assert isinstance(motion, redrive.HermiteMotion)
     step, columns = 1e-3, []
     for one in each.changes:

@@ -16,6 +16,7 @@ from .quantities import Frequency as Frequency
 from .quantities import Gap as Gap
 from .quantities import Length as Length
 from .quantities import Modulus as Modulus
+from .quantities import Moment as Moment
 from .quantities import Positive as Positive
 from .quantities import Ratio as Ratio
 from .quantities import RotaryDamping as RotaryDamping

@@ -67,6 +67,7 @@ Delay = Annotated[float, _reader(units.TIME, 0.0, False), _schema(units.TIME)]
 Frequency = Annotated[float, _reader(units.FREQUENCY, 0.0, True), _schema(units.FREQUENCY)]
 Density = Annotated[float, _reader(units.AREAL_DENSITY, 0.0, True), _schema(units.AREAL_DENSITY)]
 Force = Annotated[float, _reader(units.FORCE, 0.0, True), _schema(units.FORCE)]
+Moment = Annotated[float, _reader(units.MOMENT, None, False), _schema(units.MOMENT)]
 Stiffness = Annotated[float, _reader(units.STIFFNESS, 0.0, True), _schema(units.STIFFNESS)]
 BendingStiffness = Annotated[
     float, _reader(units.BENDING_STIFFNESS, 0.0, True), _schema(units.BENDING_STIFFNESS)

@@ -14,10 +14,13 @@ from pipeline.problem.sections import (
     Quads,
     Region,
     Selector,
+    SeveralDrives,
+    SingleDrive,
     TimeSeriesDrive,
     loose_units,
     resolve_centre,
     selected_units,
+    single_drives,
 )
 
 
@@ -98,7 +101,16 @@ def _smallest_void(lattice: Quads) -> float:
 def _selectors(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
     for index, support in enumerate(problem.supports):
         yield ("supports", index, "units"), support.units
-    yield ("drive", "units"), problem.drive.units
+    for keys, drive in _drives(problem):
+        yield (*keys, "units"), drive.units
+
+
+def _drives(problem: Problem) -> Iterator[tuple[KeyPath, SingleDrive]]:
+    if not isinstance(problem.drive, SeveralDrives):
+        yield ("drive",), problem.drive
+        return
+    for index, drive in enumerate(problem.drive.drives):
+        yield ("drives", index), drive
 
 
 def _units_exist(problem: Problem) -> Findings:
@@ -110,18 +122,44 @@ def _units_exist(problem: Problem) -> Findings:
 
 
 def _drive_is_free(problem: Problem) -> Findings:
-    driven = set(selected_units(problem.drive.units, problem.lattice))
-    for support in problem.supports:
-        if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
-            what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
-            yield ProblemFault(what, ("drive", "units"), "drive or clamp it, not both")
+    others: set[int] = set()
+    for keys, drive in _drives(problem):
+        driven = set(selected_units(drive.units, problem.lattice))
+        for support in problem.supports:
+            if both := sorted(driven & set(selected_units(support.units, problem.lattice))):
+                what = f"unit {problem.lattice.name(both[0])} is driven and clamped"
+                yield ProblemFault(what, (*keys, "units"), "drive or clamp it, not both")
+        if both := sorted(driven & others):
+            what = f"unit {problem.lattice.name(both[0])} is driven twice"
+            yield ProblemFault(what, (*keys, "units"), "give every unit to one drive")
+        others |= driven
+
+
+def _one_kind_of_load(problem: Problem) -> Findings:
+    kinds = single_drives(problem.drive)
+    if len(kinds) > 1 and not problem.static:
+        slow = [d.kind for d in kinds if problem.model_copy(update={"drive": d}).static]
+        if slow:
+            what = f"a {slow[0]} is a slow load, and another of the drives is not"
+            yield ProblemFault(what, ("drives",), "give all of them a course in time, or none")
+    if problem.spectrum is not None and any(d.kind in ("force", "torque") for d in kinds):
+        what = "a spectrum tells the transmission of a displacement, not of a force"
+        yield ProblemFault(what, ("spectrum",), "leave it out, or drive by a displacement")
+
+
+def _steps_of(problem: Problem) -> bool:
+    """Tells a path whose loads can be equal steps."""
+    return all(
+        isinstance(drive, LinearRampDrive) or getattr(drive, "static", False)
+        for drive in single_drives(problem.drive)
+    )
 
 
 def _horizon(problem: Problem) -> Findings:
     if problem.horizon.periods is not None and problem.frequency is None:
         what = f"a {problem.drive.kind} drive has no period"
         yield ProblemFault(what, ("horizon", "periods"), 'give `duration`, e.g. "1 s"')
-    if problem.horizon.steps is not None and not isinstance(problem.drive, LinearRampDrive):
+    if problem.horizon.steps is not None and not _steps_of(problem):
         what = f"a {problem.drive.kind} drive does not load in equal steps"
         yield ProblemFault(what, ("horizon", "steps"), "drive by a linear_ramp, or give `samples`")
 
@@ -266,7 +304,7 @@ def _void_and_supports(problem: Problem, removed: set[int]) -> Findings:
     lattice = problem.lattice
     for keys, selector in _selectors(problem):
         if both := sorted(removed & set(selected_units(selector, lattice))):
-            held = "driven" if keys[0] == "drive" else "clamped"
+            held = "clamped" if keys[0] == "supports" else "driven"
             what = f"the void touches the {held} units: it removes unit {lattice.name(both[0])}"
             yield ProblemFault(what, ("void",), f"make it smaller, or move it off the {held} units")
 
@@ -328,6 +366,7 @@ _CHECKS: tuple[Callable[[Problem], Findings], ...] = (
     _foil,
     _units_exist,
     _drive_is_free,
+    _one_kind_of_load,
     _horizon,
     _robust,
     _reaction,

@@ -16,7 +16,14 @@ from pipeline.problem.fields import FOLDER, Section
 from pipeline.problem.reading import yaml_file
 from pipeline.problem.reading.feasibility import find_faults
 from pipeline.problem.reading.yaml_file import Document, KeyPath
-from pipeline.problem.sections import Sweep, TimeSeriesDrive, designs, sweep_cases
+from pipeline.problem.sections import (
+    SeveralDrives,
+    SingleDrive,
+    Sweep,
+    TimeSeriesDrive,
+    designs,
+    sweep_cases,
+)
 from pipeline.runtime import UserError, read_bounded
 
 _LARGEST = 64 << 20  # bytes of a measured motion
@@ -243,17 +250,27 @@ def _value(data: object, keys: KeyPath) -> object:
 
 def _with_recording(problem: Problem, document: Document) -> Problem:
     """Adds the content hash of the measured motion that a problem refers to, if any."""
-    drive = problem.drive
+    if not isinstance(problem.drive, SeveralDrives):
+        return problem.model_copy(update={"drive": _hashed(problem.drive, document, ("drive",))})
+    drives = tuple(
+        _hashed(drive, document, ("drives", index))
+        for index, drive in enumerate(problem.drive.drives)
+    )
+    return problem.model_copy(update={"drive": problem.drive.model_copy(update={"drives": drives})})
+
+
+def _hashed(drive: SingleDrive, document: Document, keys: KeyPath) -> SingleDrive:
+    """Adds the content hash of its file to a measured motion."""
     if not isinstance(drive, TimeSeriesDrive):
-        return problem
+        return drive
     try:
         held = read_bounded(document.path.parent / drive.file, _LARGEST)
     except OSError as error:
         raise UserError(
             f"the measured motion cannot be read: {error.strerror}",
             file=document.path,
-            line=document.line(("drive", "file")),
-            key="drive.file",
+            line=document.line((*keys, "file")),
+            key=_dotted((*keys, "file")),
             value=drive.file,
             remedy="give its path as seen from the problem file",
         ) from error
@@ -262,9 +279,9 @@ def _with_recording(problem: Problem, document: Document) -> Problem:
         raise UserError(
             f"{drive.file} is not the file that was meant: its SHA-256 is {found}",
             file=document.path,
-            line=document.line(("drive", "sha256")),
-            key="drive.sha256",
+            line=document.line((*keys, "sha256")),
+            key=_dotted((*keys, "sha256")),
             value=drive.sha256,
             remedy="restore the file, or correct or remove the hash",
         )
-    return problem.model_copy(update={"drive": drive.model_copy(update={"sha256": found})})
+    return drive.model_copy(update={"sha256": found})

@@ -1,42 +1,115 @@
-"""Describes the motion of driven units: one model per kind, told apart by the key `kind`.
+"""Describes what drives units: one model per kind, told apart by the key `kind`.
 
 Driven units have all three degrees of freedom prescribed: the displacement follows the drive along
-one direction per load case, the rotation is held (a time series prescribes all three).
+one direction per load case, the rotation is held (a time series prescribes all three). `free` sets
+some of them free. Where the drive is a force, they give way along it.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Field, GetJsonSchemaHandler, StringConstraints, model_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
-from pipeline.problem.fields import Angle, Delay, Duration, Frequency, Length, Ratio, Section, fault
+from pipeline.problem.fields import (
+    Angle,
+    Delay,
+    Duration,
+    Force,
+    Frequency,
+    Length,
+    Moment,
+    Ratio,
+    Section,
+    fault,
+)
 from pipeline.problem.sections.selectors import Selector
 
 _SUM_TOLERANCE = 1e-6
+Dof = Literal["ux", "uy", "theta"]
 
 
-class _Directed(Section):
-    """A drive along straight lines, one load case per direction.
+class _Drive(Section):
+    """A drive of units.
 
     Attributes:
         kind: which of the drives this is.
         units: that are driven.
-        amplitude: A, of their displacement.
-        directions: of the displacement against x, counter-clockwise.
+        free: degrees of freedom of these units that nothing holds, such as the way sideways.
+    """
+
+    unit: ClassVar[str] = "mm"
+    """Of the amplitude, in which it is read."""
+    units: Selector
+    free: tuple[Dof, ...] = ()
+
+    @property
+    def case_weights(self) -> tuple[float, ...]:
+        """Returns the weight of the one load case."""
+        return (1.0,)
+
+    @property
+    def acting(self) -> tuple[Dof, ...]:
+        """Lists the degrees of freedom that the drive moves in some load case."""
+        return ("theta",)
+
+    @model_validator(mode="after")
+    def _is_not_free(self) -> Self:
+        if both := [dof for dof in self.acting if dof in self.free]:
+            what = f"the drive acts on {both[0]}, which is to be free"
+            raise fault(what, "drive it or set it free, not both", "free")
+        return self
+
+
+class _Directed(_Drive):
+    """A drive along straight lines, one load case per direction.
+
+    Attributes:
+        directions: of the displacement or force against x, counter-clockwise; or `direction`, one.
         weights: of the load cases in the loss, adding up to 1; equal ones by default.
     """
 
-    units: Selector
-    amplitude: Length
     directions: Annotated[tuple[Angle, ...], Field(min_length=1)]
     weights: tuple[Ratio, ...] | None = None
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Adds `direction`, which stands for a list of one."""
+        made = super().__get_pydantic_json_schema__(core_schema, handler)
+        whole = handler.resolve_ref_schema(made)
+        several = whole["properties"]["directions"]
+        whole["properties"]["direction"] = several["items"] | {"description": "instead of a list"}
+        whole["required"] = [name for name in whole["required"] if name != "directions"]
+        whole["oneOf"] = [{"required": ["directions"]}, {"required": ["direction"]}]
+        return made
 
     @property
     def case_weights(self) -> tuple[float, ...]:
         """Computes the weight of each load case in the loss; equal ones where none are given."""
         return self.weights or (1.0 / len(self.directions),) * len(self.directions)
+
+    @property
+    def acting(self) -> tuple[Dof, ...]:
+        """Lists the degrees of freedom that the drive moves in some load case."""
+        parts: tuple[tuple[Dof, float], ...] = (
+            ("ux", max(abs(math.cos(angle)) for angle in self.directions)),
+            ("uy", max(abs(math.sin(angle)) for angle in self.directions)),
+        )
+        return tuple(dof for dof, part in parts if part > _SUM_TOLERANCE)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_direction(cls, data: object) -> object:
+        if not isinstance(data, Mapping) or "direction" not in data or "directions" in data:
+            return data
+        others = {key: value for key, value in data.items() if key != "direction"}
+        return {**others, "directions": [data["direction"]]}
 
     @model_validator(mode="after")
     def _weights_match(self) -> Self:
@@ -51,7 +124,17 @@ class _Directed(Section):
         return self
 
 
-class HarmonicDrive(_Directed):
+class _Displaced(_Directed):
+    """A displacement along straight lines.
+
+    Attributes:
+        amplitude: A, of the displacement.
+    """
+
+    amplitude: Length
+
+
+class HarmonicDrive(_Displaced):
     """A sin(2 pi f t) from the first instant, as the authors drive the shielding sample.
 
     Attributes:
@@ -62,7 +145,7 @@ class HarmonicDrive(_Directed):
     frequency: Frequency
 
 
-class RampHarmonicDrive(_Directed):
+class RampHarmonicDrive(_Displaced):
     """A (1 + tanh((t - delay)/rise_time))/2 sin(2 pi f (t - delay)).
 
     Attributes:
@@ -77,7 +160,7 @@ class RampHarmonicDrive(_Directed):
     delay: Delay = 0.0
 
 
-class PulseDrive(_Directed):
+class PulseDrive(_Displaced):
     """A exp(-((t - delay)/width)^2), a single push there and back.
 
     Attributes:
@@ -90,7 +173,7 @@ class PulseDrive(_Directed):
     delay: Duration
 
 
-class TanhRampDrive(_Directed):
+class TanhRampDrive(_Displaced):
     """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression.
 
     Attributes:
@@ -101,7 +184,7 @@ class TanhRampDrive(_Directed):
     duration: Duration
 
 
-class LinearRampDrive(_Directed):
+class LinearRampDrive(_Displaced):
     """A t/duration.
 
     Attributes:
@@ -112,38 +195,156 @@ class LinearRampDrive(_Directed):
     duration: Duration
 
 
-class TimeSeriesDrive(Section):
+class _Course(Section):
+    """A load that grows in proportion to the load path, unless it has a course in time.
+
+    Attributes:
+        frequency: f of a course sin(2 pi f t).
+        rise_time: of the switch by which that begins, as of a `ramp_harmonic`.
+        width: of a single push there and back, as of a `pulse`.
+        delay: of either.
+    """
+
+    frequency: Frequency | None = None
+    rise_time: Duration | None = None
+    width: Duration | None = None
+    delay: Delay = 0.0
+
+    @property
+    def static(self) -> bool:
+        """Tells a load that grows slowly."""
+        return self.frequency is None and self.width is None
+
+    @model_validator(mode="after")
+    def _one_course(self) -> Self:
+        if self.frequency is not None and self.width is not None:
+            raise fault("frequency and width exclude each other", "give one of them", "width")
+        if self.rise_time is not None and self.frequency is None:
+            raise fault("nothing rises without a frequency", "give `frequency` too", "rise_time")
+        if self.delay and self.static:
+            raise fault("a load path has no delay", "give `frequency` or `width` too", "delay")
+        return self
+
+
+class ForceDrive(_Course, _Directed):
+    """A force on the driven units together, shared equally, in place of a displacement.
+
+    It keeps its direction. The units' rotation, and the way across a force along x or y, stay held
+    unless they are `free`.
+
+    Attributes:
+        amplitude: A, of the force on all units together.
+    """
+
+    unit: ClassVar[str] = "N"
+    kind: Literal["force"]
+    amplitude: Force
+
+
+class TorqueDrive(_Course, _Drive):
+    """A moment on the driven units together, shared equally, in place of a rotation.
+
+    The units stay in place unless `ux` and `uy` are `free`.
+
+    Attributes:
+        amplitude: of the moment on all units together, counter-clockwise.
+    """
+
+    unit: ClassVar[str] = "N mm"
+    kind: Literal["torque"]
+    amplitude: Moment
+
+
+class RotationDrive(_Course, _Drive):
+    """A rotation of each driven unit, about its centroid.
+
+    The units stay in place unless `ux` and `uy` are `free`.
+
+    Attributes:
+        amplitude: of the rotation, counter-clockwise.
+    """
+
+    unit: ClassVar[str] = "rad"
+    kind: Literal["rotation"]
+    amplitude: Angle
+
+
+class TimeSeriesDrive(_Drive):
     """A measured motion (x, y, theta) of the driven units, read from a file beside the problem.
 
     The file is a CSV whose heading names the columns `time (s)`, `ux (mm)`, `uy (mm)` and
     `theta (rad)`, or other units of these kinds in the brackets; lines above it are comments. Times
     ascend from zero to the end of the horizon at least, where `horizon: { duration: 1 s }` gives
-    it; the motion starts at rest, and between two lines it is interpolated linearly.
+    it; the motion starts at rest, and between two lines it is interpolated linearly. Columns of
+    `free` degrees of freedom are read and left aside.
 
     Attributes:
-        kind: which of the drives this is.
-        units: that are driven.
         file: with the motion.
         sha256: of the file, which is refused if it has another.
     """
 
     kind: Literal["time_series"]
-    units: Selector
     file: Annotated[str, StringConstraints(min_length=1)]
     sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")] | None = None
 
     @property
-    def case_weights(self) -> tuple[float, ...]:
-        """Returns the weight of the one load case."""
-        return (1.0,)
+    def acting(self) -> tuple[Dof, ...]:
+        """Lists the degrees of freedom that the drive moves."""
+        every: tuple[Dof, ...] = ("ux", "uy", "theta")
+        return tuple(dof for dof in every if dof not in self.free)
 
 
-Drive = Annotated[
+SingleDrive = (
     HarmonicDrive
     | RampHarmonicDrive
     | PulseDrive
     | TanhRampDrive
     | LinearRampDrive
-    | TimeSeriesDrive,
-    Field(discriminator="kind"),
-]
+    | ForceDrive
+    | TorqueDrive
+    | RotationDrive
+    | TimeSeriesDrive
+)
+
+
+class SeveralDrives(Section):
+    """Drives of different units that act at once.
+
+    In a problem file they may stand as a list under `drives`, in place of `drive`.
+
+    Attributes:
+        kind: which of the drives this is.
+        drives: each with one direction, or with one for each load case.
+    """
+
+    kind: Literal["several"]
+    drives: Annotated[
+        tuple[Annotated[SingleDrive, Field(discriminator="kind")], ...], Field(min_length=1)
+    ]
+
+    @property
+    def directions(self) -> tuple[float, ...]:
+        """Lists the direction of the first drive in every load case."""
+        found: tuple[float, ...] = getattr(self.drives[0], "directions", (0.0,))
+        return found if len(found) > 1 else found * len(self.case_weights)
+
+    @property
+    def case_weights(self) -> tuple[float, ...]:
+        """Computes the weight of each load case in the loss."""
+        return max((drive.case_weights for drive in self.drives), key=len)
+
+    @model_validator(mode="after")
+    def _cases_agree(self) -> Self:
+        counts = {len(drive.case_weights) for drive in self.drives} - {1}
+        if len(counts) > 1:
+            what = f"drives of {' and '.join(map(str, sorted(counts)))} directions act at once"
+            raise fault(what, "give each one direction, or as many as the others", "drives")
+        return self
+
+
+Drive = Annotated[SingleDrive | SeveralDrives, Field(discriminator="kind")]
+
+
+def single_drives(drive: SingleDrive | SeveralDrives) -> tuple[SingleDrive, ...]:
+    """Lists the drives that act at once."""
+    return drive.drives if isinstance(drive, SeveralDrives) else (drive,)

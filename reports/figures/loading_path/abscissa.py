@@ -5,10 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.problem import Problem, selected_units
-from pipeline.problem.sections import Kagome, Lattice, Quads
+from pipeline.problem import Problem, driven_units
+from pipeline.problem.sections import Kagome, Lattice, Quads, single_drives
+from reports.figures.loading_path import measures
 from sim.core import Floats
 
+_LOADS = {
+    "force": ("Applied force", "$F$", "N", 1.0),
+    "torque": ("Applied moment", "$M$", "N mm", 1.0),
+    "rotation": ("Applied rotation", r"$\theta$", "°", 180.0 / np.pi),
+}
+"""Loads that grow in proportion to the load path: name, symbol, unit, and that of the dataset in
+it."""
 ORDER = ("intact", "altered", "cloaked")
 _ALONG = np.cos(np.pi / 4)
 """Of a drive: nearer to the line than to its normal it strains along it, else it shears."""
@@ -20,9 +28,9 @@ SECOND = "Cloaked, no overlap"
 class Abscissa:
     """Tells where along the path every sample of a response lies.
 
-    `values` (n_times,) is the displacement of the driven units along the drive in mm, or the time
-    in s; `strain` is a paper's label of the last value (a fraction of one), `shown` are the samples
-    of the snapshots.
+    `values` (n_times,) is what the first drive grows by (the displacement of the driven units along
+    it in mm, a force in N, a moment in N mm, an angle in degrees), or the time in s; `strain` is a
+    paper's label of the last value (a fraction of one), `shown` are the samples of the snapshots.
     """
 
     name: str
@@ -32,6 +40,11 @@ class Abscissa:
     static: bool
     strain: float | None
     shown: tuple[int, ...]
+
+    @property
+    def displaces(self) -> bool:
+        """Tells a path along which the driven units are displaced, and not loaded or turned."""
+        return self.static and self.unit == "mm"
 
     @property
     def label(self) -> str:
@@ -49,13 +62,19 @@ class Abscissa:
 
 def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
     """Returns the path of a response."""
-    static = problem.static
-    values = driven_displacement(response) if static else response["time"].values
-    paper = problem.report.paper
+    static, kind = problem.static, single_drives(problem.drive)[0].kind
+    paper, time = problem.report.paper, response["time"].values
+    name, symbol, unit, factor = _LOADS.get(kind, ("Applied displacement", "$u$", "mm", 1.0))
+    if not static:
+        name, symbol, unit, values = "Time", "$t$", "s", time
+    elif kind in _LOADS:
+        values = factor * float(response["amplitude"][0]) * time / time[-1]
+    else:
+        values = driven_displacement(response)
     return Abscissa(
-        name="Applied displacement" if static else "Time",
-        symbol="$u$" if static else "$t$",
-        unit="mm" if static else "s",
+        name=name,
+        symbol=symbol,
+        unit=unit,
         values=values,
         static=static,
         strain=None if paper is None or not static else paper.strain,
@@ -65,11 +84,7 @@ def abscissa_of(problem: Problem, response: xr.Dataset) -> Abscissa:
 
 def driven_displacement(response: xr.Dataset, case: int = 0) -> Floats:
     """Returns displacement (n_times,) of the driven units along the drive's direction, mm."""
-    motion = response["displacement"].isel(structure=0, case=case)
-    driven = response["support"].values == 2
-    angle = np.radians(float(response["direction"][case]))
-    mean = motion.isel(unit=driven).mean("unit")
-    along = np.cos(angle) * mean.sel(dof="ux") + np.sin(angle) * mean.sel(dof="uy")
+    along = measures.driven_displacement(response).isel(structure=0, case=case)
     return np.asarray(along.values, dtype=float)
 
 
@@ -92,7 +107,7 @@ def load_kind(problem: Problem, angle: float) -> str:
 def driven_side(problem: Problem) -> tuple[Floats, int]:
     """Finds the vector (2,) from the middle to the driven units, and its larger component."""
     sites = {unit: (x, y) for unit, x, y in problem.lattice.sites()}
-    driven = [sites[unit] for unit in selected_units(problem.drive.units, problem.lattice)]
+    driven = [sites[unit] for unit in driven_units(problem)]
     outward = np.mean(driven, axis=0) - np.array(list(sites.values())).mean(axis=0)
     return np.asarray(outward), int(np.argmax(np.abs(outward)))
 

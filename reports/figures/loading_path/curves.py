@@ -178,6 +178,15 @@ def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
         _sides(axes, study)
 
 
+def displacement_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws how far the driven units go under a load."""
+    moved = measures.driven_displacement(study.response)
+    _plain_panel(axes, study.problem, path, moved, "displacement (mm)")
+    _eigenvalues(axes, study, path)
+    if study.problem.objective.target == "rest":
+        _sides(axes, study)
+
+
 def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     """Draws the smallest eigenvalue of the tangent, dotted, against an axis on the right."""
     box, margin = axes.get_position(), RIGHT_AXIS / style.TWO_COLUMNS

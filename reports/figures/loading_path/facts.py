@@ -84,8 +84,9 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     yield number("interest_units", "Units of interest", int(response["roi"].sum()))
     yield from _radii(problem)
     if path.static:
-        yield _displacement_fact(path)
-        yield from strain_facts(problem, path)
+        yield _load_fact(path)
+        if path.displaces:
+            yield from strain_facts(problem, path)
         count = problem.horizon.steps or problem.horizon.samples
         yield number("load_steps", "Loads in the loss", count, note="equally spaced")
     else:
@@ -124,11 +125,11 @@ def _cloak_width(problem: Problem) -> float | None:
     return cloak[2] - inner if inner > 0 else None
 
 
-def _displacement_fact(path: Abscissa) -> Fact:
-    note = "of the driven units, along the drive"
+def _load_fact(path: Abscissa) -> Fact:
+    note = "of the driven units, along the drive" if path.displaces else "on the driven units"
     if path.strain is not None:
         note += f"; the paper labels it ε = {100 * path.strain:g} %"
-    return number("amplitude", "Applied displacement", float(path.values[-1]), "mm", note=note)
+    return number("amplitude", path.name, float(path.values[-1]), path.unit, note=note)
 
 
 def strain_facts(problem: Problem, path: Abscissa) -> Iterator[Fact]:
@@ -256,8 +257,11 @@ def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Yields force of the drive at the end of the path."""
+    """Yields force of the drive at the end of the path, or how far its load goes."""
     if not path.static:
+        return
+    if not path.displaces:
+        yield from _displacement_facts(study, path)
         return
     every = measures.reaction(study.response)
     force = over_cases(study.problem, every).isel(time=-1)
@@ -273,6 +277,15 @@ def reaction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         for name in ("altered", "cloaked"):
             label = f"Reaction, {display_name(study.problem, name).lower()}, off the intact by"
             yield share(f"reaction_error_{name}", label, float(off.sel(structure=name)), note=note)
+
+
+def _displacement_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
+    moved = over_cases(study.problem, measures.driven_displacement(study.response)).isel(time=-1)
+    note = f"of the driven units, mean, at {path.at(-1)}"
+    for name in structures(study.response):
+        label = f"Displacement, {display_name(study.problem, name).lower()}"
+        value = float(moved.sel(structure=name))
+        yield number(f"displacement_{name}", label, value, "mm", digits=3, note=note)
 
 
 def robustness_facts(study: StudyResults) -> Iterator[Fact]:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.problem.sections import Paper
+from pipeline.problem.sections import Paper, single_drives
 from reports.base import Table, style
 from reports.facts import JUMPED, Fact
 from reports.figures.loading_path import curves, measures, tables
@@ -104,9 +104,12 @@ def design_panels(
 def _at_rest(figure: Figure, study: StudyResults) -> Iterator[Axes]:
     """Yields the structures side by side, and how large and how driven they are."""
     side, names = 40.0, structures(study.response)
-    lattice, drive = study.problem.lattice, study.problem.drive
+    lattice, drives = study.problem.lattice, single_drives(study.problem.drive)
     size = f"{lattice_size(lattice)} units, $s$ = {lattice.spacing:g} mm"
-    notes = [size, f"$A$ = {drive.amplitude:g} mm" if hasattr(drive, "amplitude") else "", ""]
+    sizes = [
+        f"{drive.amplitude:.4g} {drive.unit}" for drive in drives if hasattr(drive, "amplitude")
+    ]
+    notes = [size, f"$A$ = {', '.join(sizes)}" if sizes else "", ""]
     left = (3 - len(names)) * (side + 0.6) / 2
     for k, name in enumerate(names):
         x = left + k * (side + 0.6)
@@ -132,14 +135,7 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
             words,
             (),
         )
-    words = "Force of the drive along its direction"
-    if path.static:
-        words += (
-            "; dotted, smallest eigenvalue of the tangent at fixed supports and drive: where it "
-            "vanishes a path ends, and the structure snaps"
-        )
-    words += "."
-    yield "Reaction", lambda axes: curves.reaction_panel(axes, study, path), words, ()
+    yield _answer(study, path)
     if (copies := study.scatter) is not None:
         words = (
             "The measure of panel d at the end of the path over imperfect cloaks: median and 5 % "
@@ -151,6 +147,18 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
         title = f"{copies['sample'].size} imperfect cloaks"
         panel = curves.robustness_panel
         yield title, lambda axes: panel(axes, study, measure, copies), words, [table]
+
+
+def _answer(study: StudyResults, path: Abscissa) -> Curve:
+    """Returns the curve of what the driven units do: displacement under a load, else force."""
+    ends = "where it vanishes a path ends, and the structure snaps"
+    stiffness = f"; dotted, smallest eigenvalue of the tangent at fixed supports and drive: {ends}"
+    if path.static and not path.displaces:
+        words = "Displacement of the driven units, mean, along the drive or along x"
+        panel = curves.displacement_panel
+        return "Displacement", lambda axes: panel(axes, study, path), f"{words}{stiffness}.", ()
+    words = "Force of the drive along its direction" + (stiffness if path.static else "")
+    return "Reaction", lambda axes: curves.reaction_panel(axes, study, path), f"{words}.", ()
 
 
 def _side_by_side(shown: Sequence[Curve], top: float) -> Iterator[Panel]:

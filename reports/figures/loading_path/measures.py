@@ -102,13 +102,25 @@ def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
     return nearer
 
 
+def driven_displacement(response: xr.Dataset) -> xr.DataArray:
+    """Finds the mean displacement in mm of the driven units along the drive's direction."""
+    driven = response["displacement"].isel(unit=response["support"].values == DRIVEN)
+    return _along(driven.mean("unit"), response)
+
+
+def _along(vector: xr.DataArray, response: xr.Dataset) -> xr.DataArray:
+    """Returns the part (structure, case, time) along the drive's direction."""
+    angle = np.radians(response["direction"])
+    along: xr.DataArray = np.cos(angle) * vector.sel(dof="ux") + np.sin(angle) * vector.sel(
+        dof="uy"
+    )
+    return along.transpose("structure", "case", "time")
+
+
 def reaction(response: xr.Dataset) -> xr.DataArray:
     """Finds force in N that the drive exerts along its direction, on all driven units together."""
     held = response["reaction_force"].isel(unit=response["support"].values == DRIVEN)
-    total = held.sum("unit")
-    angle = np.radians(response["direction"])
-    along: xr.DataArray = np.cos(angle) * total.sel(dof="ux") + np.sin(angle) * total.sel(dof="uy")
-    return along.transpose("structure", "case", "time")
+    return _along(held.sum("unit"), response)
 
 
 def reaction_error(force: xr.DataArray) -> xr.DataArray:

@@ -7,8 +7,14 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, Normalize
 
-from pipeline.problem import Problem
-from pipeline.problem.sections import Region
+from pipeline.problem import Problem, selected_units
+from pipeline.problem.sections import (
+    Region,
+    RotationDrive,
+    SingleDrive,
+    TorqueDrive,
+    single_drives,
+)
 from reports.base import style
 from reports.panels import (
     CLAMP_TINT,
@@ -68,18 +74,26 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
     others = np.where(interest, INTEREST_TINT, UNIT_TINT).tolist()
     draw_clamps(axes, structure, problem.lattice.spacing)
     draw(axes, structure, colours=tints(structure, held, altered, others), margin=12.0)
-    for direction in response["direction"].values if name != "intact" else ():
-        if not np.isnan(direction):
-            _load_arrows(axes, structure, float(direction))
+    for drive in single_drives(problem.drive):
+        units = list(selected_units(drive.units, problem.lattice))
+        _load_arrows(axes, structure, drive, structure.centroid[units])
 
 
-def _load_arrows(axes: Axes, structure: RigidUnits, direction: float) -> None:
-    """Draws arrows onto some of the driven units, along the drive."""
-    ends = structure.centroid[structure.present & (structure.support == DRIVEN)]
-    along = np.array([np.cos(np.radians(direction)), np.sin(np.radians(direction))])
+def _load_arrows(axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Floats) -> None:
+    """Draws arrows onto some of the driven units, along the drive or in its sense of turning."""
     few = np.unique(np.linspace(0, len(ends) - 1, 5).round().astype(int))
-    reach = 0.055 * float(np.ptp(structure.centroid[structure.present], axis=0).max())
-    for x, y in ends[few[1:-1] if len(few) == 5 else few]:
-        start = np.array([x, y]) - 1.3 * reach * along
-        end = np.array([x, y]) - 0.3 * reach * along
-        arrow(axes, start, end, style.ALTERED, zorder=7, clip_on=False)
+    size = float(np.ptp(structure.centroid[structure.present], axis=0).max())
+    reach = max(0.055 * size, 0.8 * size / np.sqrt(structure.present.sum()))
+    shown = ends[few[1:-1] if len(few) == 5 else few]
+    if isinstance(drive, TorqueDrive | RotationDrive):
+        for end in shown:
+            turn = "\u21ba" if drive.amplitude > 0 else "\u21bb"
+            axes.text(end[0], end[1], turn, color=style.ALTERED, ha="center", va="center", zorder=7)
+        return
+    if (angles := getattr(drive, "directions", None)) is None:  # a measured course
+        return
+    for angle in angles:
+        along = np.array([np.cos(angle), np.sin(angle)])
+        for end in shown:
+            start, tip = end - 1.3 * reach * along, end - 0.3 * reach * along
+            arrow(axes, start, tip, style.ALTERED, zorder=7, clip_on=False)

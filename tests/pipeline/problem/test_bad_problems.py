@@ -13,7 +13,7 @@ from tests.pipeline.conftest import Refusal
 TABLE = r"""
 spacing: => spacng: | lattice.spacng | unknown key | did you mean 'spacing'?
 directions: [0 deg, 45 deg, 90 deg, 135 deg] => directions: [0 deg]\n  rotation: 10 deg
-    | drive.rotation | unknown key | known here: units, amplitude
+    | drive.rotation | unknown key | known here: units, free
 objective: => goal: | goal | unknown key | known here: title, doc, lattice
   rows: 15\n =>  | lattice.rows | missing key | add it
 spacing: 15 mm => spacing: 15 | lattice.spacing | the unit is missing | "15 mm"

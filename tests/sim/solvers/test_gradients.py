@@ -26,11 +26,14 @@ from sim.core import Floats
 from sim.quasistatics import StaticSolver, equilibrium_path
 from sim.quasistatics.equilibrium_path import follow
 from sim.solvers import (
+    DISPLACEMENT,
+    FORCE,
     Harmonic,
     LinearRamp,
     PrescribedMotion,
     Solver,
     TimeSeries,
+    Together,
     adjoint_cases,
     differentiable_motion,
     solve_cases,
@@ -94,6 +97,18 @@ def squeezed(depth: float, side: int = 5) -> Rig:
     """Squares between plates, of which one moves in."""
     left = side * np.arange(side)
     return Rig(rotating_squares(side), left, left + side - 1, LinearRamp(-depth, 1.0))
+
+
+@cache
+def pushed(slowly: bool) -> Rig:
+    """Squares clamped at corners, a force on one unit, which may not turn, and one on another."""
+    course = LinearRamp(0.4, 1.0, 2.0) if slowly else Harmonic(0.4, 150.0, 2.0, 0.0015, 0.003)
+    shares, control = (
+        np.array([[1.0], [-0.3]]),
+        np.array([[FORCE, FORCE, DISPLACEMENT], [FORCE] * 3]),
+    )
+    forces, driven = Together((course,), shares), np.array([12, 18])
+    return Rig(rotating_squares(), np.array([0, 4, 20, 24]), driven, forces, control=control)
 
 
 @cache
@@ -201,6 +216,19 @@ def test_equilibria_in_contact(quantity: str) -> None:
     for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
         np.testing.assert_array_equal(ray.in_contact(step, solver.output_times), pattern)
     assert_exact_in_contact(ray)
+
+
+@pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
+def test_equilibria_under_forces(quantity: str) -> None:
+    rig = pushed(slowly=True)
+    assert_exact(Ray(rig, SOLVERS["static"](rig), quantity))
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES)
+@pytest.mark.parametrize("solver", DYNAMIC)
+def test_motions_under_forces(solver: str, quantity: str) -> None:
+    rig = pushed(slowly=False)
+    assert_exact(Ray(rig, SOLVERS[solver](rig), quantity))
 
 
 @pytest.mark.parametrize("quantity", ["density", "damping"])

@@ -1,0 +1,128 @@
+"""Drives of a problem file: displacements, forces, moments and rotations, alone or together."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.posing import scene_of
+from pipeline.problem import from_canonical, load
+from pipeline.problem.identity import canonical_json
+from pipeline.runtime import UserError
+from sim.scene import Scene, simulate
+from tests.pipeline import static
+
+PUSH = "{ kind: force, units: right, amplitude: 0.5 N, direction: 180 deg, free: [uy] }"
+TURN = "{ kind: rotation, units: { units: [[2, 0]] }, amplitude: 10 deg }"
+RIGHT = [4, 9, 14, 19, 24]
+
+
+def written(folder: Path, drive: str, horizon: str = "duration: 1 s, steps: 4") -> Path:
+    path = static.write(folder, static.HOLE, size=5)
+    text = path.read_text()
+    start, end = text.index("drive:"), text.index("constraints:")
+    path.write_text(f"{text[:start]}{drive}\nhorizon: {{ {horizon} }}\n{text[end:]}")
+    return path
+
+
+def posed(folder: Path, drive: str, horizon: str = "duration: 1 s, steps: 4") -> Scene:
+    path = written(folder, drive, horizon)
+    return scene_of(load(path), folder).objective.reference  # type: ignore[return-value]
+
+
+def moved(scene: Scene) -> np.ndarray:
+    return np.asarray(simulate(scene, vertices=scene.lattice.vertices).displacement[0])
+
+
+def test_a_force_is_shared_by_the_units_and_leaves_them_free_sideways(tmp_path: Path) -> None:
+    scene = posed(tmp_path, f"drive: {PUSH}")
+    (case,) = scene.loads.cases
+    forces = case.forces(np.array([0.5, 1.0]))
+    np.testing.assert_allclose(forces[:, :, 0], [[-0.05] * 5, [-0.1] * 5])
+    np.testing.assert_array_equal(scene.loads.driven, RIGHT)
+    response = simulate(scene, vertices=scene.lattice.vertices)
+    end = np.asarray(response.displacement[0, -1])[RIGHT]
+    assert (end[:, 0] < -0.01).all()
+    assert np.abs(end[:, 1]).max() > 1e-3
+    np.testing.assert_array_equal(end[:, 2], 0.0)
+    np.testing.assert_allclose(response.drive_force[0, :, 0], -0.125 * np.arange(1, 5))
+
+
+def test_a_moment_and_the_rotation_that_it_makes(tmp_path: Path) -> None:
+    turned = posed(tmp_path, f"drive: {TURN}")
+    np.testing.assert_allclose(moved(turned)[-1, 2], [0.0, 0.0, np.deg2rad(10.0)])
+    seen = simulate(turned, vertices=turned.lattice.vertices).observables[0]
+    moment = float(seen.reaction[-1, 2, 2])
+    torque = f"{{ kind: torque, units: {{ units: [[2, 0]] }}, amplitude: {moment} N mm }}"
+    loaded = posed(tmp_path, f"drive: {torque}")
+    np.testing.assert_allclose(moved(loaded)[-1], moved(turned)[-1], atol=1e-8)
+
+
+def test_several_drives_act_at_once(tmp_path: Path) -> None:
+    scene = posed(tmp_path, f"drives:\n  - {PUSH}\n  - {TURN}")
+    np.testing.assert_array_equal(scene.loads.driven, [2, *RIGHT])
+    end = moved(scene)[-1]
+    np.testing.assert_allclose(end[2], [0.0, 0.0, np.deg2rad(10.0)])
+    alone = moved(posed(tmp_path, f"drive: {TURN}"))[-1]
+    assert (end[RIGHT, 0] < alone[RIGHT, 0]).all()
+
+
+def test_directions_of_one_are_load_cases_of_all(tmp_path: Path) -> None:
+    push = PUSH.replace("direction: 180 deg, free: [uy]", "directions: [180 deg, 90 deg]")
+    asked = load(written(tmp_path, f"drives:\n  - {push}\n  - {TURN}"))
+    scene = scene_of(asked, tmp_path)
+    assert len(scene.loads.cases) == 2
+    ends = [case.forces(np.array([1.0]))[0, -1, :2] for case in scene.loads.cases]
+    np.testing.assert_allclose(ends, [[-0.1, 0.0], [0.0, 0.1]], atol=1e-12)
+
+
+def test_a_force_has_a_course_in_time(tmp_path: Path) -> None:
+    shaken = PUSH.replace("}", ", frequency: 4 Hz }")
+    scene = posed(tmp_path, f"drive: {shaken}", "periods: 1, samples: 20")
+    assert not scene.loads.static
+    assert scene.loads.drive_frequency == 4.0
+    response = simulate(scene, vertices=scene.lattice.vertices)
+    put_on = -0.5 * np.sin(8 * np.pi * response.times)
+    np.testing.assert_allclose(response.drive_force[0, :, 0], put_on, atol=1e-12)
+    assert np.abs(np.asarray(response.displacement[0])[:, RIGHT, 0]).max() > 0.01
+
+
+def test_a_driven_edge_may_slide(tmp_path: Path) -> None:
+    ramp = "{ kind: linear_ramp, units: right, amplitude: 3 mm, duration: 1 s, directions: [0 deg]"
+    held, free = (moved(posed(tmp_path, f"drive: {ramp}{more}}}")) for more in ("", ", free: [uy]"))
+    np.testing.assert_array_equal(held[:, RIGHT, 1], 0.0)
+    assert np.abs(free[-1, RIGHT, 1]).max() > 1e-3
+    np.testing.assert_allclose(free[-1, RIGHT, 0], 3.0)
+
+
+def test_they_are_read_back_from_a_dataset(tmp_path: Path) -> None:
+    asked = load(written(tmp_path, f"drives:\n  - {PUSH}\n  - {TURN}"))
+    assert from_canonical(canonical_json(asked)) == asked
+
+
+@pytest.mark.parametrize(
+    ("drive", "words"),
+    [
+        (f"drive: [{PUSH}]", ("keys and values are wanted here", "a list under `drives`")),
+        (f"drive: {PUSH.replace('N,', 'mm,')}", ("not that of a force", "drive.amplitude")),
+        (f"drive: {PUSH.replace('[uy]', '[ux]')}", ("acts on ux, which is to be free",)),
+        (f"drives: [{PUSH}, {PUSH}]", ("is driven twice", "drives[1].units")),
+        (f"drive: {PUSH}\ndrives: [{TURN}]", ("exclude each other",)),
+        (
+            f"drives: [{PUSH}, {TURN.replace('deg }', 'deg, frequency: 2 Hz }')}]",
+            ("is a slow load", "a course in time"),
+        ),
+        (f"drive: {PUSH.replace('free', 'delay: 1 s, free')}", ("has no delay",)),
+    ],
+)
+def test_what_has_no_meaning_is_refused(tmp_path: Path, drive: str, words: tuple[str, ...]) -> None:
+    with pytest.raises(UserError) as told:
+        load(written(tmp_path, drive))
+    assert all(word in str(told.value) for word in words), told.value
+
+
+def test_forces_on_what_nothing_holds_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path, f"drive: {PUSH}")
+    path.write_text(path.read_text().replace("units: left", "units: left\n    clamp: [ux]"))
+    with pytest.raises(UserError, match="nothing holds the structure against the forces"):
+        scene_of(load(path), tmp_path)
