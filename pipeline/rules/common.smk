@@ -18,6 +18,11 @@ onstart:
     rule_inputs.check_room("results")
     if not workflow.non_local_exec:
         stage_server.start()
+    first_look.show(
+        f"{job.wildcards.name}{job.wildcards.preset}"
+        for job in workflow.dag.needrun_jobs()
+        if job.rule.name == "design"
+    )
 
 
 # What was built, and the caches of compiled solvers and plots.

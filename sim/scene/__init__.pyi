@@ -3,6 +3,8 @@ from .evaluation import GradientChain as GradientChain
 from .evaluation import constraints_of as constraints_of
 from .evaluation import evaluate as evaluate
 from .evaluation import minimise as minimise
+from .expected_cost import Cost as Cost
+from .expected_cost import estimate_cost as estimate_cost
 from .load_family import LoadFamily as LoadFamily
 from .load_family import LoadLosses as LoadLosses
 from .objectives import DisplacementMimicking as DisplacementMimicking

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from sim.core import Floats, SimulationError
+from sim.scene.expected_cost import estimate_cost
 from sim.scene.scene import Scene
 from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
@@ -26,14 +27,6 @@ INSTANTS = 513
 """At which a motion is looked at."""
 LARGE = 100_000
 """Unknowns from which on memory and time are told in advance."""
-ENTRIES = 8.0
-"""Of a factor, over n log2(n) unknowns: 7.0 of 120 thousand (`make bench`)."""
-SECONDS = 6e-9
-"""To factorise a tangent of n unknowns, over n^1.5."""
-FACTORISATIONS = 4
-"""For each load."""
-HELD_STATES = 4
-"""Arrays of all states that a solve and its adjoint hold."""
 
 
 class SceneError(SimulationError):
@@ -139,11 +132,9 @@ def _size(scene: Scene, n_times: int) -> Iterator[str]:
     Raises:
         SceneError: it needs more memory than there is.
     """
-    n = 3 * scene.lattice.n_units - len(scene.loads.held)
+    n, memory, seconds = estimate_cost(scene, n_times)
     if n < LARGE:
         return
-    memory = 8.0 * (ENTRIES * n * np.log2(n) + HELD_STATES * n_times * n)
-    seconds = SECONDS * n**1.5 * FACTORISATIONS * n_times * len(scene.loads.cases)
     told = f"{scene.lattice.n_units} units: {n} unknowns, about {memory / 1e9:.2g} GB"
     installed = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if memory > installed:

@@ -26,6 +26,10 @@ from .snapshot_grid import SnapshotStructure as SnapshotStructure
 from .snapshot_grid import shade_bar as shade_bar
 from .snapshot_grid import snapshot as snapshot
 from .snapshot_grid import snapshots as snapshots
+from .structure_panels import DRIVE_TINT as DRIVE_TINT
+from .structure_panels import INTEREST_TINT as INTEREST_TINT
+from .structure_panels import UNIT_TINT as UNIT_TINT
 from .structure_panels import UnitColouring as UnitColouring
+from .structure_panels import rest_panel as rest_panel
 from .structure_panels import shade_of as shade_of
 from .tables import by_structure as by_structure

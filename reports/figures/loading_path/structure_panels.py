@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, Normalize
 
 from pipeline.problem import Problem, selected_units
+from pipeline.problem.outlines import Outline
 from pipeline.problem.sections import (
     Region,
     RotationDrive,
@@ -74,9 +75,18 @@ def rest_panel(axes: Axes, problem: Problem, response: xr.Dataset, name: str) ->
     others = np.where(interest, INTEREST_TINT, UNIT_TINT).tolist()
     draw_clamps(axes, structure, problem.lattice.spacing)
     draw(axes, structure, colours=tints(structure, held, altered, others), margin=12.0)
+    if name != "intact" and problem.void is not None:
+        _draw_outlines(axes, problem.void.outlines(problem.lattice.centre_site))
     for drive in single_drives(problem.drive):
         units = list(selected_units(drive.units, problem.lattice))
         _load_arrows(axes, structure, drive, structure.centroid[units])
+
+
+def _draw_outlines(axes: Axes, outlines: tuple[Outline, ...]) -> None:
+    """Draws the void as it was asked for, over the units that it removed."""
+    for outline in outlines:
+        ring = np.array([*outline, outline[0]])
+        axes.plot(*ring.T, color=style.ALTERED, lw=0.7, zorder=6)
 
 
 def _load_arrows(axes: Axes, structure: RigidUnits, drive: SingleDrive, ends: Floats) -> None:

@@ -1,0 +1,95 @@
+"""Looks at a problem before it is computed: what it costs, and what may not be meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from pipeline.problem import Problem
+from pipeline.problem.sections import single_drives
+from sim.core import Ints
+from sim.scene import Scene, estimate_cost, sample_times
+from sim.structure import Lattice
+
+FAR = 0.25
+"""Of a displacement, over the length of the lattice."""
+MANY = 3000
+"""Units beyond which necks are not looked for."""
+START = 20.0
+"""Seconds that a run takes besides its evaluations, on one core."""
+
+
+def cost_line(asked: Problem, scene: Scene) -> str:
+    """Says size, unknowns, memory and time to expect of a problem's optimisation."""
+    cost = estimate_cost(scene, len(sample_times(scene)))
+    methods = asked.optimiser.methods.chosen
+    evaluations = sum(method.evaluations for method in methods.values())
+    seconds = START + evaluations * cost.seconds
+    longest = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+    return (
+        f"{scene.lattice.n_units} units, {len(scene.design.cloak)} of them to redesign;"
+        f" {cost.unknowns} unknowns; {len(scene.loads.cases)} load case(s);"
+        f" about {max(0.3, cost.memory / 1e9):.2g} GB;"
+        f" {evaluations} evaluations of the design, about {longest} on one core"
+    )
+
+
+def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
+    """Lists what may not be meant, besides what `check_scene` warns of."""
+    if len(scene.loads.clamped) == 0:
+        yield "no unit is clamped: what is not driven floats freely; give `supports`"
+    size = float(np.ptp(scene.lattice.vertices, axis=0).max())
+    for drive in single_drives(asked.drive):
+        push = getattr(drive, "amplitude", 0.0) if drive.unit == "mm" else 0.0
+        if push > FAR * size:
+            share = push / size
+            yield (
+                f"the drive goes {push:g} mm, {share:.0%} of the lattice's length; lower"
+                " `drive.amplitude` if that is not meant"
+            )
+    yield from _picture(asked)
+    yield from _necks(scene.lattice)
+
+
+def _picture(asked: Problem) -> Iterator[str]:
+    """Doubts a picture that shows more than one outline, or removes its own corners."""
+    void = asked.void
+    if void is None or void.image is None:
+        return
+    drawn = void.outlines(asked.lattice.centre_site)
+    if len(drawn) > 1:
+        yield (
+            f"{void.image.file} shows {len(drawn)} outlines, one within another or beside it: units"
+            " within an odd number of them go; if the ground is dark, give `invert: true`"
+        )
+
+
+def _necks(lattice: Lattice) -> Iterator[str]:
+    """Doubts a lattice that a single unit holds together."""
+    if lattice.n_units > MANY:
+        return
+    one, other = lattice.ligament_units.T
+    count = np.bincount(lattice.ligament_units.ravel(), minlength=lattice.n_units)
+    thin = [
+        unit
+        for unit in np.flatnonzero((count > 1) & (count < count.max())).tolist()
+        if _pieces_without(unit, one, other, lattice.n_units)
+    ]
+    if thin:
+        i, j = lattice.index[thin[0]]
+        yield (
+            f"necks of one unit: {len(thin)}, the first at [{i}, {j}]; without it a part hangs on"
+            " nothing: move or shrink the void if that is not meant"
+        )
+
+
+def _pieces_without(unit: int, one: Ints, other: Ints, n_units: int) -> bool:
+    kept = (one != unit) & (other != unit)
+    ends = (one[kept], other[kept])
+    joined = coo_array((np.ones(kept.sum(), dtype=bool), ends), shape=(n_units, n_units))
+    _, piece = connected_components(joined, directed=False)
+    sizes = np.bincount(np.delete(piece, unit))
+    return int(np.count_nonzero(sizes)) > 1

@@ -1,0 +1,35 @@
+"""Shows studies before they are computed: each in a picture, with its cost and what is doubtful."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Iterable
+
+from pipeline.runtime import PREFIX, WORK
+from pipeline.workflow.studies import Study, check_names, problem_of
+
+
+def work(args: argparse.Namespace) -> None:
+    """Shows one study.
+
+    Raises:
+        UserError: there is no such study, or its problem has a fault.
+    """
+    study = Study.parse(args.study)
+    check_names(study)
+    problem_of(study)
+    sys.exit(_show(study))
+
+
+def show(names: Iterable[str]) -> None:
+    """Shows studies, named as their folders of results are; a fault is told by their stages."""
+    for name in sorted(set(names)):
+        _show(Study.parse(name))
+
+
+def _show(study: Study) -> int:
+    command = [sys.executable, "-m", f"{PREFIX}reports", "check", *study.options.split()]
+    shown = subprocess.run([*command, "--out-dir", f"results/{study}"], cwd=WORK, check=False)
+    return shown.returncode

@@ -1,0 +1,87 @@
+"""Shows a problem before it is computed: a picture of it, its size, and what may not be meant."""
+
+import argparse
+import sys
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from pipeline import problem
+from pipeline.posing import (
+    doubts,
+    lattice_of,
+    network_variables,
+    scene_of,
+    spread,
+    cost_line,
+    unit_coordinates,
+)
+from pipeline.problem import Problem
+from reports.base import style
+from reports.figures.loading_path import DRIVE_TINT, INTEREST_TINT, UNIT_TINT, rest_panel
+from reports.panels import CLAMP_TINT, CLOAK_TINT
+from sim.scene import Scene
+
+SIDE = 110.0
+"""Of the picture, mm."""
+
+
+def report(args: argparse.Namespace) -> None:
+    """Draws ``check.png`` and says the rest, a line each; what the scene itself warns of is logged.
+
+    Raises:
+        UserError: the problem has a fault.
+    """
+    asked = problem.load(args.problem, args.preset)
+    scene = scene_of(asked, args.problem.parent)
+    told = [cost_line(asked, scene), *(f"warning: {line}" for line in doubts(asked, scene))]
+    args.out_dir.mkdir(parents=True, exist_ok=True)
+    with style.styled():
+        figure = style.page(SIDE + 22.0, SIDE)
+        axes = style.place(figure, 2.0, 8.0, SIDE - 4.0, SIDE - 4.0)
+        rest_panel(axes, asked, _at_rest(asked, scene), "cloaked")
+        _removed(axes, asked, scene)
+        axes.set_title(style.literal(asked.title or args.problem.parent.name))
+        _legend(axes, asked)
+        path = args.out_dir / "check.png"
+        figure.savefig(path, dpi=150)
+    print("\n".join([*told, f"picture: {path}"]), file=sys.stderr)  # noqa: T201
+
+
+def _at_rest(asked: Problem, scene: Scene) -> xr.Dataset:
+    """Lays out the lattice with its void as responses have it."""
+    intact, lattice = lattice_of(asked), scene.lattice
+    places = spread(lattice.padded(lattice.vertices), lattice, intact.n_units)
+    variables = {
+        **network_variables(asked, scene),
+        "vertices": (("structure", "unit", "vertex", "xy"), places[None]),
+    }
+    coordinates = {**unit_coordinates(intact), "structure": (("structure",), ["cloaked"])}
+    return xr.Dataset(variables, coordinates)
+
+
+def _removed(axes: Axes, asked: Problem, scene: Scene) -> None:
+    """Draws the units that the void removes, dashed."""
+    intact = lattice_of(asked)
+    gone = np.setdiff1d(intact.id, scene.lattice.id)
+    rings = [ring[np.isfinite(ring[:, 0])] for ring in intact.padded(intact.vertices)[gone]]
+    made = PolyCollection(rings, facecolors="none", edgecolors=style.GREY, linewidths=0.3)
+    made.set(linestyle="dashed", zorder=1)
+    axes.add_collection(made)
+
+
+def _legend(axes: Axes, asked: Problem) -> None:
+    tints = {"redesigned": CLOAK_TINT, "clamped": CLAMP_TINT, "driven": DRIVE_TINT}
+    if asked.objective.region != "surroundings":
+        tints |= {"of interest": INTEREST_TINT}
+    told: list[Artist] = [
+        Patch(color=colour, label=name) for name, colour in {**tints, "other": UNIT_TINT}.items()
+    ]
+    if asked.void is not None:
+        told.append(Line2D([], [], color=style.ALTERED, label="void as drawn"))
+    axes.legend(handles=told, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=3)

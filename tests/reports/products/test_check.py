@@ -1,0 +1,78 @@
+"""What is shown of a problem before it is computed."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PIL import Image, ImageDraw
+
+from pipeline.posing import doubts, scene_of, cost_line
+from pipeline.problem import load
+from reports.__main__ import main
+from sim.scene import estimate_cost, sample_times
+from tests.pipeline import static
+
+IMAGE = (
+    "void: { image: { file: logo.png, width: 60 mm }, loose: remove }\n"
+    "cloak: { disc: { radius: 100 mm } }\n"
+)
+
+
+def doubted(path: Path) -> list[str]:
+    return list(doubts(asked := load(path), scene_of(asked, path.parent)))
+
+
+def test_a_picture_and_a_line_of_its_cost(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    assert main(["check", "--problem", str(path), "--out-dir", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr().err
+    assert "24 units, 8 of them to redesign; 42 unknowns; 1 load case(s)" in told
+    assert "4 evaluations of the design" in told
+    assert "warning" not in told
+    with Image.open(tmp_path / "out/check.png") as picture:
+        assert min(picture.size) > 500
+
+
+def test_the_cost_grows_as_the_factor_does(tmp_path: Path) -> None:
+    costs = []
+    for size in (15, 30):
+        path = static.write(tmp_path, static.SHIELD if size == 15 else static.HEART, size=size)
+        scene = scene_of(load(path), tmp_path)
+        costs.append(estimate_cost(scene, len(sample_times(scene))))
+    assert costs[1].unknowns > 3.5 * costs[0].unknowns
+    assert costs[1].seconds > 3.5 * costs[0].seconds
+    assert "min on one core" not in cost_line(load(path), scene)
+
+
+def drawn(folder: Path, draw: Callable[[ImageDraw.ImageDraw], object]) -> Path:
+    picture = Image.new("L", (200, 200), 255)
+    draw(ImageDraw.Draw(picture))
+    picture.save(folder / "logo.png")
+    return static.write(folder, IMAGE + static.MIMIC)
+
+
+def test_an_inverted_picture_is_doubted(tmp_path: Path) -> None:
+    def ring(on: ImageDraw.ImageDraw) -> None:
+        on.rectangle((5, 5, 195, 195), fill=0)
+        on.ellipse((60, 60, 140, 140), fill=255)
+
+    (told,) = doubted(drawn(tmp_path, ring))
+    assert "logo.png shows 2 outlines" in told
+    disc = drawn(tmp_path, lambda on: on.ellipse((60, 60, 140, 140), fill=0))
+    assert doubted(disc) == []
+
+
+def test_a_far_push_is_doubted(tmp_path: Path) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=40.0)
+    (told,) = doubted(path)
+    assert told.startswith("the drive goes 40 mm, 5")
+
+
+def test_a_neck_is_doubted(tmp_path: Path) -> None:
+    """Two voids' worth of units leave a column joined by one unit."""
+    wide = "void: { polygon: { vertices: [[22 mm, -8 mm], [38 mm, -8 mm], [38 mm, 50 mm],"
+    wide += " [22 mm, 50 mm]] } }\ncloak: { disc: { radius: 37 mm } }\n"
+    (told,) = doubted(static.write(tmp_path, wide + static.MIMIC, size=5, amplitude=3.0))
+    assert told.startswith("necks of one unit: 1, the first at [2, 4]")
