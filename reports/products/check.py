@@ -13,12 +13,12 @@ from matplotlib.patches import Patch
 
 from pipeline import problem
 from pipeline.posing import (
+    cost_line,
     doubts,
     lattice_of,
     network_variables,
     scene_of,
     spread,
-    cost_line,
     unit_coordinates,
 )
 from pipeline.problem import Problem

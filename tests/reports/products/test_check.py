@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PIL import Image, ImageDraw
 
-from pipeline.posing import doubts, scene_of, cost_line
+from pipeline.posing import cost_line, doubts, scene_of
 from pipeline.problem import load
 from reports.__main__ import main
 from sim.scene import estimate_cost, sample_times
