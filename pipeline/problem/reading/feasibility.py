@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pipeline.problem import Problem, cloak_units, inclusion_units, interest_units, void_units
 from pipeline.problem.reading.yaml_file import KeyPath
 from pipeline.problem.sections import (
+    DisplacementDrive,
     LinearRampDrive,
     ListedNetwork,
     Quads,
@@ -16,7 +17,6 @@ from pipeline.problem.sections import (
     Selector,
     SeveralDrives,
     SingleDrive,
-    TimeSeriesDrive,
     loose_units,
     resolve_centre,
     selected_units,
@@ -178,6 +178,9 @@ def _reaction(problem: Problem) -> Findings:
     objective, place = problem.objective, ("objective", "reaction")
     if objective.reaction is None:
         return
+    if not isinstance(problem.drive, DisplacementDrive):
+        what = f"a drive of the kind {problem.drive.kind} has no displacement that a force answers"
+        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
     if objective.target == "rest":
         what = "a structure at rest has no force of the drive to mimic"
         yield ProblemFault(what, place, "leave it out, or give target: intact")
@@ -192,9 +195,10 @@ def _loads(problem: Problem) -> Findings:
     if (family := objective.loads) is None:
         return
     place = ("objective", "loads")
-    if isinstance(drive, TimeSeriesDrive):
-        what = "a measured motion has no direction and amplitude to vary"
-        yield ProblemFault(what, place, "leave it out, or drive along a direction")
+    if not isinstance(drive, DisplacementDrive):
+        what = f"a drive of the kind {drive.kind} has no displacement and direction to vary"
+        yield ProblemFault(what, place, "leave it out, or displace units along a direction")
+        return
     if family.frequency is not None and problem.frequency is None:
         what = f"a {drive.kind} drive has no frequency to vary"
         yield ProblemFault(what, (*place, "frequency"), "leave it out")

@@ -124,7 +124,7 @@ class _Directed(_Drive):
         return self
 
 
-class _Displaced(_Directed):
+class DisplacementDrive(_Directed):
     """A displacement along straight lines.
 
     Attributes:
@@ -134,7 +134,7 @@ class _Displaced(_Directed):
     amplitude: Length
 
 
-class HarmonicDrive(_Displaced):
+class HarmonicDrive(DisplacementDrive):
     """A sin(2 pi f t) from the first instant, as the authors drive the shielding sample.
 
     Attributes:
@@ -145,7 +145,7 @@ class HarmonicDrive(_Displaced):
     frequency: Frequency
 
 
-class RampHarmonicDrive(_Displaced):
+class RampHarmonicDrive(DisplacementDrive):
     """A (1 + tanh((t - delay)/rise_time))/2 sin(2 pi f (t - delay)).
 
     Attributes:
@@ -160,7 +160,7 @@ class RampHarmonicDrive(_Displaced):
     delay: Delay = 0.0
 
 
-class PulseDrive(_Displaced):
+class PulseDrive(DisplacementDrive):
     """A exp(-((t - delay)/width)^2), a single push there and back.
 
     Attributes:
@@ -173,7 +173,7 @@ class PulseDrive(_Displaced):
     delay: Duration
 
 
-class TanhRampDrive(_Displaced):
+class TanhRampDrive(DisplacementDrive):
     """A (1 + tanh(6 (2 t/duration - 1)))/2, the authors' slow compression.
 
     Attributes:
@@ -184,7 +184,7 @@ class TanhRampDrive(_Displaced):
     duration: Duration
 
 
-class LinearRampDrive(_Displaced):
+class LinearRampDrive(DisplacementDrive):
     """A t/duration.
 
     Attributes:
