@@ -128,7 +128,7 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
     words = f"{measure.label}{marks([study])}."
     yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
     if path.static and problem.objective.target != "rest":
-        words = "Loss of distance between the top and the bottom row, mean over the middle columns."
+        words = "How much nearer the top and the bottom row come, mean over the middle columns."
         yield (
             "Lateral contraction",
             lambda axes: curves.contraction_panel(axes, study, path),
