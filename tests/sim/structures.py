@@ -135,7 +135,7 @@ class Numbers(NamedTuple):
     drive: MotionLaw
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rig:
     """A small structure, clamped and driven, all of whose numbers can be varied.
 
@@ -218,11 +218,16 @@ class Rig:
         """A smooth function of displacement and velocity without any symmetry."""
         drive = self.driven_by(numbers.drive)
         response = differentiable_motion(solver, self.parameters(numbers), (drive,))
-        return _uneven(response.displacement, 1.0) + _uneven(response.velocity, 1e-3)
+        return uneven_loss(response.displacement, response.velocity)
+
+
+def uneven_loss(displacement: Array | Floats, velocity: Array | Floats) -> Array:
+    """Sum of weighted squares of motions (n_cases, n_times, n_units, 3) and their velocities."""
+    return _uneven(displacement, 1.0) + _uneven(velocity, 1e-3)
 
 
 @jax.jit
-def _uneven(motion: Array, scale: float) -> Array:
+def _uneven(motion: Array | Floats, scale: float) -> Array:
     """Sum of squares of (n_cases, n_times, n_units, 3) with weights that differ everywhere."""
     weights = 1.5 + jnp.sin(jnp.arange(motion.size, dtype=float)).reshape(motion.shape)
     lengths = scale * motion * jnp.array([1.0, 1.0, 7.5])
