@@ -49,6 +49,10 @@ DYNAMIC: dict[str, Callable[[Rig], Solver]] = {
 }
 
 
+def equilibria(rig: Rig) -> StaticSolver:
+    return StaticSolver(rig.topology, np.array([0.6, 1.0]), relative=1e-13)
+
+
 def path(rig: Rig, solver: Solver) -> Floats:
     """States (n_times, n_units, 3) of a rig."""
     found = solve_case(solver, rig.values, rig.drive)[0]
@@ -139,14 +143,13 @@ def test_motions_stay_clear(solver: str) -> None:
 
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
 def test_gradients_of_equilibria(quantity: str) -> None:
-    rig = squeezed()
-    solver = StaticSolver(rig.topology, np.array([0.6, 1.0]), relative=1e-13)
-    assert_clear_in_contact(rig, path(rig, solver))
-    assert_exact_in_contact(Ray(rig, solver, quantity))
+    ray = Ray(squeezed(), equilibria, quantity)
+    assert_clear_in_contact(ray.rig, path(ray.rig, ray.solver))
+    assert_exact_in_contact(ray)
 
 
 @pytest.mark.parametrize("quantity", ["design", "contact"])
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_gradients_of_motions(solver: str, quantity: str) -> None:
     rig = shaken()
-    assert_exact_in_contact(Ray(rig, DYNAMIC[solver](rig), quantity))
+    assert_exact_in_contact(Ray(rig, DYNAMIC[solver], quantity))

@@ -70,7 +70,8 @@ DURATION = 0.012
 ASKED = np.linspace(0.0, DURATION, 9)
 EVERYWHERE = np.linspace(0.0, DURATION, 301)
 
-SOLVERS: dict[str, Callable[[Rig], Solver]] = {
+Method = Callable[[Rig], Solver]
+SOLVERS: dict[str, Method] = {
     "static": lambda rig: StaticSolver(rig.topology, np.array([0.4, 1.0]), relative=1e-13),
     "implicit": lambda rig: ImplicitSolver(
         rig.topology, np.linspace(0.0, DURATION, 61), ASKED, tolerance=1e-8
@@ -127,14 +128,14 @@ def measured(n_units: int | None = None) -> TimeSeries:
 
 
 @cache
-def solver_of(rig: Rig, name: str) -> Solver:
-    return SOLVERS[name](rig)
+def solver_of(rig: Rig, method: Method) -> Solver:
+    return method(rig)
 
 
 @cache
-def gradient(rig: Rig, name: str) -> Floats:
+def gradient(rig: Rig, method: Method) -> Floats:
     """Derivatives of the loss by all numbers, one after the other."""
-    found = jax.grad(partial(rig.loss, solver_of(rig, name)))(rig.numbers)
+    found = jax.grad(partial(rig.loss, solver_of(rig, method)))(rig.numbers)
     return np.asarray(ravel_pytree(found)[0])
 
 
@@ -143,7 +144,7 @@ class Ray:
     """Loss of a solver along one direction, and its slope by the adjoint."""
 
     rig: Rig
-    method: str
+    method: Method
     quantity: str
 
     @property
@@ -215,20 +216,20 @@ def assert_exact_in_contact(ray: Ray) -> None:
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
 def test_equilibria(quantity: str) -> None:
     rig = squeezed(4.0)
-    assert_exact(Ray(rig, "static", quantity))
+    assert_exact(Ray(rig, SOLVERS["static"], quantity))
 
 
 def test_equilibria_by_fronts() -> None:
     """30 x 30 squares, whose tangent is no longer stored as a band."""
     rig = squeezed(20.0, side=30)
     assert rig.topology.numbering[1].by_fronts
-    assert_exact(Ray(rig, "static", "design"))
+    assert_exact(Ray(rig, SOLVERS["static"], "design"))
 
 
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "contact", "drive"])
 def test_equilibria_in_contact(quantity: str) -> None:
     rig = squeezed(9.0)
-    ray = Ray(rig, "static", quantity)
+    ray = Ray(rig, SOLVERS["static"], quantity)
     times = ray.solver.output_times
     pattern = ray.in_contact(0.0, times)
     assert pattern.any()
@@ -240,40 +241,40 @@ def test_equilibria_in_contact(quantity: str) -> None:
 @pytest.mark.parametrize("quantity", ["design", "stiffness", "drive"])
 def test_equilibria_under_forces(quantity: str) -> None:
     rig = pushed(slowly=True)
-    assert_exact(Ray(rig, "static", quantity))
+    assert_exact(Ray(rig, SOLVERS["static"], quantity))
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_motions_under_forces(solver: str, quantity: str) -> None:
     rig = pushed(slowly=False)
-    assert_exact(Ray(rig, solver, quantity))
+    assert_exact(Ray(rig, SOLVERS[solver], quantity))
 
 
 @pytest.mark.parametrize("quantity", ["density", "damping"])
 def test_equilibria_do_not_depend_on_inertia(quantity: str) -> None:
     rig = squeezed(4.0)
-    assert Ray(rig, "static", quantity).slope == 0.0
+    assert Ray(rig, SOLVERS["static"], quantity).slope == 0.0
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES)
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_motions(solver: str, quantity: str) -> None:
     rig = shaken()
-    assert_exact(Ray(rig, solver, quantity))
+    assert_exact(Ray(rig, SOLVERS[solver], quantity))
 
 
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_motions_under_a_recorded_drive(solver: str) -> None:
     rig = shaken(recorded=True)
-    assert_exact(Ray(rig, solver, "drive"))
+    assert_exact(Ray(rig, SOLVERS[solver], "drive"))
 
 
 @pytest.mark.parametrize("quantity", [*QUANTITIES, "contact"])
 @pytest.mark.parametrize("solver", DYNAMIC)
 def test_motions_in_contact(solver: str, quantity: str) -> None:
     rig = shaken(bias_deg=45.0)
-    ray = Ray(rig, solver, quantity)
+    ray = Ray(rig, SOLVERS[solver], quantity)
     pattern = ray.in_contact(0.0, EVERYWHERE)
     assert pattern.any()
     for step in TAYLOR_IN_CONTACT[quantity][0] * np.array([-1, 1]):
@@ -285,7 +286,7 @@ def test_motions_in_contact(solver: str, quantity: str) -> None:
 def test_motions_deep_in_contact(quantity: str) -> None:
     """Voids that close to their barrier, followed by many finer steps."""
     rig = shaken(bias_deg=45.0, amplitude=3.0)
-    ray = Ray(rig, "blanes_moan", quantity)
+    ray = Ray(rig, SOLVERS["blanes_moan"], quantity)
     states = ray.motion(0.0, ray.solver)[0][0]
     assert rig.topology.smallest_void_angle(rig.values.void, states).min() < np.deg2rad(-13.5)
     assert ray.slope == pytest.approx(ray.difference(1e-7), rel=1e-3)
@@ -295,15 +296,15 @@ def test_motions_deep_in_contact(quantity: str) -> None:
 @pytest.mark.parametrize("solver", ["implicit", "blanes_moan"])
 def test_polygons_of_any_kind(solver: str, quantity: str) -> None:
     rig = pulled()
-    assert_exact(Ray(rig, solver, quantity))
+    assert_exact(Ray(rig, SOLVERS[solver], quantity))
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_loops_are_compiled_for_one_kind_of_arguments(solver: str) -> None:
     """Derivatives come as arrays of JAX, which are read only, or of NumPy."""
     rig = shaken() if solver in DYNAMIC else squeezed(4.0)
-    method = solver_of(rig, solver)
-    by_jax = Ray(rig, solver, "design").slope
+    method = solver_of(rig, SOLVERS[solver])
+    by_jax = Ray(rig, SOLVERS[solver], "design").slope
     motion, velocity, records = solve_cases(method, rig.values, (rig.drive,))
     pulled = adjoint_cases(method, records, np.ones_like(motion), np.zeros_like(velocity))
     assert np.isfinite(by_jax)
