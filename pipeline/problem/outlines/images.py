@@ -38,10 +38,18 @@ FARTHEST = 1e9
 """Coordinate of a drawing, in its own unit."""
 
 
-def read_outlines(path: Path) -> tuple[Outline, ...]:
+def read_outlines(
+    path: Path, *, threshold: float | None = None, invert: bool = False
+) -> tuple[Outline, ...]:
     """Reads closed outlines of an image's shape, y up, in pixels or the drawing's own unit.
 
     A point within an odd number of them lies in the shape.
+
+    Args:
+        path: of a PNG, JPG or SVG.
+        threshold: grey level from 0 of black to 1 of white below which a pixel is in the shape; an
+            image must be binary without it.
+        invert: whether what is light is the shape.
 
     Raises:
         UserError: no such file, unreadable, not binary, or without a shape.
@@ -51,9 +59,16 @@ def read_outlines(path: Path) -> tuple[Outline, ...]:
     except OSError as error:
         what = f"the image cannot be read: {error.strerror}"
         raise UserError(what, remedy="give its path as seen from the problem file") from error
-    outlines = _of_drawing(path) if path.suffix.lower() == ".svg" else _of_pixels(held)
+    if path.suffix.lower() != ".svg":
+        outlines = _of_pixels(_dark(held, threshold, invert))
+    elif threshold is None and not invert:
+        outlines = _of_drawing(path)
+    else:
+        what = "a drawing has no grey levels"
+        raise UserError(what, remedy="remove `threshold` and `invert`; its filled parts are read")
     if not outlines:
-        raise UserError("the image shows no shape", remedy="draw the void dark on a light ground")
+        remedy = "draw the void dark on a light ground, or give `invert: true` for a light void"
+        raise UserError("the image shows no shape", remedy=remedy)
     read = tuple(
         tuple((round(float(x), 6), round(-float(y), 6)) for x, y in points) for points in outlines
     )
@@ -63,10 +78,9 @@ def read_outlines(path: Path) -> tuple[Outline, ...]:
     return read
 
 
-def _of_pixels(held: bytes) -> list[NDArray[Any]]:
+def _of_pixels(dark: NDArray[np.uint8]) -> list[NDArray[Any]]:
     import cv2
 
-    dark = (_grey(held) < (DARK + LIGHT) / 2).astype(np.uint8)
     padded = np.pad(dark, 1)
     found, _ = cv2.findContours(padded, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     areas = [cv2.contourArea(contour) for contour in found]
@@ -79,8 +93,8 @@ def _of_pixels(held: bytes) -> list[NDArray[Any]]:
     return [points - 1.0 for points in smooth if len(points) > 2]
 
 
-def _grey(held: bytes) -> NDArray[np.uint8]:
-    """Computes grey levels of a binary image; transparent pixels are white.
+def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint8]:
+    """Marks the pixels of an image's shape; transparent ones belong to its ground.
 
     Raises:
         UserError: unreadable, too large or not binary.
@@ -105,12 +119,15 @@ def _grey(held: bytes) -> NDArray[np.uint8]:
     grey = colours[..., :3].mean(axis=2)
     if colours.shape[2] in (2, 4):
         cover = colours[..., -1] / 255
-        grey = cover * colours[..., : colours.shape[2] - 1].mean(axis=2) + (1 - cover) * 255
+        ground = 0.0 if invert else 255.0
+        grey = cover * colours[..., : colours.shape[2] - 1].mean(axis=2) + (1 - cover) * ground
     between = float(np.mean((grey >= DARK) & (grey <= LIGHT)))
-    if between > LARGEST_BLUR:
+    if threshold is None and between > LARGEST_BLUR:
         what = f"the image is not binary: {between:.0%} of its pixels are neither dark nor light"
-        raise UserError(what, remedy="save it as black on white, without shades")
-    return np.round(grey).astype(np.uint8)
+        remedy = "save it as black on white, or give the grey level that parts it: `threshold: 0.5`"
+        raise UserError(what, remedy=remedy)
+    level = (DARK + LIGHT) / 2 if threshold is None else 255 * threshold
+    return ((grey >= level) if invert else (grey < level)).astype(np.uint8)
 
 
 def _of_drawing(path: Path) -> list[NDArray[Any]]:
@@ -120,8 +137,9 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
     try:
         _check_depth(path)
         _check_copies(ElementTree.parse(path).getroot())
-        shapes = SVG.parse(str(path), reify=True).elements()
+        shapes = list(SVG.parse(str(path), reify=True).elements())
         paths = [Curve(shape) for shape in shapes if isinstance(shape, Shape)]
+        _check_outlines(shapes, paths)
         count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
         if count < 2:
             raise ValueError(f"it has more than {MOST_POINTS // 2} pieces; simplify it")
@@ -132,6 +150,27 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     return found
+
+
+def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
+    """Refuses text, and lines that enclose nothing.
+
+    Raises:
+        UserError: there are some.
+    """
+    from svgelements import Close, Text
+
+    if any(isinstance(element, Text) for element in elements):
+        remedy = "convert text to paths (Inkscape: Path > Object to Path)"
+        raise UserError("the drawing holds text, which has no outline", remedy=remedy)
+    for path in paths:
+        filled = path.fill is not None and path.fill.value is not None
+        pieces = [piece for piece in path.as_subpaths() if len(piece) > 1]
+        if not filled and any(
+            not isinstance(piece[-1], Close) and piece[0].end != piece[-1].end for piece in pieces
+        ):
+            remedy = "close them, or convert strokes to paths (Inkscape: Path > Stroke to Path)"
+            raise UserError("the drawing holds lines that enclose nothing", remedy=remedy)
 
 
 def _check_depth(path: Path) -> None:

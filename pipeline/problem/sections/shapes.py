@@ -222,6 +222,9 @@ class Image(Section):
 
     Attributes:
         file: as seen from the problem file.
+        threshold: grey level, from 0 of black to 1 of white, below which a pixel is dark; without
+            it the image must be binary.
+        invert: whether the shape is light on a dark or a transparent ground.
         size: width and height to which the box around the shape is scaled; or `width`.
         width: to which it is scaled with its proportions kept; or `size`.
         centre: of the box: the middle of the lattice, or [x, y].
@@ -229,6 +232,8 @@ class Image(Section):
     """
 
     file: Annotated[str, StringConstraints(min_length=1)]
+    threshold: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    invert: bool = False
     size: tuple[Length, Length] | None = None
     width: Length | None = None
     centre: Centre = "centre"
@@ -245,7 +250,9 @@ class Image(Section):
 
         folder = (info.context or {}).get(FOLDER, ".")
         try:
-            outlines = read_outlines(Path(folder) / self.file)
+            outlines = read_outlines(
+                Path(folder) / self.file, threshold=self.threshold, invert=self.invert
+            )
         except UserError as error:
             raise fault(error.what, str(error.remedy), "file") from error
         return self.model_copy(update={"read": outlines})

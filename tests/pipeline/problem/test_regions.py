@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.problem import canonical_json, cloak_units, content_hash, from_canonical, void_units
-from pipeline.problem.outlines import Outline, extents
+from pipeline.problem.outlines import Outline, extents, read_outlines
 from pipeline.problem.reading import load
 from pipeline.runtime import UserError
 from tests.pipeline.static import MIMIC, write
@@ -45,6 +45,44 @@ def draw(path: Path, flip: bool = False) -> Path:
     image[65:80, 30:70] = 0
     cv2.imwrite(str(path), image[::-1] if flip else image)
     return path
+
+
+@pytest.mark.parametrize("kind", ["white on black", "white on nothing", "yellow on blue"])
+def test_a_light_or_coloured_shape_is_read_as_a_dark_one(kind: str, tmp_path: Path) -> None:
+    dark = draw(tmp_path / "l.png")
+    shape = np.equal(cv2.imread(str(dark), cv2.IMREAD_GRAYSCALE), 0)
+    colours = np.zeros((*shape.shape, 4 if kind == "white on nothing" else 3), np.uint8)
+    asked: dict[str, float] = {}
+    if kind == "yellow on blue":  # mean levels of 156 and 85, neither dark nor light
+        colours[...], colours[shape], asked = (255, 0, 0), (14, 201, 255), {"threshold": 0.5}
+    else:
+        colours[shape] = 255
+    cv2.imwrite(str(tmp_path / "light.png"), colours)
+    if asked:
+        with pytest.raises(UserError, match="not binary") as caught:
+            read_outlines(tmp_path / "light.png")
+        assert "threshold" in str(caught.value.remedy)
+    assert read_outlines(tmp_path / "light.png", invert=True, **asked) == read_outlines(dark)
+
+
+@pytest.mark.parametrize(
+    ("drawn", "what"),
+    [
+        ('<text x="10" y="20">logo</text>', "the drawing holds text"),
+        ('<path fill="none" stroke="black" d="M0 0 L9 9 L0 9"/>', "lines that enclose nothing"),
+        ('<polyline fill="none" stroke="black" points="0,0 9,9 0,9"/>', "lines that enclose"),
+    ],
+)
+def test_text_and_open_strokes_are_to_be_converted(drawn: str, what: str, tmp_path: Path) -> None:
+    path = tmp_path / "my logo.svg"
+    square = '<path fill="none" stroke="black" d="M0 0 H9 V9 H0 Z"/>'
+    head = '<svg xmlns="http://www.w3.org/2000/svg" width="20" height="20">'
+    path.write_text(f"{head}{square}</svg>")
+    assert len(read_outlines(path)) == 1
+    path.write_text(f"{head}{square}{drawn}</svg>")
+    with pytest.raises(UserError, match=what) as caught:
+        read_outlines(path)
+    assert "to paths" in str(caught.value.remedy)
 
 
 @pytest.mark.parametrize(
