@@ -50,7 +50,7 @@ def draw(path: Path, flip: bool = False) -> Path:
 @pytest.mark.parametrize("kind", ["white on black", "white on nothing", "yellow on blue"])
 def test_a_light_or_coloured_shape_is_read_as_a_dark_one(kind: str, tmp_path: Path) -> None:
     dark = draw(tmp_path / "l.png")
-    shape = np.equal(cv2.imread(str(dark), cv2.IMREAD_GRAYSCALE), 0)
+    shape = np.asarray(cv2.imread(str(dark), cv2.IMREAD_GRAYSCALE)) == 0
     colours = np.zeros((*shape.shape, 4 if kind == "white on nothing" else 3), np.uint8)
     asked: dict[str, float] = {}
     if kind == "yellow on blue":  # mean levels of 156 and 85, neither dark nor light
