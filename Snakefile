@@ -7,7 +7,13 @@ import sys
 from snakemake.utils import min_version
 
 from pipeline.runtime import source_hash, stage_server
-from pipeline.workflow import calibration_inputs, first_look, recordings, rule_inputs, studies
+from pipeline.workflow import (
+    calibration_inputs,
+    first_look,
+    recordings,
+    rule_inputs,
+    studies,
+)
 from reports.catalogue import REPORTS
 from reports.paper_figures import paper_figures, paper_movies
 
