@@ -132,7 +132,7 @@ class Loads:
         Raises:
             ValueError: load cases put forces on different units.
         """
-        first, *others = (case.loaded for case in self.cases)
+        first, *others = [case.loaded for case in self.cases] or [_none()]
         if any(not np.array_equal(first, other) for other in others):
             raise ValueError("all load cases must put forces on the same units, if only of zero")
         return first

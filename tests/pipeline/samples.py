@@ -63,6 +63,9 @@ SIZES = {
     "loop": 2,
     "band": 12,
     "preset": 3,
+    "design": 2,
+    "load": 5,
+    "search": 3,
 }
 
 

@@ -38,6 +38,8 @@ joule = newton * meter = J
 """
 
 _LONGEST = 80
+_GREATEST = 1e12
+"""In working units."""
 _NUMBER = r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 # Only products of integer powers go to pint, whose own grammar would evaluate any arithmetic.
 _POWER = r"[A-Za-zµ°]+(?:(?:\^|\*\*)-?\d)?"
@@ -89,7 +91,8 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     """Converts the quantity `text` to a float in the working unit of `dimension`.
 
     Raises:
-        UserError: no unit, an unknown one, one of another dimension, or no finite number.
+        UserError: no unit, an unknown one, one of another dimension, or a number that is not
+            finite or beyond all that is built.
     """
     wanted = f'{dimension.name} is wanted here, e.g. "{dimension.example}"'
     if isinstance(text, bool) or not isinstance(text, str | int | float):
@@ -104,6 +107,9 @@ def parse_quantity(text: object, dimension: Dimension) -> float:
     value = float(match["number"]) * _factor(match["unit"], dimension, wanted)
     if not math.isfinite(value):
         raise UserError("not a finite number", remedy=wanted)
+    if abs(value) > _GREATEST:
+        what = f"no specimen has {value:.3g} {dimension.unit}"
+        raise UserError(what, remedy=f"check number and unit; {wanted}")
     return value
 
 

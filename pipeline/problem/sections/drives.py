@@ -57,6 +57,15 @@ class _Drive(Section):
         """Lists the degrees of freedom that the drive moves in some load case."""
         return ("theta",)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _kind_is_no_key(cls, data: object) -> object:
+        for kind in ("force", "torque", "rotation"):
+            if isinstance(data, Mapping) and kind in data:
+                remedy = f"a {kind} is a drive of its own: `kind: {kind}` with `amplitude`"
+                raise fault("unknown key", remedy, kind)
+        return data
+
     @model_validator(mode="after")
     def _is_not_free(self) -> Self:
         if both := [dof for dof in self.acting if dof in self.free]:

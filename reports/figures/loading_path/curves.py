@@ -37,6 +37,9 @@ CASE_STYLES = (
 RIGHT_AXIS = 9.0
 """Room for the labels of an axis on the right, mm."""
 
+_FLAT = 0.05
+"""Share of the altered structure's measure below which a curve is seen on a logarithmic axis."""
+
 
 def path_axes(axes: Axes, path: Abscissa, label: str) -> None:
     """Draws an x axis along the path, with a paper's label of the load above it if there is one."""
@@ -92,14 +95,27 @@ def measure_panel(axes: Axes, study: StudyResults, path: Abscissa, measure: Meas
     _jumps(axes, path, values, response)
     if study.redesign is not None and study.redesign.changed:
         _second(axes, study, measure, study.redesign)
-    if problem.objective.target == "rest":
-        axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label="Unloaded")
+    still = "Unloaded" if problem.objective.target == "rest" else display_name(problem, "intact")
+    axes.plot(path.values[[0, -1]], [0, 0], color=style.INTACT, lw=1.2, label=f"{still}: zero")
     if study.scatter is not None:
         _bands(axes, study, path, measure, study.scatter)
     measured.bands(axes, study, measure.key)
     measured.measured_curves(axes, study, path, measure.of, names)
     legend = axes.legend(loc="upper left", handlelength=1.2)
-    axes.set_ylim(0, (1.1 + 0.1 * len(legend.get_texts())) * axes.get_ylim()[1])
+    room = 0.1 * len(legend.get_texts())
+    if _vanishes(problem, values):
+        seen = values.sel(structure=names).isel(time=slice(1, None)).values
+        low, high = 0.5 * float(np.nanmin(seen[seen > 0.0])), 1.1 * float(np.nanmax(seen))
+        axes.set_yscale("log")
+        axes.set_ylim(low, high * (high / low) ** (room / (1.0 - room)))
+    else:
+        axes.set_ylim(0, (1.1 + room) * axes.get_ylim()[1])
+
+
+def _vanishes(problem: Problem, values: xr.DataArray) -> bool:
+    """Tests if the cloak's curve lies on the axis where the altered structure's is seen."""
+    ends = over_cases(problem, values).isel(time=-1)
+    return float(ends.sel(structure="cloaked")) < _FLAT * float(ends.sel(structure="altered"))
 
 
 def _second(axes: Axes, study: StudyResults, measure: Measure, again: RedesignResults) -> None:

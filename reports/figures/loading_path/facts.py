@@ -160,7 +160,8 @@ def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
     for name in ("altered", "cloaked"):
         label = f"{measure.label}, {display_name(study.problem, name).lower()}"
         end = float(values.sel(structure=name).isel(time=-1))
-        yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=where)
+        note = f"{where}{measure.formula}"
+        yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=note)
         yield from _each_load(
             study,
             f"{measure.key}_{name}",

@@ -45,7 +45,8 @@ TALLEST_SNAPSHOTS = 116.0
 _SECOND = "; dashed purple: the cloak optimised again with contact on distance, under that contact"
 _HISTORY = (
     "Loss against evaluation; rejected evaluations are dots, infeasible ones pale, the circle is "
-    "the best feasible design."
+    "the best feasible design. Where a descent has ended, it goes on from a design shifted at "
+    "random: the loss jumps up there."
 )
 
 _KEYS: tuple[Literal["ux", "uy", "theta"], ...] = ("ux", "uy", "theta")
@@ -125,7 +126,7 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
     """Titles, curves, sentences and tables of what stands below the snapshots, left to right."""
     problem, measure = study.problem, measures.measure_of(study.problem)
     way = [Table("path.csv", "every structure along the path", tables.path(study))]
-    words = f"{measure.label}{marks([study])}."
+    words = f"{measure.label}{measure.formula}{marks([study])}."
     yield measure.label, lambda axes: curves.measure_panel(axes, study, path, measure), words, way
     if path.static and problem.objective.target != "rest":
         words = "How much nearer the top and the bottom row come, mean over the middle columns."

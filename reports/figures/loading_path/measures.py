@@ -15,7 +15,8 @@ from reports.study import DRIVEN
 class Measure:
     """Describes a number along the path that should be small, of every structure and load case.
 
-    `of` maps a response to (structure, case, time); `symbol` stands on axes.
+    `of` maps a response to (structure, case, time); `symbol` stands on axes, `formula` behind the
+    label where it is explained.
     """
 
     key: str
@@ -23,6 +24,7 @@ class Measure:
     symbol: str
     unit: str
     of: Callable[[xr.Dataset], xr.DataArray]
+    formula: str = ""
 
 
 def measure_of(problem: Problem) -> Measure:
@@ -42,6 +44,8 @@ def measure_of(problem: Problem) -> Measure:
         "mimicking error",
         "1",
         lambda r: mismatch(r, scale, problem.static),
+        f", ‖U − U₀‖ / {'‖U₀‖ at full load' if problem.static else 'max ‖U₀‖'} over the region of"
+        " interest, U₀ that of the intact structure",
     )
 
 

@@ -77,7 +77,8 @@ def along_edges(problem: Problem, response: xr.Dataset) -> xr.DataArray:
             found = smaller_angles(problem, part.isel(case=case))[:, here]
             angles[k, case, :, : found.shape[1]] = found
     dims = ("structure", "case", "time", "ligament")
-    return xr.DataArray(angles, {name: response[name] for name in ("structure", "time")}, dims)
+    known = ("structure", "direction", "time")
+    return xr.DataArray(angles, {name: response[name] for name in known}, dims)
 
 
 def edge_contacts(problem: Problem, response: xr.Dataset) -> xr.DataArray:

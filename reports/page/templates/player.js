@@ -131,7 +131,7 @@
   if (data.cases.length > 1) {
     menu("Load", data.cases, state.load, (index) => { state.load = index; }).id = "player-case";
   }
-  menu("Colour", data.fields.map((field) => field.label), 0,
+  menu("Colour", data.fields.map((field) => field.label.replace("_", "")), 0,
     (index) => { state.field = index; paintBar(); }).id = "player-field";
   if (residual.some((cases) => cases.some(Boolean))) {
     menu("View", ["motion", "residual: measured less simulated"], 0,
@@ -257,7 +257,9 @@
     }
     const number = (value) => `${Number(value.toPrecision(3))}`.replace("-", "−");
     const [low, high] = limits(field);
-    barLabel.textContent = state.residual ? `residual ${field.label}` : field.label;
+    const [symbol, index] = field.label.split("_");
+    barLabel.textContent = state.residual ? `residual ${symbol}` : symbol;
+    if (index) make("sub", { textContent: index }, barLabel);
     barLow.textContent = number(low) + unit;
     barHigh.textContent = number(high) + unit;
   };

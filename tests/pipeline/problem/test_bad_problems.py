@@ -13,13 +13,14 @@ from tests.pipeline.conftest import Refusal
 TABLE = r"""
 spacing: => spacng: | lattice.spacng | unknown key | did you mean 'spacing'?
 directions: [0 deg, 45 deg, 90 deg, 135 deg] => directions: [0 deg]\n  rotation: 10 deg
-    | drive.rotation | unknown key | known here: units, free
+    | drive.rotation | unknown key | `kind: rotation`
 objective: => goal: | goal | unknown key | known here: title, doc, lattice
   rows: 15\n =>  | lattice.rows | missing key | add it
 spacing: 15 mm => spacing: 15 | lattice.spacing | the unit is missing | "15 mm"
 radius: 67.5 mm => radius: 4.5 s
     | cloak.disc.radius | the unit 's' is not that of a length | a length is wanted here
 spacing: 15 mm => spacing: .nan | lattice.spacing | not a number with a unit | mm
+spacing: 15 mm => spacing: 1e300 mm | lattice.spacing | no specimen has 1e+300 mm | check number
 axial_stiffness: 120 N/mm => axial_stiffness: -120 N/mm
     | material.axial_stiffness | a stiffness must be greater than zero
     | give a value greater than zero

@@ -158,7 +158,7 @@ def test_the_figure_is_legible(name: str, request: pytest.FixtureRequest) -> Non
 
 def test_the_figure_names_structures_units_and_the_papers_label(shield: StudyResults) -> None:
     words = figure_assertions.words(made(shield))
-    assert {"Uncloaked", "Cloaked", "Unloaded", "paper’s label ε (%)", "force (N)"} <= words
+    assert {"Uncloaked", "Cloaked", "Unloaded: zero", "paper’s label ε (%)", "force (N)"} <= words
     assert set("abcdef") <= words
     drafted = dataclasses.replace(shield, draft=("9 units instead of 225",))
     assert "DRAFT" in figure_assertions.words(made(drafted))

@@ -32,7 +32,7 @@ def test_report_is_complete(report: Path) -> None:
 
 def test_what_may_not_be_meant_stands_at_the_top(report: Path) -> None:
     page = (report / "index.html").read_text(encoding="utf-8")
-    note = f'<p class="warning" role="note">{shaken_study.WARNED}.</p>'
+    note = f'<p class="warning" role="note">{shaken_study.WARNED}; shims of '
     assert page.index(note) < page.index('id="figure"')
 
 
@@ -54,8 +54,8 @@ def test_command_line(tmp_path: Path) -> None:
 def test_datasets_of_another_problem_are_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    paths = shaken_study.write(tmp_path, "quick")
-    assert main(command(paths, tmp_path / "report", None)) == 2
+    paths = shaken_study.write(tmp_path)
+    assert main(command(paths, tmp_path / "report", "quick")) == 2
     told = capfd.readouterr().err
     assert "the dataset was made from another problem" in told
     assert "design.nc" in told
