@@ -115,12 +115,6 @@ def check_ends(moments: Iterable[str], undisturbed: Checkout, fresh: Checkout) -
     assert not fresh.jobs()
 
 
-def test_no_end_of_an_optimisation_changes_the_results(
-    undisturbed: Checkout, fresh: Checkout
-) -> None:
-    check_ends(list(ENDS)[:2], undisturbed, fresh)
-
-
 def test_a_second_run_in_the_same_folder_is_refused(fresh: Checkout) -> None:
     run = fresh.start()
     wait_until((fresh.results / "logs/design_sqp.log").exists, run)

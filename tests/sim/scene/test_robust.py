@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from sim.core import Floats
 from sim.scene import Evaluator, Scene, combined, make_plan
 from sim.solvers import Harmonic, Pulse
 from tests.sim.scene.test_plan import ANGLES, design_of, scene
@@ -29,23 +30,23 @@ def test_the_gradient_of_the_p_mean() -> None:
         assert float(slope[k]) == pytest.approx((ahead - behind) / 2e-6, rel=1e-6, abs=1e-9)
 
 
-def robust() -> Scene:
-    """Two frequencies along four directions, and two imperfect copies."""
+def robust(angles: Floats = ANGLES) -> Scene:
+    """Two frequencies along some directions, and two imperfect copies."""
     posed = scene()
     copies = 0.3 * np.random.default_rng(7).uniform(-1, 1, (2, posed.lattice.n_groups, 2))
-    motions = tuple(Harmonic(a, f, angle) for a, f in ((3.0, 5.0), (2.0, 10.0)) for angle in ANGLES)
-    weights = np.repeat([0.15, 0.1], 4)
+    motions = tuple(Harmonic(a, f, angle) for a, f in ((3.0, 5.0), (2.0, 10.0)) for angle in angles)
+    weights = np.repeat([0.6, 0.4], len(angles)) / len(angles)
     return scene(
         motions=motions, weights=weights, frequency=10.0, sharpness=8.0, copies=copies, samples=21
     )
 
 
 def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
-    posed = robust()
+    posed = robust(ANGLES[1:2])
     evaluate = Evaluator(posed, make_plan(posed))
     design = design_of(posed, 0.2)
     value, gradient, each = evaluate(design)
-    assert each.shape == (8,)
+    assert each.shape == (2,)
     assert posed.loads.case_weights @ each < value < each.max()
     steepest = float(np.linalg.norm(gradient))
     way = gradient / steepest
@@ -54,7 +55,7 @@ def test_the_evaluator_is_the_derivative_of_the_robust_loss() -> None:
 
 
 def test_the_loss_over_copies_is_the_mean_of_theirs() -> None:
-    posed = robust()
+    posed = robust(ANGLES[1:2])
     assert posed.design.copies is not None
     design = design_of(posed, 0.2)
     whole = Evaluator(posed, make_plan(posed))(design)[0]
