@@ -211,7 +211,9 @@ def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     for name in structures(study.response):
         colour = style.STRUCTURE_COLOURS[name]
         right.plot(path.values, mean.sel(structure=name), color=colour, lw=1.0, ls=":")
-    right.set(ylim=(0.0, None), ylabel="eigenvalue (N/m)")
+    # below the legend that tells measured curves from simulated ones
+    room = 1.5 if study.recordings and study.problem.objective.target == "rest" else 1.05
+    right.set(ylim=(0.0, room * max(0.0, float(mean.max())) or None), ylabel="eigenvalue (N/m)")
     right.yaxis.set_major_locator(MaxNLocator(4))
 
 
