@@ -27,12 +27,17 @@ _process, _kept = psutil.Process(), [0]
 gc.disable()  # what is imported to collect tests stays: nothing to look through, now or later
 
 
-LONG = ("e2e", "workflow", "docs", "solvers")
-"""Folders with files of a minute; begun first, they keep no worker at the end."""
+FIRST = ("test_gradients.py", "workflow", "test_contact_solves.py", "e2e", "docs", "solvers")
+"""Files and folders of a minute: begun first, they keep no worker at the end. Those that compile
+most loops have one between that compiles none, as a worker waits for loops of the other."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.path.parent.name not in LONG)
+    def place(item: pytest.Item) -> int:
+        names = (item.path.name, item.path.parent.name)
+        return min((FIRST.index(name) for name in names if name in FIRST), default=len(FIRST))
+
+    items.sort(key=place)
 
 
 def pytest_collection_finish() -> None:
