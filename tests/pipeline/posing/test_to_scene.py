@@ -16,7 +16,7 @@ from tests.pipeline.static import SHIELD, write
 SERIES = "drive: { kind: time_series, units: right, file: push.csv }\n"
 WRONG = {
     "beyond the lattice": ("amplitude: 9 mm", "amplitude: 400 mm", "drive.amplitude"),
-    "1e300": ("amplitude: 9 mm", "amplitude: 1e300 mm", "drive.amplitude"),
+    "1e10": ("amplitude: 9 mm", "amplitude: 1e10 mm", "drive.amplitude"),
     "no supports": ("supports:\n  - units: left\n", "supports: []\n", "supports"),
     "no length": ("ligament_length: 2.25 mm", "ligament_length: 1e-9 mm", "lattice"),
 }
