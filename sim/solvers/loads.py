@@ -11,7 +11,7 @@ from jax import Array
 from sim.core import Floats, Ints, Numbers
 
 DISPLACEMENT, FORCE, FREE = 0, 1, -1
-"""What a component of a drive prescribes of its degree of freedom: a displacement or rotation, a
+"""Kinds of what a drive prescribes of a degree of freedom: a displacement or rotation, a
 force or moment (a dead load), or nothing."""
 NOTICED = 1e-3
 """Least kink of a series that steps stop at: how far its point lies off its neighbours' line, over

@@ -71,7 +71,7 @@ class Sandbox:
         return os.environ | {"STAGE_SECONDS": str(self.stage_seconds)}
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        """What snakemake says to a command, and how it ends."""
+        """Returns the output of a command of snakemake, and its exit status."""
         told = self.root.with_name("told")
         given = ["--cores", "2", *words]
         server = _server()
@@ -93,7 +93,7 @@ class Sandbox:
         )
 
     def planned(self, *words: str) -> Counter[str]:
-        """How often each rule would run."""
+        """Counts the jobs of each rule in a plan."""
         ended = self.run("--dry-run", *words)
         assert ended.returncode == 0, ended.stdout + ended.stderr
         table = ended.stdout.partition("\n---")[2].partition("\ntotal")[0].splitlines()[1:]

@@ -23,7 +23,7 @@ _ABOUT = 60
 """Distance of a picture's rim from the outlines, px."""
 _UNITS = ("px", "px", "mrad")
 _LIMITS = (0.03, 0.03, 2.0)
-"""What the other program's result is good for."""
+"""Bounds of the difference from the other program's result, px and rad."""
 
 
 def tracking_error(made: xr.Dataset) -> Floats:

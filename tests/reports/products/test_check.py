@@ -1,4 +1,4 @@
-"""What is shown of a problem before it is computed."""
+"""Shows a problem before it is computed."""
 
 from collections.abc import Callable
 from pathlib import Path
