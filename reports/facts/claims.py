@@ -143,7 +143,7 @@ def _side(claim: Claim, fact: Fact | None, spacing: Fact | None, missing: str) -
     if fact is None or not math.isfinite(fact.value):
         return Side(ABSENT, "not yet evaluated", missing)
     value, unit, place = parsed(claim.paper or claim.meaning or "")
-    if unit == "s" and spacing is not None:
+    if unit == "spacings" and spacing is not None:
         value, unit, place = value * spacing.value, spacing.unit, place * spacing.value
     if unit != fact.unit:
         raise UserError(

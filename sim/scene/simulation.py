@@ -24,7 +24,7 @@ from sim.scene.objectives import (
 )
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.scene.soundness import check_units
+from sim.scene.soundness import check_cases, check_units
 from sim.solvers import Case, PrescribedMotion, Solver, concrete, differentiable_motion, solve_cases
 from sim.structure import Parameters, parameters, shape
 from sim.time_integration import simpson_weights
@@ -136,6 +136,7 @@ def simulate(
     """
     made = plan or make_plan(scene, vertices, times, threads, every_case=True)
     chosen = tuple(int(case) for case in (made.simulated if cases is None else cases))
+    check_cases(scene, chosen)
     if vertices is not None or design is None:
         network = scene.lattice.vertices if vertices is None else vertices
         values: Parameters[Any] = concrete_parameters(scene, network)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 
 import jax
@@ -13,7 +13,7 @@ import shapely
 
 from sim.core import Floats, SimulationError
 from sim.scene.expected_cost import estimate_cost
-from sim.scene.scene import Scene
+from sim.scene.scene import DOFS, Scene
 from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
 
@@ -100,18 +100,35 @@ def check_units(lattice: Lattice, vertices: Floats) -> None:
 
 
 def _check_ids(scene: Scene) -> None:
-    """Refuses ids of units that there are not."""
+    """Refuses units and degrees of freedom that there are not."""
     loads, n = scene.loads, scene.lattice.n_units
+    frozen = scene.design.frozen
     named = {
         "supports": [each.units for each in loads.supports],
         "drive.units": [case.units for case in loads.cases],
         "objective.region": [scene.objective.region],
-        "cloak": [scene.design.cloak],
+        "cloak": [scene.design.cloak, *([] if frozen is None else [frozen])],
     }
     for key, ids in named.items():
+        for each in ids:
+            if not np.issubdtype(getattr(each, "dtype", None), np.integer):
+                raise SceneError("units are no array of integers; take np.array of their ids", key)
         every = np.concatenate([np.zeros(0, dtype=np.int64), *ids])
         if len(wrong := every[(every < 0) | (every >= n)]) > 0:
             raise SceneError(f"there is no unit {wrong[0]}; the lattice has 0 to {n - 1}", key)
+    for dof in {dof for each in loads.supports for dof in each.dofs} - set(DOFS):
+        raise SceneError(f"there is no {dof!r}; the dofs are {', '.join(DOFS)}", "supports")
+
+
+def check_cases(scene: Scene, numbers: Iterable[int]) -> None:
+    """Refuses load cases that there are not.
+
+    Raises:
+        SceneError: naming the first of them.
+    """
+    n = len(scene.loads.cases)
+    for wrong in (number for number in numbers if not 0 <= number < n):
+        raise SceneError(f"there is no load case {wrong}; the scene has 0 to {n - 1}", "drive")
 
 
 def _loose_units(scene: Scene) -> Iterator[str]:

@@ -1,14 +1,31 @@
 """What a build leaves: readable logs, complete results, and nothing to be done."""
 
 import resource
+import shutil
+from pathlib import Path
 
+from reports.__main__ import main
 from tests.e2e.checkout import Checkout, assert_plain
+from tests.reports.page.test_report_page import Links
 
 
 def test_the_results_are_complete(undisturbed: Checkout) -> None:
     names = {"design_sqp.nc", "design_mma.nc", "design.nc", "response.nc", "sweep.nc"}
     report = {f"report/tiny.{suffix}" for suffix in ("pdf", "svg", "png")} | {"report/index.html"}
     assert names | report <= set(undisturbed.built())
+
+
+def test_every_link_leads_somewhere(undisturbed: Checkout, tmp_path: Path) -> None:
+    results = shutil.copytree(undisturbed.root / "results", tmp_path / "results")
+    assert main(["index", "--results", str(results), "--quiet"]) == 0
+    links = {page: Links(page.read_text(encoding="utf-8")) for page in results.rglob("*.html")}
+    assert len(links) == 2
+    for page, found in links.items():
+        for address in (*found.hrefs.values(), *found.loaded):
+            file, _, place = address.partition("#")
+            if not file.startswith(("data:", "https://")):
+                assert not place or place in found.ids, (page, address)
+                assert (page.parent / file).is_file() or not file, (page, address)
 
 
 def test_logs_are_plain_lines_that_tell_what_happened(undisturbed: Checkout) -> None:

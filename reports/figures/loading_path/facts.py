@@ -73,7 +73,7 @@ def scene_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         yield Fact("variant", "Values", np.nan, "1", paper.variant, note=note)
     initial = from_dataset(study.design, lattice.spacing, "vertices_initial")
     yield Fact("units", "Units", lattice.n_units, "1", lattice_size(lattice))
-    yield number("spacing", "Spacing s", lattice.spacing, "mm")
+    yield number("spacing", "Spacing", lattice.spacing, "mm")
     if isinstance(lattice, Quads):
         yield checks.bias_fact(initial)
     yield number("ligament_length", "Ligament length", lattice.ligament_length, "mm")
@@ -104,11 +104,11 @@ def _radii(problem: Problem) -> Iterator[Fact]:
     ):
         bounds = region.bounds if isinstance(region, Region) else None
         if bounds is not None:
-            yield number(key, label, bounds[2], "mm", note=f"{bounds[2] / spacing:.4g} s")
+            yield number(key, label, bounds[2], "mm", note=f"{bounds[2] / spacing:.4g} spacings")
     width = _cloak_width(problem)
     if width is not None:
         yield number(
-            "cloak_width", "Width of the cloak", width, "mm", note=f"{width / spacing:.4g} s"
+            "cloak_width", "Width of the cloak", width, "mm", note=f"{width / spacing:.4g} spacings"
         )
 
 

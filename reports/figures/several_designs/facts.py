@@ -28,7 +28,7 @@ def _setting(family: DesignSeries) -> Iterator[Fact]:
     scene = design.scene
     size = f"{scene.columns} × {scene.rows}"
     yield Fact("units", "Units", scene.columns * scene.rows, "1", size)
-    yield number("spacing", "Spacing s", scene.spacing, "mm")
+    yield number("spacing", "Spacing", scene.spacing, "mm")
     initial = from_dataset(design.study.design, scene.spacing, "vertices_initial")
     yield checks.bias_fact(initial)
     yield number("amplitude", "Amplitude of the source", scene.amplitude, "mm")

@@ -76,7 +76,7 @@ def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     initial = from_dataset(design, scene.spacing, "vertices_initial")
     size = f"{scene.columns} × {scene.rows}"
     yield Fact("units", "Units", initial.n_units, "1", size, "15 × 15")
-    yield number("spacing", "Spacing s", scene.spacing, "mm", paper="15 mm")
+    yield number("spacing", "Spacing", scene.spacing, "mm", paper="15 mm")
     yield replace(checks.bias_fact(initial), paper="20°")
     yield number("amplitude", "Amplitude A", scene.amplitude, "mm", paper="4.5 mm")
     yield number("frequency", "Frequency f", scene.frequency, "Hz", paper="2 Hz")
@@ -85,10 +85,10 @@ def scene_facts(scene: ReportScene, design: xr.Dataset) -> Iterator[Fact]:
     count = len(scene.directions)
     yield Fact("directions", "Loading angles α", count, "1", angles, "0, 45, 90, 135°")
     radius = scene.radii[-1]
-    words = f"{radius / scene.spacing:g}s = {worded(radius, 'mm', 4)}"
+    words = f"{worded(radius, 'mm', 4)} = {radius / scene.spacing:g} spacings"
     reach = measures.site_radius(initial, scene.middle, CLOAK) / scene.spacing
-    note = f"4.5s is the authors' code, 4s their text; the farthest cloak unit lies at {reach:.3g}s"
-    yield Fact("radius", "Cloak radius", radius, "mm", words, "4s = 60 mm", note)
+    note = f"4.5 is the authors' code, 4 their text; the farthest cloak unit lies at {reach:.3g}"
+    yield Fact("radius", "Cloak radius", radius, "mm", words, "60 mm = 4 spacings", note)
     note = f"{scene.horizon * scene.frequency:g} drive cycles from rest"
     yield number("horizon", "Loss taken over", scene.horizon, "s", note=note)
 

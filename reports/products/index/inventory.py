@@ -20,6 +20,14 @@ from reports.facts import fact_records as facts
 
 FIGURE = re.compile(r"fig\d+")
 """Names of the studies that are figures of the paper."""
+PRODUCTS = {
+    "fabrication": "fabrication files",
+    "sweep": "sweep",
+    "spectrum": "spectrum",
+    "gains": "gains of robust designs",
+    "certificate": "losses over a family of loads",
+}
+"""Pages of a study beside its report, by folder."""
 
 
 SEAL = re.compile(r'<meta name="facts-sha256" content="(\w+)">')
@@ -143,8 +151,11 @@ def _datasets(page: Path, text: str) -> list[Path]:
 
 def _around(folder: Path, results: Path, faults: list[UserError]) -> list[Link]:
     """Lists what is built of a study, and its recordings, with whether they were filmed."""
-    package = folder / "fabrication/index.html"
-    found = [Link(_seen(package, results), "fabrication files")] if package.is_file() else []
+    found = [
+        Link(_seen(page, results), text)
+        for product, text in PRODUCTS.items()
+        if (page := folder / product / "index.html").is_file()
+    ]
     pages = sorted(folder.glob("recordings/*/index.html"))
     return found + _sound(pages, lambda page: _recording(page, results), faults)
 

@@ -10,7 +10,7 @@ from reports.figures.loading_path import facts as along
 from reports.figures.shielding import facts as shielding
 from reports.study import StudyResults
 
-UNIT = {"1", "mm", "ms", "deg", "%", "Hz", "s"}
+UNIT = {"1", "mm", "ms", "deg", "%", "Hz", "spacings"}
 
 
 def test_claims_are_in_words_of_their_own_with_a_line_and_a_unit() -> None:

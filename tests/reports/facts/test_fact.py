@@ -20,8 +20,8 @@ def found(study: StudyResults) -> dict[str, Fact]:
 def test_every_number_that_the_paper_quotes_is_there(found: dict[str, Fact]) -> None:
     quoted = {fact.paper for fact in found.values() if fact.paper != fact_records.ABSENT}
     assert {
-        "15 × 15", "15 mm", "20°", "4.5 mm", "2 Hz", "0, 45, 90, 135°", "4s = 60 mm", "≈ 150",
-        "≈ 70 %", "5.2 mm", "1.9 mm", "63 %", "< 0.35", "0–180°", "2–16 Hz", "symmetric",
+        "15 × 15", "15 mm", "20°", "4.5 mm", "2 Hz", "0, 45, 90, 135°", "60 mm = 4 spacings",
+        "≈ 150", "≈ 70 %", "5.2 mm", "1.9 mm", "63 %", "< 0.35", "0–180°", "2–16 Hz", "symmetric",
     } <= quoted  # fmt: skip
 
 
@@ -35,7 +35,7 @@ def test_keys_are_unique_and_everything_has_a_group(study: StudyResults) -> None
     ("key", "value", "words"),
     [
         ("bias", 20.0, "20°"),
-        ("radius", 67.5, "4.5s = 67.5 mm"),
+        ("radius", 67.5, "67.5 mm = 4.5 spacings"),
         ("horizon", 1.0, "1 s"),
         ("mean_reduction", 88.0, "88.0 %"),
         ("mean_reduction_all", 88.0, "88.0 %"),

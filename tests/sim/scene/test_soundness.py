@@ -58,6 +58,17 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "no length": (
         scene(lattice=sim.quads(5, 5, 15.0, 0.0, 0.3)), "has no length", "lattice.ligament_length",
     ),
+    "no such unit clamped": (scene(supports=(sim.Clamp(LEFT + 21),)), "no unit 26; .* 0 to 24",
+                             "supports"),
+    "none below 0": (scene(supports=(sim.Clamp(LEFT - 1),)), "no unit -1", "supports"),
+    "driven": (scene(cases=(sim.PrescribedMotion(np.array([25]), sim.LinearRamp(-1.0, 1.0)),)),
+               "no unit 25", "drive.units"),
+    "of interest": (scene(region=np.array([25])), "no unit 25", "objective.region"),
+    "redesigned": (scene(cloak=np.array([25])), "no unit 25", "cloak"),
+    "kept": (scene(frozen=np.array([25])), "no unit 25", "cloak"),
+    "a list": (scene(region=[12]), "no array of integers", "objective.region"),
+    "a float": (scene(region=np.array([12.0])), "no array of integers", "objective.region"),
+    "no such dof": (scene(supports=(sim.Clamp(LEFT, ("uz",)),)), "no 'uz'; .*ux, uy", "supports"),
 }  # fmt: skip
 
 
@@ -67,6 +78,12 @@ def test_what_has_no_meaning_is_refused(posed: sim.Scene, what: str, key: str) -
         with pytest.raises(SceneError, match=what) as refusal:
             door(posed)
         assert refusal.value.key == key
+
+
+def test_a_load_case_that_is_not_there_is_refused() -> None:
+    for number in (1, -1):
+        with pytest.raises(SceneError, match=f"no load case {number}; the scene has 0 to 0"):
+            sim.simulate(scene(), cases=[number])
 
 
 def test_sound_scenes_pass() -> None:
