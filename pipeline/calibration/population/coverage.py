@@ -16,6 +16,7 @@ from pipeline.calibration.population.prediction import (
     find_band,
     medians,
     new_curves,
+    redraw_population,
     student_band,
 )
 from sim.core import Floats
@@ -74,7 +75,8 @@ def try_band(
     inside, width = np.empty(n_sets), np.empty(n_sets)
     for k, curves in enumerate(new.reshape(n_sets, NEW_CURVES, -1)):
         draws = {name: values[k] for name, values in found.items()}
-        band = find_band(new_curves(curve, draws, random))
+        known = redraw_population(draws, priors, random)
+        band = find_band(new_curves(curve, known, random))
         inside[k] = band.holds(curves).mean()
         width[k] = band.half_width / student_band(curve, medians(draws)["constants"]).half_width
     return Coverage(inside, width)

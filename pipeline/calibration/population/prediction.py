@@ -7,12 +7,18 @@ import numpy as np
 from scipy.stats import t as student
 
 from pipeline.calibration.population.curve_emulator import CurveEmulator, log_force
-from pipeline.calibration.population.hierarchical_model import Draws, correlation
+from pipeline.calibration.population.hierarchical_model import (
+    Draws,
+    PriorNumbers,
+    correlation,
+)
 from sim.core import Floats
 
 LEVEL = 0.95
-REPEATS = 8
+REPEATS = 64
 """New samples for every draw from the posterior."""
+_REACH = np.linspace(-5.0, 5.0, 201)
+"""Where the law of a spread is summed, in standard deviations of its prior."""
 _JITTER = 1e-10
 
 
@@ -66,13 +72,58 @@ def pose_curve(emulator: CurveEmulator, displacement: Floats, kind: int) -> Pose
     return PosedCurve(displacement, place, emulator.weights(displacement), emulator.centre, kind)
 
 
+def redraw_population(
+    draws: Draws, priors: PriorNumbers, random: np.random.Generator, repeats: int = REPEATS
+) -> Draws:
+    """Draws mean and spread anew, by their exact law given the samples' constants.
+
+    Readings tell of the population through its samples alone. With n of them, of mean m and sum of
+    squares q about it, and the prior N(c, w^2) of the mean,
+
+        p(ln s | m, q) ~ p(ln s) s^(1 - n) exp(-q / 2 s^2) N(m; c, w^2 + s^2 / n),
+
+    and the mean is normal given s. The walk of a sampler through the long tail of s would leave
+    far more noise in the ends of a band.
+
+    Args:
+        draws: from one posterior, each (n_draws, ...).
+        priors: of it.
+        random: where they are drawn from.
+        repeats: for every draw.
+
+    Returns:
+        (n_draws * repeats, ...) draws from the same posterior.
+    """
+    constants = np.moveaxis(draws["constants"], 1, 2)  # (n_draws, 3, n_samples)
+    count, middle = constants.shape[-1], constants.mean(axis=-1, keepdims=True)
+    square = count * constants.var(axis=-1, keepdims=True)
+    centre, width = np.reshape(priors.centre, (3, 1)), np.square(priors.constants)
+
+    logs = priors.medians[0] + priors.wide * _REACH
+    of_mean = width + np.exp(2 * logs) / count
+    weight = -(_REACH**2) / 2 + (1 - count) * logs - square * np.exp(-2 * logs) / 2
+    weight = weight - np.log(of_mean) / 2 - (middle - centre) ** 2 / (2 * of_mean)
+    below = np.cumsum(np.exp(weight - weight.max(axis=-1, keepdims=True)), axis=-1)
+    at = below[..., -1:] * random.uniform(size=(*middle.shape[:2], repeats))
+    place = np.minimum((at[..., None, :] > below[..., None]).sum(axis=-2), len(_REACH) - 1)
+    within = (logs[1] - logs[0]) * random.uniform(-0.5, 0.5, size=place.shape)
+    spread = np.exp(logs[place] + within)
+
+    known = width / (width + spread**2 / count)
+    mean = centre + known * (middle - centre)
+    mean = mean + np.sqrt(known / count) * spread * random.normal(size=spread.shape)
+    made = {"mean": mean, "spread": spread}
+    flat = {name: np.moveaxis(each, 2, 1).reshape(-1, 3) for name, each in made.items()}
+    return {name: np.repeat(draws[name], repeats, axis=0) for name in _DRAWN} | flat
+
+
 def new_curves(
     curve: PosedCurve,
     draws: Draws,
     random: np.random.Generator,
     *,
     sample: int | None = None,
-    repeats: int = REPEATS,
+    repeats: int = 1,
 ) -> Floats:
     """Draws curves of a new sample, or of a known one, as they would be read.
 

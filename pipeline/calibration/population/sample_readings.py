@@ -61,8 +61,8 @@ def read_curve(asked: SampleTest, folder: Path) -> SampleCurve:
             file=folder / asked.file,
             key=asked.columns.force,
             value=f"{force[line]:g} N at {displacement[line]:g} mm",
-            remedy="count displacement and force positive in the test's direction, and cut the"
-            " file where the test ends",
+            remedy="count displacement and force positive in the test's direction (record: reversed"
+            " turns them), and cut the file where the test ends",
         )
     return curve
 

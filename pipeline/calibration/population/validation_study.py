@@ -35,6 +35,7 @@ from pipeline.calibration.population.prediction import (
     medians,
     new_curves,
     pose_curve,
+    redraw_population,
     student_band,
 )
 from pipeline.calibration.population.sample_readings import (
@@ -50,6 +51,8 @@ from sim.core import Floats, Numbers
 POINTS = 18
 """Of the prediction, evenly spaced."""
 QUANTILES = (0.025, 0.5, 0.975)
+_REPEATS = 8
+"""Curves of a known sample for every draw from the posterior."""
 
 
 class FittedPopulation(NamedTuple):
@@ -91,15 +94,14 @@ def validate_population(asked: Population, folder: Path) -> xr.Dataset:
     at = np.linspace(float(measured.displacement.min()), end, POINTS)
     kinds = list(emulators)
     curve = pose_curve(predicted, at, kinds.index(asked.predict.test))
-    middle = medians(posteriors[""])
-    bands = {
-        "": find_band(new_curves(curve, posteriors[""], random)),
-        "doubled": find_band(new_curves(curve, posteriors["doubled"], random)),
-        "student": student_band(curve, middle["constants"]),
-    }
+    middle, centre = medians(posteriors[""]), begin.logs(ELASTIC_NAMES)
+    bands: dict[str, PredictionBand] = {"student": student_band(curve, middle["constants"])}
+    for name, given in (("", asked.priors), ("doubled", asked.priors.doubled)):
+        drawn = redraw_population(posteriors[name], prior_numbers(given, centre), random)
+        bands[name] = find_band(new_curves(curve, drawn, random))
     truth = np.log(np.interp(at, measured.displacement, measured.force))
     ranked = _ranked(found, begin, curve, truth - bands[""].median)
-    priors = prior_numbers(asked.priors, begin.logs(ELASTIC_NAMES))
+    priors = prior_numbers(asked.priors, centre)
     covered = try_band(readings, priors, curve, middle, asked.sampling)
     variables = {
         **_constants(found),
@@ -322,7 +324,8 @@ def _predicted(
     thin = single.thinned(float(emulator.displacement[-1]), found.asked.points)
     curve = pose_curve(emulator, thin.displacement, kind)
     sample = found.asked.samples.index(single.samples[0])
-    band = find_band(new_curves(curve, found.posteriors[without], random, sample=sample))
+    drawn = new_curves(curve, found.posteriors[without], random, sample=sample, repeats=_REPEATS)
+    band = find_band(drawn)
     truth = np.log(thin.force)
     deviation = float((truth - band.median).mean())
     return _LeftOutCurve(without, single.name, bool(band.holds(truth)), band.half_width, deviation)

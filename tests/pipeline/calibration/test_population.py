@@ -132,6 +132,28 @@ def test_a_known_sample_is_predicted_better_than_a_new_one(emulator: CurveEmulat
     assert (new.std(axis=0) > 3 * known.std(axis=0)).all()
 
 
+def test_mean_and_spread_are_drawn_from_their_law() -> None:
+    """Against Student's law, to which it comes where the priors tell next to nothing."""
+    random = np.random.default_rng(0)
+    constants = np.array([[-0.1, 0.0, 0.1, 0.0]]).T + np.array([4.0, 0.0, 1.0])
+    draws = {name: np.zeros((1, 1)) for name in ("discrepancy", "mounting", "reading")}
+    draws |= {name: np.zeros((1, 3)) for name in ("mean", "spread")} | {
+        "constants": constants[None]
+    }
+    centre, flat = np.array([4.1, 0.1, 0.9]), np.log(1e4)
+    priors = hierarchical_model.PriorNumbers(centre, flat, np.log([0.1] * 4), flat)
+    found = prediction.redraw_population(draws, priors, random, 40_000)
+    new = found["mean"] + found["spread"] * random.normal(size=found["mean"].shape)
+    scale = np.sqrt(0.02 / 3) * np.sqrt(5 / 4)
+    expected = constants.mean(axis=0) + scale * student.ppf([[0.1], [0.5], [0.9]], 3)
+    np.testing.assert_allclose(np.quantile(new, [0.1, 0.5, 0.9], axis=0), expected, atol=0.006)
+
+    sure = priors._replace(constants=1e-3, wide=1e-3)
+    found = prediction.redraw_population(draws, sure, random, 100)
+    np.testing.assert_allclose(found["mean"], np.tile(centre, (100, 1)), atol=5e-3)
+    np.testing.assert_allclose(found["spread"], 0.1, rtol=6e-3)
+
+
 def test_what_is_missing_is_found(asked: Population, centre: Constants) -> None:
     path = missing_physics.follow_test(asked.lattice, "shear", centre, 3.75)
     late = next(each for each in missing_physics.MECHANISMS if "late" in each.name)
