@@ -36,8 +36,10 @@ def _samples(args: argparse.Namespace) -> None:
     asked, folder = load_section(args.file, Population), args.file.parent
     made = validate_population(asked, folder)
     parents = {each.name: folder / each.file for each in (*asked.data, asked.predict)}
+    tracks = [path for path in parents.values() if path.suffix == ".nc"]
+    synthetic = any(datasets.read(path, "track").attrs["synthetic"] == "yes" for path in tracks)
     origin = provenance.of_recording(
-        asked.model_dump_json(), parents, synthetic=False, role="population"
+        asked.model_dump_json(), parents, synthetic=synthetic, role="population"
     )
     datasets.write(made, args.out, "population", origin)
     LOG.info(
@@ -50,7 +52,7 @@ def _constants(args: argparse.Namespace) -> None:
     asked = load_section(args.file, Population)
     drawn = draw_constants(asked, args.file.parent, args.count)
     source = asked.source
-    lines = [  # no semicolon, which would be the separator
+    lines = [
         f"# Constants of new samples, drawn from what {args.file.name} finds of those measured",
         f"# Measured by {source.by}. {source.reference}",
         f"# Licence: {source.licence}. Made by python -m pipeline validate constants",

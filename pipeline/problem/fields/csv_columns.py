@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _LARGEST = 512 << 20
 _UNIT = re.compile(r"[\[(][^\])]+[\])]")
+_NUMBERS = re.compile(r"[\s\";]*[-+.]?\d")
 _HEADING = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\])]+)[\])]")
 
 
@@ -54,13 +55,20 @@ def read_cells(path: Path) -> CsvCells:
         raise UserError("no such file", file=path, remedy="check the path") from error
     except OSError as error:
         raise refusal(path, error) from error
-    separator = next((sign for sign in ";\t" if any(sign in line for line in lines)), ",")
+    separator = _separator(lines)
     rows = csv.reader(lines, delimiter=separator)
     try:
         return CsvCells([[cell.strip() for cell in row] for row in rows], separator)
     except csv.Error as error:
         remedy = "give plain columns of numbers"
         raise UserError(f"not a readable CSV: {error}", file=path, remedy=remedy) from error
+
+
+def _separator(lines: list[str]) -> str:
+    """Finds the sign that parts most of the lines of numbers; those above may hold any in words."""
+    numbers = [line for line in lines if _NUMBERS.match(line)] or lines
+    parted = (sign for sign in ";\t" if 2 * sum(sign in line for line in numbers) > len(numbers))
+    return next(parted, ",")
 
 
 def read_columns(path: Path, names: Iterable[str]) -> Floats:

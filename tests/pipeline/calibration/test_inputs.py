@@ -39,6 +39,15 @@ def test_units_of_columns_are_minded(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[0], [20.0, 1000.0])
 
 
+@pytest.mark.parametrize("comment", ["# Zwick; compression\tof s1", "Operator; Meier\ttoday"])
+def test_a_separator_in_a_comment_is_none(comment: str, tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    path.write_text(f"{comment}\ndisplacement (mm),force (N)\n{ROWS}\n")
+    np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED)[-1], [7.0, 14.0])
+    path.write_text(f"{comment}, again\ndisplacement (mm);force (N)\n1,5;-2,5e1\n\n2;3\n")
+    np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED), [[1.5, -25.0], [2, 3]])
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
