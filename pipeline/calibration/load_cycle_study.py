@@ -23,12 +23,14 @@ class CyclePath(NamedTuple):
     Attributes:
         approach: (n,) of the clamps, mm, there and back.
         tension: (n,) N: the slope of the energy over the approach, negative in compression.
+        energy: (n,) stored, N mm.
         turn: number of the farthest equilibrium.
         jumps: number of times that the structure jumped.
     """
 
     approach: Floats
     tension: Floats
+    energy: Floats
     turn: int
     jumps: int
 
@@ -71,11 +73,14 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     steps = np.arange(len(motion), dtype=float)
     drive = PrescribedMotion(units_held[1], TimeSeries(steps, motion))
     state, _, found = solve_case(StaticSolver(fixed, steps[1:]), values, drive)
-    force = observe(fixed, values, state.reshape(len(state), -1, 3)).force_on(units_held[1])
+    seen = observe(fixed, values, state.reshape(len(state), -1, 3))
+    force = seen.force_on(units_held[1])
     direction = np.gradient(path[:, :2], path[:, 2], axis=0, edge_order=2)
     along = np.concatenate([direction[1:], direction[-2::-1]])
     tension = -(force * along).sum(axis=1)
-    return CyclePath(there_and_back[:, 2], tension, len(path) - 2, int(found.jumped.sum()))
+    energy = seen.strain_energy + seen.contact_energy
+    jumps = int(found.jumped.sum())
+    return CyclePath(there_and_back[:, 2], tension, energy, len(path) - 2, jumps)
 
 
 class MeasuredCycle(NamedTuple):

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from pipeline import datasets
 from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
 from pipeline.calibration.experiments.load_cycles import prepare_record
 from pipeline.calibration.experiments.simulated_experiment import (
@@ -42,8 +43,10 @@ TOLERANCE = 1e-12
 
 
 class ForceFile(Protocol):
-    """Tells a file of forces: its columns, and how a record is cut."""
+    """Tells a file of forces: its test and columns, and how a record is cut."""
 
+    @property
+    def test(self) -> TestKind: ...  # noqa: D102
     @property
     def file(self) -> str | None: ...  # noqa: D102
     @property
@@ -60,18 +63,39 @@ def read(asked: ForceFile, folder: Path) -> tuple[Floats, Floats]:
     """
     assert asked.file is not None
     path = folder / asked.file
-    wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
-    displacement, force = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
-    if not (np.abs(displacement) > 0).any():
-        remedy = "give a test in which the top row moves"
-        raise UserError("the displacement is zero throughout", file=path, remedy=remedy)
-    if asked.record is None:
-        return displacement, force
-    try:
-        return prepare_record(displacement, force, asked.record)
-    except ValueError as error:
-        remedy = "look at the curve, and change branch, drop_first or toe"
-        raise UserError(str(error), file=path, key="record", remedy=remedy) from error
+    if path.suffix == ".nc":
+        displacement, force = _read_track(path, asked.test)
+    else:
+        wanted = {asked.columns.displacement: units.LENGTH, asked.columns.force: units.FORCE}
+        displacement, force = csv_columns.read_quantities(path, wanted, LEAST_LINES).T
+    if asked.record is not None:
+        try:
+            displacement, force = prepare_record(displacement, force, asked.record)
+        except ValueError as error:
+            remedy = "look at the curve, and change branch, drop_first or toe"
+            raise UserError(str(error), file=path, key="record", remedy=remedy) from error
+    if not (displacement > 0).any() and (asked.test != "shear" or not displacement.any()):
+        raise UserError(
+            "the displacement is nowhere above zero",
+            file=path,
+            key=asked.columns.displacement,
+            value=f"down to {displacement.min():g} mm",
+            remedy=f"count it positive in {asked.test}, or write record: {{reversed: both}}",
+        )
+    return displacement, force
+
+
+def _read_track(path: Path, test: TestKind) -> tuple[Floats, Floats]:
+    """Reads how far the top row of a filmed specimen went from the bottom row, and the force."""
+    track = datasets.read(path, "track")
+    if not np.isfinite(track["load_force"]).any():
+        remedy = "give load_cell in the recording's YAML, and track it again"
+        raise UserError("the track has no forces", file=path, key="load_force", remedy=remedy)
+    rows = [track["displacement"].where(track["j"] == end) for end in (track["j"].max(), 0)]
+    top, bottom = (each.mean("unit").sel(dof=["ux", "uy"]) for each in rows)
+    way = (top - bottom).transpose("time", "dof").values @ DIRECTIONS[test]
+    seen = np.isfinite(way) & np.isfinite(track["load_force"].values)
+    return way[seen], track["load_force"].values[seen]
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,9 @@ def prepare_record(
     Raises:
         ValueError: nothing is left.
     """
-    branches = split_branches(displacement, force)
+    turned = options.reversed
+    way = -displacement if turned in ("displacement", "both") else displacement
+    branches = split_branches(way, -force if turned in ("force", "both") else force)
     if options.drop_first:
         branches = branches[2:]
     branches = [

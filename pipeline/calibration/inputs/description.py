@@ -49,6 +49,7 @@ class RecordOptions(Section):
 
     Attributes:
         branch: of each cycle that is taken.
+        reversed: what the machine counts the other way than the test's direction.
         drop_first: leaves out the first cycle.
         zero: of displacement and force: as they are, or where each branch starts.
         toe: force by which the slack is taken up; the displacement then counts from where the line
@@ -56,6 +57,7 @@ class RecordOptions(Section):
     """
 
     branch: Literal["all", "loading", "unloading"] = "loading"
+    reversed: Literal["displacement", "force", "both"] | None = None
     drop_first: bool = False
     zero: Literal["file", "start"] = "file"
     toe: Force | None = None
@@ -66,7 +68,8 @@ class ForceDisplacement(Section):
 
     Attributes:
         name: of the set.
-        file: a CSV with a heading, as seen from this file.
+        file: a CSV with a heading, as seen from this file; or a track (.nc) with a load cell, of
+            which the top row's way from the bottom row is taken.
         virtual: how it is computed, in place of a file.
         lattice: the specimen.
         test: where the top row moves to; displacement and force count positive that way.

@@ -41,8 +41,8 @@ class SampleTest(Section):
     Attributes:
         test: where the top row moves to; displacement and force count positive that way.
         samples: that the curve is of; of several it is the mean, each counting alike.
-        file: a CSV with a heading, as seen from this file.
-        columns: of the file.
+        file: a CSV with a heading, as seen from this file; or a track (.nc) with a load cell.
+        columns: of the CSV.
         record: where the file is a machine's record: how it is cut.
     """
 

@@ -45,7 +45,8 @@ def test_a_separator_in_a_comment_is_none(comment: str, tmp_path: Path) -> None:
     path.write_text(f"{comment}\ndisplacement (mm),force (N)\n{ROWS}\n")
     np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED)[-1], [7.0, 14.0])
     path.write_text(f"{comment}, again\ndisplacement (mm);force (N)\n1,5;-2,5e1\n\n2;3\n")
-    np.testing.assert_allclose(csv_columns.read_quantities(path, WANTED), [[1.5, -25.0], [2, 3]])
+    found = csv_columns.read_quantities(path, WANTED)
+    np.testing.assert_allclose(found, np.array([[1.5, -25.0], [2.0, 3.0]]))
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,7 @@ def test_mean_and_spread_are_drawn_from_their_law() -> None:
     expected = constants.mean(axis=0) + scale * student.ppf([[0.1], [0.5], [0.9]], 3)
     np.testing.assert_allclose(np.quantile(new, [0.1, 0.5, 0.9], axis=0), expected, atol=0.006)
 
-    sure = priors._replace(constants=1e-3, wide=1e-3)
+    sure = priors._replace(constants=np.array(1e-3), wide=np.array(1e-3))
     found = prediction.redraw_population(draws, sure, random, 100)
     np.testing.assert_allclose(found["mean"], np.tile(centre, (100, 1)), atol=5e-3)
     np.testing.assert_allclose(found["spread"], 0.1, rtol=6e-3)
