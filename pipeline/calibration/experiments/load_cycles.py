@@ -150,11 +150,18 @@ def _from_start(branch: LoadBranch, options: RecordOptions) -> tuple[Floats, Flo
     if options.toe is None:
         return way, load
     # the straight line between the toe's force and twice as much meets the axis at the start
-    felt = np.flatnonzero(load >= options.toe)
-    twice = np.flatnonzero(load >= 2 * options.toe)
-    if not len(twice) or felt[0] == twice[0]:
-        raise ValueError("the force does not rise to twice the toe's")
-    first, second = felt[0], twice[0]
-    rise = (load[second] - load[first]) / (way[second] - way[first])
-    start = way[first] - load[first] / rise
-    return (way - start)[first:], load[first:]
+    start = 2 * _reaches(way, load, options.toe) - _reaches(way, load, 2 * options.toe)
+    felt = int(np.argmax(load >= options.toe))
+    return (way - start)[felt:], load[felt:]
+
+
+def _reaches(way: Floats, load: Floats, level: float) -> float:
+    """Interpolates where a branch reaches a force first."""
+    above = load >= level
+    k = int(np.argmax(above))
+    if not above.any():
+        raise ValueError(f"the force does not rise to {level:g} N")
+    if k == 0:
+        raise ValueError(f"the force begins above {level:g} N")
+    part = (level - load[k - 1]) / (load[k] - load[k - 1])
+    return float(way[k - 1] + part * (way[k] - way[k - 1]))

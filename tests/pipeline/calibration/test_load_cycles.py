@@ -49,10 +49,20 @@ def test_a_record_is_cut_as_wanted(branch: str, stiffness: float) -> None:
     np.testing.assert_allclose(force[inner], stiffness * way[inner], rtol=1e-9)
 
 
-def test_slack_is_taken_up_by_the_toe() -> None:
-    options = RecordOptions.model_validate({"drop_first": True, "toe": "0.6 N"})
+@pytest.mark.parametrize("toe", ["0.6 N", "0.07 N"])  # of which twice is between the same lines
+def test_slack_is_taken_up_by_the_toe(toe: str) -> None:
+    options = RecordOptions.model_validate({"drop_first": True, "toe": toe})
     way, force = load_cycles.prepare_record(*cycles(slack=0.3), options)
     np.testing.assert_allclose(force, 3.0 * way, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("toe", "told"), [("4 N", "does not rise to 8"), ("0.2 N", "begins above")]
+)
+def test_a_toe_that_a_branch_does_not_show_is_refused(toe: str, told: str) -> None:
+    options = RecordOptions.model_validate({"toe": toe})
+    with pytest.raises(ValueError, match=told):
+        load_cycles.prepare_record(cycles()[0], cycles()[1] + 0.3, options)
 
 
 @pytest.mark.parametrize(("reversed_", "signs"), [("both", (-1, -1)), ("force", (1, -1))])
