@@ -8,15 +8,36 @@ _REMEDIES = {
     "out_of_frame": "leave room about the specimen for its motion",
     "hidden": "keep hands, cables and loading pins out of the view",
     "glare": "use diffuse light from the side, or polarising filters",
-    "poor_fit": "check the focus, the marks and the design",
     "strayed": "check the design: units may be exchanged",
 }
+_BLURRED = 1.6
+"""Blur of edges, px, from which a lens or the camera's processing is to blame."""
+_QUICK = 2.0
+"""Way of a unit from frame to frame, px, that may blur it beyond recognition."""
+_FAINT = 0.3
+"""Contrast, part of the range of brightness, below which noise hides edges."""
 
 
 def advice(found: TrackQuality) -> list[str]:
     """Lists all findings, what is lost and when first; praise if there is none."""
     told = [words for wrong, words in _findings(found) if wrong]
     return told or ["Nothing to improve: light, sharpness, codec and timing are as they should be."]
+
+
+def _remedy(reason: str, found: TrackQuality) -> str:
+    """Tells what to change where units were lost; a poor fit has the cause that was measured."""
+    if reason != "poor_fit":
+        return _REMEDIES[reason]
+    if found.fastest >= _QUICK:
+        return f"expose more briefly, since units move by up to {found.fastest:.1f} px a frame"
+    if found.blur >= _BLURRED:
+        return f"focus, since edges are blurred by {found.blur:.1f} px"
+    if found.light.bright - found.light.dark <= _FAINT:
+        return "more light"
+    return (
+        "light, sharpness and pace are as they should be, so compare the design, the marks and"
+        " what stands before the units with the overlay"
+    )
 
 
 def _findings(found: TrackQuality) -> list[tuple[bool, str]]:
@@ -28,7 +49,7 @@ def _findings(found: TrackQuality) -> list[tuple[bool, str]]:
         (
             share.sum() >= 0.001,
             f"{100 * share.sum():.2g} % of the units were lost, most often for the reason"
-            f" “{reason.replace('_', ' ')}”: {_REMEDIES[reason]}.",
+            f" “{reason.replace('_', ' ')}”: {_remedy(reason, found)}.",
         ),
         (
             bool(found.duplicates or found.dropped),
@@ -41,7 +62,7 @@ def _findings(found: TrackQuality) -> list[tuple[bool, str]]:
             " constant frame rate. The file's own times were used.",
         ),
         (
-            light.bright <= 0.5 or contrast <= 0.3,
+            light.bright <= 0.5 or contrast <= _FAINT,
             f"The picture uses {100 * contrast:.0f} % of the range of brightness: more light, or a"
             " wider aperture.",
         ),
@@ -50,8 +71,10 @@ def _findings(found: TrackQuality) -> list[tuple[bool, str]]:
             f"{100 * light.clipped:.0f} % of the pixels are overexposed: a shorter exposure.",
         ),
         (
-            found.blur >= 1.6,
-            f"Edges are blurred by {found.blur:.1f} px: focus on the faces of the units.",
+            found.blur >= _BLURRED,
+            f"Edges are blurred by {found.blur:.1f} px, 0.7 px being sharp: focus on the faces of"
+            " the units; where they are in focus, the camera smooths or enlarges the picture, so"
+            " switch digital zoom, stabilisation and noise reduction off.",
         ),
         (
             light.flicker >= 0.03,

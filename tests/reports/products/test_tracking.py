@@ -118,6 +118,26 @@ def test_lost_units_and_repeated_frames_come_first(track: xr.Dataset) -> None:
     assert "1 repeated" in second
 
 
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, "compare the design"),
+        ({"fastest": 6.0}, "expose more briefly, since units move by up to 6.0 px"),
+        ({"blur": 2.0}, "focus, since edges are blurred by 2.0 px"),
+        ({"light": ExposureStatistics(0.6, 0.4, 0.0, 0.0)}, "more light"),
+    ],
+)
+def test_a_poor_fit_has_the_cause_that_was_measured(
+    track: xr.Dataset, change: dict[str, Any], told: str
+) -> None:
+    found = of(track)._replace(fastest=0.1)
+    lost = np.where(np.array(found.reasons) == "poor_fit", 0.02, 0.0) * np.ones((FRAMES, 1))
+    first, *_ = advice.advice(found._replace(lost=lost, **change))
+    assert "poor fit" in first
+    assert told in first
+    assert ("focus" in first) == ("blur" in change)
+
+
 def test_units_are_coloured_and_lost_ones_hatched(track: xr.Dataset) -> None:
     frames = [Frame(k, k / 10, grey()) for k in range(FRAMES)]
     drawn = list(overlay.images(overlay.painter(track, "displacement"), frames))
