@@ -35,6 +35,8 @@ class Reader:
         shutil.rmtree(root / "experiments/logo", ignore_errors=True)
         (root / "docs").mkdir()
         shutil.copy(ROOT / "docs/example_sim.py", root / "docs")
+        (root / "films").mkdir()
+        shutil.copy(ROOT / "tests/data/tracking/f_silhouette.mp4", root / "films/phone.mp4")
         return cls(checkout, draft)
 
     def told(self, page: str) -> str:

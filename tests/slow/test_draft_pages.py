@@ -30,8 +30,10 @@ def test_the_tutorial(reader: Reader) -> None:
 
 def test_a_video_of_ones_own(reader: Reader) -> None:
     told = reader.told("docs/video.md")
-    for name in ("run1.nc", "run1.csv", "run1_report/index.html", "proposed/run1_units.png"):
+    made = (".nc", ".csv", "_report/index.html")
+    for name in (f"{video}{each}" for video in ("phone", "run1") for each in made):
         assert (reader.checkout.root / "films" / name).is_file()
+    assert (reader.checkout.root / "films/proposed/phone_units.png").is_file()
     seen = re.search(r"seen less simulated, mm: ([\d.]+)", told)
     assert seen is not None
     assert float(seen[1]) < 0.05
