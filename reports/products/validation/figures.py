@@ -12,7 +12,7 @@ SYMBOLS = (r"$k_\ell$", r"$k_s$", r"$k_\theta$")
 COLOURS = (style.ALTERED, "#1d7f78", style.CLOAKED, "#2f86b4", "#a33c00", "#5b6067")
 _MOST = 8.0
 """Of the likelihood lost that is shown."""
-_LIMIT = 3.84
+LIMIT = 3.84
 """Of the same, at the ends of a 95 % interval."""
 
 
@@ -61,9 +61,10 @@ def _prediction(axes: Axes, made: xr.Dataset) -> None:
         label = "Student’s interval" if end == "student_low" else None
         axes.plot(x, made[end], ":", color=style.GREY, linewidth=0.8, label=label)
     axes.plot(x, made["median"], color=style.CLOAKED, label="median")
-    axes.plot(x, made["simulated"], "--", color=style.ALTERED, label="simulated by the authors")
+    if np.isfinite(made["simulated"]).any():
+        axes.plot(x, made["simulated"], "--", color=style.ALTERED, label="simulated by the authors")
     axes.plot(x, made["measured"], "o", color=style.INTACT, markersize=2.2, label="measured")
-    most = 1.45 * float(made["high"].max())  # room for the legend
+    most = 1.45 * float(max(made["high"].max(), made["measured"].max()))  # room for the legend
     axes.set(xlabel="displacement, mm", ylabel="force, N", xlim=(0, None), ylim=(0, most))
     axes.legend(loc="upper left", ncols=2)
 
@@ -87,7 +88,7 @@ def _profile(axes: Axes, made: xr.Dataset) -> None:
         lost = np.maximum(made["profile"].values[k], 0.0)
         shown = np.interp(np.log(fine), np.log(factor), lost)
         axes.plot(fine, shown, color=COLOURS[k], label=symbol)
-    axes.axhline(_LIMIT, color=style.GREY, linewidth=0.5)
+    axes.axhline(LIMIT, color=style.GREY, linewidth=0.5)
     axes.set(xlabel="factor on the median", ylabel="−2 ln L lost", xscale="log", ylim=(0, _MOST))
     axes.set_xticks([0.5, 1, 2, 4], ["0.5", "1", "2", "4"])
     axes.minorticks_off()

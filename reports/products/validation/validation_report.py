@@ -2,75 +2,108 @@
 
 import argparse
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
+from scipy.stats import t as student
 
 from pipeline import datasets
 from pipeline.calibration.inputs import UNITS, KnownPictures
+from pipeline.datasets.tables import Kind
 from pipeline.problem.fields import SIM_UNITS
+from pipeline.runtime import UserError
 from reports.base import Table
 from reports.page import PageTable, Report, publish
 from reports.products.validation import pictures
-from reports.products.validation.figures import draw_cycles, draw_samples
+from reports.products.validation.figures import LIMIT, draw_cycles, draw_samples
 from sim.core import Floats
 
 
 def report(args: argparse.Namespace) -> None:
-    """Makes the report that a command line asks for."""
-    samples = datasets.read(args.samples, "population")
-    cycles = datasets.read(args.cycles, "load_cycles")
-    seen = datasets.read(args.pictures, "pictures")
-    asked = json.loads(samples.attrs["population"])
-    shown = KnownPictures.model_validate_json(seen.attrs["pictures"], context=SIM_UNITS)
-    figures = {
-        "prediction": lambda: draw_samples(samples),
-        "cycles": lambda: draw_cycles(cycles),
-        "pictures": lambda: pictures.draw_pictures(seen, shown, args.folder),
+    """Makes the report that a command line asks for, of the parts that it names.
+
+    Raises:
+        UserError: it names none, or pictures without their folder.
+    """
+    given: dict[Kind, Path | None] = {
+        "population": args.samples,
+        "load_cycles": args.cycles,
+        "pictures": args.pictures,
     }
-    values = {
-        "sources": [
-            asked["source"],
-            json.loads(cycles.attrs["load_cycles"])["source"],
-            shown.rigid_parts.source.model_dump(),
-            shown.specimen.source.model_dump(),
-        ],
-        "pictures": pictures.picture_facts(seen, shown),
-        "headline": list(_headline(samples)),
+    made = {kind: datasets.read(path, kind) for kind, path in given.items() if path is not None}
+    if not made:
+        raise UserError("nothing to show", remedy="give --samples, --cycles or --pictures")
+    asked = {kind: json.loads(each.attrs[kind]) for kind, each in made.items()}
+    figures: dict[str, Callable[[], Figure]] = {}
+    values: dict[str, Any] = dict.fromkeys(("shown", "cycles", "pictures")) | {"headline": []}
+    tables: list[Table] = []
+    if (samples := made.get("population")) is not None:
+        figures["prediction"] = lambda: draw_samples(samples)
+        values |= _of_samples(samples, asked["population"])
+        tables = _tables(samples)
+    if (cycles := made.get("load_cycles")) is not None:
+        figures["cycles"] = lambda: draw_cycles(cycles)
+        simulated = bool(np.isfinite(cycles["misfit"]).any())
+        values |= {"cycles": _cycles(cycles), "simulated_cycles": simulated}
+        values["cycles_doc"] = asked["load_cycles"]["doc"]
+    values["sources"] = [each["source"] for each in asked.values() if "source" in each]
+    if (seen := made.get("pictures")) is not None:
+        if args.folder is None:
+            raise UserError("the pictures are wanted", remedy="give --folder, where their YAML is")
+        shown = KnownPictures.model_validate_json(seen.attrs["pictures"], context=SIM_UNITS)
+        figures["pictures"] = lambda: pictures.draw_pictures(seen, shown, args.folder)
+        values |= {"pictures": pictures.picture_facts(seen, shown)}
+        values["tracked"] = pictures.error_table(seen)
+        values["sources"] += [asked["pictures"][k]["source"] for k in ("rigid_parts", "specimen")]
+    values["synthetic"] = any(each.attrs["synthetic"] == "yes" for each in made.values())
+    files = [path.name for path in given.values() if path is not None]
+    values["files"] = files
+    values["provenance"] = sorted(
+        (f"{name}: {key}", str(value))
+        for name, each in zip(files, made.values(), strict=True)
+        for key, value in each.attrs.items()
+        if key not in given
+    )
+    publish(Report(figures, "validation.html.j2", values, tables), args.out_dir)
+
+
+def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Tells the fit of a population, and its prediction."""
+    count = made.sizes["sample"]
+    quantile = student.ppf(0.975, count - 1) * np.sqrt(1 + 1 / count)
+    return {
+        "headline": list(_headline(made)),
         "shown": {
-            "errors": _errors(samples),
-            "constants": _constants(samples),
-            "scales": _scales(samples),
-            "left_out": _left_out(samples),
-            "mechanisms": _mechanisms(samples),
-            "cycles": _cycles(cycles),
-            "pictures": pictures.error_table(seen),
+            "errors": _errors(made),
+            "constants": _constants(made),
+            "scales": _scales(made),
+            "left_out": _left_out(made),
+            "mechanisms": _mechanisms(made),
         },
+        "count": count,
+        "student": f"{quantile:.2f}",
         "priors": asked["priors"],
-        "signed": _signed(samples),
-        "held": list(_held(samples)),
-        "inside": bool(samples["inside"].item()),
+        "signed": _signed(made),
+        "held": list(_held(made)),
+        "flat": list(_flat(made)),
+        "inside": bool(made["inside"].item()),
         "correlation": [
-            f"{value:+.2f}" for value in samples["correlation"].values[np.triu_indices(3, 1)]
+            f"{value:+.2f}" for value in made["correlation"].values[np.triu_indices(3, 1)]
         ],
-        "emulator": f"{100 * samples['emulator_error'].values.max():.2g} %",
-        "emulator_predicted": f"{100 * samples['emulator_error_predicted'].item():.2g} %",
-        "r_hat": f"{samples['r_hat'].item():.3f}",
-        "diverging": f"{100 * samples['diverging'].item():.2g} %",
-        "provenance": sorted(
-            (f"{name}: {key}", str(value))
-            for name, made in (
-                ("hinges.nc", samples),
-                ("morpher.nc", cycles),
-                ("pictures.nc", seen),
-            )
-            for key, value in made.attrs.items()
-            if key not in ("population", "load_cycles", "pictures")
-        ),
+        "emulator": f"{100 * made['emulator_error'].values.max():.2g} %",
+        "emulator_predicted": f"{100 * made['emulator_error_predicted'].item():.2g} %",
+        "r_hat": f"{made['r_hat'].item():.3f}",
+        "diverging": f"{100 * made['diverging'].item():.2g} %",
     }
-    publish(Report(figures, "validation.html.j2", values, _tables(samples)), args.out_dir)
+
+
+def is_simulated(made: xr.Dataset) -> bool:
+    """Tells whether a curve that others simulated is beside the prediction."""
+    return bool(np.isfinite(made["simulated"]).any())
 
 
 def relative_error(made: xr.Dataset, name: str) -> Floats:
@@ -83,9 +116,10 @@ def _headline(made: xr.Dataset) -> Iterator[Mapping[str, str]]:
     inside = "inside" if made["inside"].item() else "outside"
     width = made["high"].values / made["median"].values - 1
     covered = made["covered"].values
-    yield {"value": inside, "what": "the measured curve lies in the band of a new sample, 95 %"}
+    yield {"value": inside, "what": "the band of a new sample, 95 %, lies the measured curve"}
     yield {"value": _rms(made, "median"), "what": "error of the median, rms of the largest force"}
-    yield {"value": _rms(made, "simulated"), "what": "error of the authors’ simulation"}
+    if is_simulated(made):
+        yield {"value": _rms(made, "simulated"), "what": "error of the authors’ simulation"}
     yield {
         "value": f"+{100 * width.mean():.0f} %",
         "what": "upper end of the band, over the median",
@@ -118,8 +152,8 @@ def _errors(made: xr.Dataset) -> PageTable:
     for name, what in (
         ("median", "this fit, of the small specimens alone (median)"),
         ("doubled_median", "the same with priors twice as wide"),
-        ("simulated", "the authors: 120 N/mm, 1.19 N/mm, 1.50 N mm/rad"),
-    ):
+        ("simulated", "the authors’ simulation"),
+    )[: 3 if is_simulated(made) else 2]:
         error = relative_error(made, name)
         at = [np.interp(x, made["displacement"], 100 * error) for x in (0.5, 1, 2, 3, 4)]
         band = {"median": ("low", "high"), "doubled_median": ("doubled_low", "doubled_high")}
@@ -193,6 +227,14 @@ def _held(made: xr.Dataset) -> Iterator[str]:
         yield f"without {left} {inside} of {mine.sum()} inside, {side} the median"
 
 
+def _flat(made: xr.Dataset) -> Iterator[str]:
+    """Names the constants that may be half or twice as large as far as the readings tell."""
+    factor = np.log(made["factor"].values)
+    for name, lost in zip(made["constant"].values.tolist(), made["profile"].values, strict=True):
+        if min(np.interp(np.log([0.5, 2.0]), factor, lost)) < LIMIT:
+            yield name.replace("_", " ")
+
+
 def _mechanisms(made: xr.Dataset) -> PageTable:
     columns = ("mechanism", "size", "explained", "explained_alone", "wanted", "change")
     rows = [
@@ -233,11 +275,13 @@ def _cycles(made: xr.Dataset) -> PageTable:
             )
             if record == k
         ]
-        misfit = made["misfit"].values[k]
-        told = "not simulated" if np.isnan(misfit) else f"{misfit:.2f} N"
+        misfit, jumps = made["misfit"].values[k], made["jumps"].values[k]
+        told = "not simulated" if np.isnan(misfit) else f"{misfit:.2f} N, {jumps:.0f} jumps"
         loops = f"{areas[0]:.1f} first, {areas[1:].mean():.1f} later"
         rows.append([title, "; ".join(snaps) or "none", loops, told])
-    return PageTable(["Test", "Snaps", "Loop areas, N mm", "Misfit of equilibria, rms"], rows)
+    return PageTable(
+        ["Test", "Snaps", "Loop areas, N mm", "Misfit of equilibria, rms; their jumps"], rows
+    )
 
 
 def _tables(made: xr.Dataset) -> list[Table]:

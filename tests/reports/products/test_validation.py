@@ -66,6 +66,9 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     words += ["--pictures", folder / "pictures.nc", "--folder", FOLDER]
     assert main(["validation", *map(str, words), "--out-dir", str(folder), "--quiet"]) == 0
     assert (Path(folder) / "prediction.pdf").stat().st_size > 10_000
+    alone = [*words[:2], "--out-dir", folder / "alone", "--quiet"]
+    assert main(["validation", *map(str, alone)]) == 0
+    assert "Load cycles" not in (folder / "alone/index.html").read_text()
     return (folder / "index.html").read_text()
 
 
@@ -74,6 +77,12 @@ def test_it_says_who_measured_and_nothing_is_called_synthetic(page: str) -> None
     assert page.count("Licence: MIT") == 3
     assert page.count("Licence: BSD 3-clause") == 1
     assert "SYNTHETIC" not in page
+
+
+def test_a_page_of_nothing_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validation", "--out-dir", str(tmp_path / "page")]) != 0
+    assert "give --samples, --cycles or --pictures" in capsys.readouterr().err
+    assert not (tmp_path / "page").exists()
 
 
 def test_it_tells_the_errors_and_their_sign(page: str) -> None:
