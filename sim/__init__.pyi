@@ -37,8 +37,10 @@ from .structure import Lattice as Lattice
 from .structure import Material as Material
 from .structure import VoidAngleContact as VoidAngleContact
 from .structure import damping_of_ratio as damping_of_ratio
+from .structure import honeycomb as honeycomb
 from .structure import kagome as kagome
 from .structure import quads as quads
+from .structure import triangular as triangular
 from .vibration import UnitCell as UnitCell
 from .vibration import bands as bands
 from .vibration import brillouin_path as brillouin_path

@@ -43,5 +43,5 @@ rule measure:
     message:
         "Measuring {wildcards.suite}"
     shell:
-        "python -m benchmarks {wildcards.suite} --videos {params.videos} --out {params.folder}"
+        "python -m benchmarks {wildcards.suite} --videos {params.videos:q} --out {params.folder}"
         " --log {log} > /dev/null"

@@ -74,7 +74,7 @@ rule track:
     message:
         "Tracking {wildcards.recording} of {wildcards.name}{wildcards.preset}"
     shell:
-        "python -m pipeline track {input.recording} --design {input.design}"
+        "python -m pipeline track {input.recording} --design {input.design:q}"
         " --out {output.track} --no-report --log {log}"
 
 

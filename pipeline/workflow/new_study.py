@@ -1,6 +1,7 @@
 """Makes a study of one's own: a commented problem file that builds as it is."""
 
 import argparse
+import json
 import logging
 import re
 import shutil
@@ -51,7 +52,9 @@ def text(name: str, kind: str, image: Path | None) -> str:
     if image is None:
         void, small = _DISC, _SMALL_DISC
     else:
-        void, small = _IMAGE.format(file=image.name), _SMALL_IMAGE
+        plain = re.fullmatch(r"[A-Za-z][\w.-]*", image.name)
+        file = image.name if plain else json.dumps(image.name, ensure_ascii=False)
+        void, small = _IMAGE.format(file=file), _SMALL_IMAGE
     template = (TEMPLATES / f"{kind}.yaml").read_text(encoding="utf-8")
     return Template(template).substitute(
         name=name,
@@ -74,9 +77,5 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
     if args.kind == "dynamic":
         remedy = "leave --image out, or take --kind static"
         raise UserError("the dynamic template has no void", key="--image", remedy=remedy)
-    if re.fullmatch(r"[\w.-]+", args.image.name) is None:
-        remedy = "rename it: letters, digits, and . - _ between them"
-        raise UserError("not a name for an image", file=args.image, remedy=remedy)
-
     with found_in(args.image):
         read_outlines(args.image)

@@ -19,9 +19,11 @@ from .geometry import shape as shape
 from .geometry import unwrap as unwrap
 from .geometry import void_angles as void_angles
 from .lattice import Lattice as Lattice
+from .lattice import honeycomb as honeycomb
 from .lattice import kagome as kagome
 from .lattice import listed as listed
 from .lattice import quads as quads
+from .lattice import triangular as triangular
 from .material import Material as Material
 from .material import damping_of_ratio as damping_of_ratio
 from .material import unrotated_inertia as unrotated_inertia

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -211,6 +211,65 @@ def kagome(
             ligaments.append((other + 2, 3 * unit_of[j + 1, i, 0] + 1))
     j, i = np.divmod(np.arange(2 * columns * rows), 2 * columns)
     return _network(polygons, np.array(ligaments), np.stack([i, j], axis=1), spacing)
+
+
+def honeycomb(
+    columns: int, rows: int, spacing: float, ligament_length: float, bias_angle: float = 0.0
+) -> Lattice:
+    """Builds rotating triangles: units on a honeycomb, joined at their three corners.
+
+    Neighbours are ``spacing`` apart. Rows are zigzags of units along x, and unit
+    ``i + columns * j`` with even ``i + j`` has its third neighbour in the row above, with odd in
+    the row below. The first are turned by ``-bias_angle`` (rad), the others by ``+bias_angle``,
+    and scaled so that the ligaments stay along the lines of the honeycomb.
+    """
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
+    even = (i + j) % 2 == 0
+    site = spacing * np.stack([np.sqrt(0.75) * i, 1.5 * j + 0.5 * even], axis=1)
+    first, turn = np.where(even, np.pi / 2, -np.pi / 2), np.where(even, -bias_angle, bias_angle)
+    return _regular(3, site, np.stack([i, j], axis=1), spacing, ligament_length, first, turn)
+
+
+def triangular(columns: int, rows: int, spacing: float, ligament_length: float) -> Lattice:
+    """Builds hexagons on a triangular lattice, joined at their six corners.
+
+    Neighbours are ``spacing`` apart. Rows are along x, and every other one, from the second on, is
+    shifted by half a spacing. Unit ``i + columns * j`` is the i-th of row j.
+    """
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(rows)))
+    site = spacing * np.stack([i + 0.5 * (j % 2), np.sqrt(0.75) * j], axis=1)
+    straight = np.zeros(len(i))
+    index = np.stack([i, j], axis=1)
+    return _regular(6, site, index, spacing, ligament_length, straight, straight)
+
+
+def _regular(
+    corners: int,
+    site: Floats,
+    index: Ints,
+    spacing: float,
+    ligament_length: float,
+    first: Floats,
+    turn: Floats,
+) -> Lattice:
+    """Builds regular polygons on sites, a corner towards each neighbour ``spacing`` away.
+
+    The directions of a unit's neighbours are ``first`` (n_units,) and on by equal angles; ``turn``
+    (n_units,) is that of the polygons, opposite in neighbours (rad).
+    """
+    from scipy.spatial import cKDTree
+
+    towards = first[:, None] + 2 * np.pi / corners * np.arange(corners)
+    reach = (spacing - ligament_length) / 2 / np.cos(turn)
+    angle = towards + turn[:, None]
+    out = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    polygons = list(site[:, None] + reach[:, None, None] * out)
+    pairs = cKDTree(site).query_pairs(1.01 * spacing, output_type="ndarray")
+    pairs = pairs[np.lexsort(pairs.T[::-1])]
+    x, y = (site[pairs[:, 1]] - site[pairs[:, 0]]).T
+    along = np.stack([np.arctan2(y, x), np.arctan2(-y, -x)], axis=1)
+    corner = np.cos(towards[pairs] - along[:, :, None]).argmax(axis=2)
+    return replace(_network(polygons, corners * pairs + corner, index, spacing), site=site)
 
 
 def _parity(i: int, j: int) -> float:

@@ -25,6 +25,7 @@ PINNED: dict[str, dict[str, float]] = {
     "hidden_void": {"before": 0.116888, "after": 0.0350505},
     "imperfect_copies": {"spread": 0.031412},
     "kagome": {"force": 213.694, "largest_bend": 10.6188},
+    "lattices_by_name": {"honeycomb": 0.506401, "triangular": 83.2005},
     "measured_drive": {"largest": 1.40942},
     "modes": {"first": 26.5758, "second": 42.3536, "third": 56.1552},
     "resumed_run": {"replayed": 3.0, "best": 3.04245},

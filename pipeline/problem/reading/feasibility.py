@@ -14,6 +14,7 @@ from pipeline.problem.sections import (
     ListedNetwork,
     Quads,
     Region,
+    Regular,
     Selector,
     SeveralDrives,
     SingleDrive,
@@ -50,9 +51,10 @@ def _lattice(problem: Problem) -> Findings:
         what = f"ligaments of {lattice.ligament_length:g} mm leave no room for units"
         remedy = f"keep it below the spacing, {lattice.spacing:g} mm"
         yield ProblemFault(what, ("lattice", "ligament_length"), remedy)
-    if isinstance(lattice, Quads) and abs(lattice.bias_angle) >= math.pi / 4:
-        what = f"a bias of {math.degrees(lattice.bias_angle):g} deg closes the voids"
-        yield ProblemFault(what, ("lattice", "bias_angle"), "keep it between -45 deg and 45 deg")
+    if isinstance(lattice, Regular) and lattice.void_angle <= 0:
+        most = f"{(180.0 - lattice.block_angle) / 2:g} deg"
+        what = f"a bias of {math.degrees(lattice.bias):g} deg closes the voids"
+        yield ProblemFault(what, ("lattice", "bias_angle"), f"keep it between -{most} and {most}")
 
 
 def _contact(problem: Problem) -> Findings:
@@ -63,7 +65,7 @@ def _contact(problem: Problem) -> Findings:
     if barrier >= cutoff:
         what = f"the barrier ({barrier:g} deg) is not below the cut-off ({cutoff:g} deg)"
         yield ProblemFault(what, ("contact", "barrier_angle"), f"keep it below {cutoff:g} deg")
-    elif isinstance(problem.lattice, Quads) and cutoff >= (void := _smallest_void(problem.lattice)):
+    elif isinstance(problem.lattice, Regular) and cutoff >= (void := problem.lattice.void_angle):
         what = f"the undeformed lattice is in contact: its void angles start at {void:g} deg"
         yield ProblemFault(what, ("contact", "cutoff_angle"), f"keep it below {void:g} deg")
 
@@ -92,10 +94,6 @@ def _foil(problem: Problem) -> Findings:
             what = f"it is {cut:g} here, and {model:g} by material.foil"
             keys = ("fabrication", *name.split("."))
             yield ProblemFault(what, keys, "leave it out: material.foil says it")
-
-
-def _smallest_void(lattice: Quads) -> float:
-    return 90.0 - 2.0 * abs(math.degrees(lattice.bias_angle))
 
 
 def _selectors(problem: Problem) -> Iterator[tuple[KeyPath, Selector]]:
@@ -325,12 +323,12 @@ def _void_and_rest(problem: Problem, removed: set[int]) -> Findings:
 
 def _start_is_feasible(problem: Problem) -> Findings:
     lattice, limits = problem.lattice, problem.constraints
-    if not isinstance(lattice, Quads):
+    if not isinstance(lattice, Regular):
         return
     start = {
         "edge_length": (limits.edge_length, lattice.edge_length, "mm"),
-        "block_angle": (_degrees(limits.block_angle), 90.0, "deg"),
-        "void_angle": (_degrees(limits.void_angle), _smallest_void(lattice), "deg"),
+        "block_angle": (_degrees(limits.block_angle), lattice.block_angle, "deg"),
+        "void_angle": (_degrees(limits.void_angle), lattice.void_angle, "deg"),
         "gap": (limits.gap, lattice.ligament_length, "mm"),
     }
     for name, (asked, has, unit) in start.items():

@@ -23,10 +23,13 @@ from .fabrication import Labels as Labels
 from .fabrication import Laser as Laser
 from .fabrication import Markers as Markers
 from .fabrication import Print as Print
+from .lattices import Honeycomb as Honeycomb
 from .lattices import Kagome as Kagome
 from .lattices import Lattice as Lattice
 from .lattices import ListedNetwork as ListedNetwork
 from .lattices import Quads as Quads
+from .lattices import Regular as Regular
+from .lattices import Triangular as Triangular
 from .material import STIFFNESSES as STIFFNESSES
 from .material import Contact as Contact
 from .material import MaterialConstants as MaterialConstants

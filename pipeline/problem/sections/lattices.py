@@ -1,4 +1,4 @@
-"""Describes lattices: squares or triangles on a grid, and networks read from a file.
+"""Describes lattices: polygons in columns and rows, and networks read from a file.
 
 A unit's site is the centroid of its starting polygon, which for squares is their lattice point.
 """
@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, model_validator
 from pydantic.json_schema import SkipJsonSchema
@@ -17,7 +17,7 @@ from pydantic.json_schema import SkipJsonSchema
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
 from pipeline.problem.outlines import NetworkContent, Stiffness, read_network
 from pipeline.runtime import UserError
-from sim.structure import kagome, listed, quads
+from sim.structure import honeycomb, kagome, listed, quads, triangular
 
 if TYPE_CHECKING:
     from sim.structure import Lattice as Network
@@ -88,20 +88,43 @@ class _Grid(Section):
         return tuple(self.unit(i, j) for j in along for i in chosen)
 
 
-class Quads(_Grid):
+class Regular(_Grid):
+    """Regular polygons, a corner towards each neighbour."""
+
+    corners: ClassVar[int]
+
+    @property
+    def bias(self) -> float:
+        """Angle by which the units are turned, left and right by turns, rad."""
+        return float(getattr(self, "bias_angle", 0.0))
+
+    @property
+    def edge_length(self) -> float:
+        """Edge of the starting units in mm."""
+        reach = (self.spacing - self.ligament_length) / math.cos(self.bias)
+        return reach * math.sin(math.pi / self.corners)
+
+    @property
+    def block_angle(self) -> float:
+        """Angle at the corners of the starting units, deg."""
+        return 180.0 - 360.0 / self.corners
+
+    @property
+    def void_angle(self) -> float:
+        """Smallest angle between the edges of neighbours at the start, deg."""
+        return 180.0 - self.block_angle - 2.0 * abs(math.degrees(self.bias))
+
+
+class Quads(Regular):
     """Squares of alternating bias on a square lattice, joined by ligaments at their corners.
 
     Attributes:
         bias_angle: by which the squares are turned, left and right by turns.
     """
 
+    corners: ClassVar[int] = 4
     kind: Literal["quads"] = "quads"
     bias_angle: Angle
-
-    @property
-    def edge_length(self) -> float:
-        """Edge of the starting squares in mm."""
-        return (self.spacing - self.ligament_length) / math.sqrt(2.0) / math.cos(self.bias_angle)
 
     @property
     def centre_site(self) -> Point:
@@ -142,10 +165,50 @@ class _WithNetwork(Section):
         """Lists the units that each ligament joins."""
         return iter([(one, other) for one, other in _network(self).ligament_units.tolist()])
 
+    @property
+    def centre_site(self) -> Point:
+        """Returns the middle of the box around the sites, in mm."""
+        _, x, y = zip(*self.sites(), strict=True)
+        return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
+
 
 @lru_cache(maxsize=8)
 def _network(lattice: _WithNetwork) -> Network:
     return lattice.network()
+
+
+class Honeycomb(_WithNetwork, Regular):
+    """Triangles of alternating bias on a honeycomb, each joined to three others.
+
+    Rows are zigzags along x; the units of even i + j are joined to the row above.
+
+    Attributes:
+        bias_angle: by which the triangles are turned, left and right by turns.
+    """
+
+    corners: ClassVar[int] = 3
+    kind: Literal["honeycomb"]
+    bias_angle: Angle = 0.0
+
+    def network(self) -> Network:
+        """Builds the lattice for sim/."""
+        return honeycomb(
+            self.columns, self.rows, self.spacing, self.ligament_length, self.bias_angle
+        )
+
+
+class Triangular(_WithNetwork, Regular):
+    """Hexagons on a triangular lattice, each joined to six others.
+
+    Every other row, from the second on, is shifted by half a spacing.
+    """
+
+    corners: ClassVar[int] = 6
+    kind: Literal["triangular"]
+
+    def network(self) -> Network:
+        """Builds the lattice for sim/."""
+        return triangular(self.columns, self.rows, self.spacing, self.ligament_length)
 
 
 class Kagome(_WithNetwork, _Grid):
@@ -273,12 +336,6 @@ class ListedNetwork(_WithNetwork):
         sides["corners"] = (sides["left"] | sides["right"]) & (sides["bottom"] | sides["top"])
         return tuple(sorted(sides[name]))
 
-    @property
-    def centre_site(self) -> Point:
-        """Returns the middle of the box around the sites, in mm."""
-        _, x, y = zip(*self.sites(), strict=True)
-        return (min(x) + max(x)) / 2, (min(y) + max(y)) / 2
-
     def network(self) -> Network:
         """Builds the lattice for sim/.
 
@@ -296,6 +353,8 @@ def _kind(value: object) -> str:
 Lattice = Annotated[
     Annotated[Quads, Tag("quads")]
     | Annotated[Kagome, Tag("kagome")]
+    | Annotated[Honeycomb, Tag("honeycomb")]
+    | Annotated[Triangular, Tag("triangular")]
     | Annotated[ListedNetwork, Tag("file")],
     Discriminator(_kind),
 ]

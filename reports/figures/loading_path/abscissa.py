@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.problem import Problem, driven_units
-from pipeline.problem.sections import Kagome, Lattice, Quads, single_drives
+from pipeline.problem.sections import Kagome, Lattice, ListedNetwork, single_drives
 from reports.figures.loading_path import measures
 from sim.core import Floats
 
@@ -138,8 +138,6 @@ def display_name(problem: Problem, structure: str) -> str:
 
 def lattice_size(lattice: Lattice) -> str:
     """Tells how many units a lattice has, in words."""
-    if isinstance(lattice, Quads):
-        return f"{lattice.columns} × {lattice.rows}"
-    if isinstance(lattice, Kagome):
-        return f"2 × {lattice.columns} × {lattice.rows}"
-    return f"{lattice.n_units}"
+    if isinstance(lattice, ListedNetwork):
+        return f"{lattice.n_units}"
+    return f"{'2 × ' * isinstance(lattice, Kagome)}{lattice.columns} × {lattice.rows}"

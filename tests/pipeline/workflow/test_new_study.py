@@ -1,5 +1,6 @@
 """New studies from the templates: valid as they are, and nothing half made."""
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -18,11 +19,15 @@ def test_a_template_is_a_problem(tmp_path: Path, kind: str) -> None:
     assert load(path).title == "My study"
     assert "draft" in load(path, "quick").title
     assert path.read_text().count("# ") > 8
+    made = load(path).fabrication
+    assert made.shims.thickness + 2 * min(made.coupon) > made.laser.kerf
 
 
-def test_an_image_becomes_the_void(tmp_path: Path) -> None:
-    assert run_stage("new", ["cat", "--image", str(CAT), "--folder", str(tmp_path)]) == 0
-    assert (tmp_path / "cat/cat.png").read_bytes() == CAT.read_bytes()
+@pytest.mark.parametrize("name", ["cat.png", "my cat's {best} $1, ü #2.png"])
+def test_an_image_becomes_the_void(tmp_path: Path, name: str) -> None:
+    image = Path(shutil.copyfile(CAT, tmp_path / name))
+    assert run_stage("new", ["cat", "--image", str(image), "--folder", str(tmp_path)]) == 0
+    assert (tmp_path / "cat" / name).read_bytes() == CAT.read_bytes()
     assert len(void_units(load(tmp_path / "cat/problem.yaml"))) > 30
 
 
@@ -33,7 +38,6 @@ def test_an_image_becomes_the_void(tmp_path: Path) -> None:
         (["taken"], "there is a study of this name"),
         (["x", "--image", "none.png"], "the image cannot be read"),
         (["x", "--image", str(CAT), "--kind", "dynamic"], "the dynamic template has no void"),
-        (["x", "--image", "with space.png"], "not a name for an image"),
     ],
 )
 def test_a_mistake_makes_nothing(

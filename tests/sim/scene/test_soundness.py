@@ -43,6 +43,7 @@ def crossed(unit: int) -> Floats:
     return vertices
 
 
+UNKNOWN: Any = ("uz",)
 MOVING = {"static": False, "frequency": 10.0, "steps": None, "samples": 3}
 REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "beyond": (scene(sim.LinearRamp(-400.0, 1.0)), "400 mm, further than", "drive.amplitude"),
@@ -68,7 +69,7 @@ REFUSED: dict[str, tuple[sim.Scene, str, str]] = {
     "kept": (scene(frozen=np.array([25])), "no unit 25", "cloak"),
     "a list": (scene(region=[12]), "no array of integers", "objective.region"),
     "a float": (scene(region=np.array([12.0])), "no array of integers", "objective.region"),
-    "no such dof": (scene(supports=(sim.Clamp(LEFT, ("uz",)),)), "no 'uz'; .*ux, uy", "supports"),
+    "no such dof": (scene(supports=(sim.Clamp(LEFT, UNKNOWN),)), "no 'uz'; .*ux, uy", "supports"),
 }  # fmt: skip
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.structure import Lattice, quads
+from sim.structure import Lattice, honeycomb, overlapping_pairs, quads, triangular
 from tests.sim.structures import mixed_polygons, rotating_squares
 
 
@@ -40,6 +40,29 @@ def test_padded_puts_every_vertex_in_its_units_row() -> None:
     assert padded.shape == (8, 6, 2)
     np.testing.assert_array_equal(padded[0], lattice.vertices[:6])
     np.testing.assert_array_equal((~np.isnan(padded[:, :, 0])).sum(axis=1), [6, *[3] * 6, 5])
+
+
+@pytest.mark.parametrize(
+    ("named", "joined", "n_ligaments"),
+    [
+        (honeycomb(6, 5, 10.0, 1.5, 0.3), 3, 5 * 5 + 6 * 4 // 2),
+        (honeycomb(6, 5, 10.0, 1.5), 3, 5 * 5 + 6 * 4 // 2),
+        (triangular(6, 5, 10.0, 1.5), 6, 5 * 5 + 4 * (2 * 6 - 1)),
+    ],
+    ids=["rotating", "honeycomb", "triangular"],
+)
+def test_regular_units_face_each_neighbour(named: Lattice, joined: int, n_ligaments: int) -> None:
+    """Ligaments lie between corners that face each other, on the lines between the sites."""
+    assert (named.n_units, named.n_ligaments) == (30, n_ligaments)
+    one, other = named.ligament_units.T
+    along = (named.site[other] - named.site[one]) / 10.0
+    np.testing.assert_allclose(np.linalg.norm(along, axis=1), 1.0)
+    np.testing.assert_allclose(named.ligament_vectors, 1.5 * along, atol=1e-12)
+    inner = np.bincount(named.ligament_units.ravel()) == joined
+    assert inner.any()
+    assert len(np.unique(named.ligaments)) == 2 * n_ligaments
+    assert len(overlapping_pairs(named, named.vertices)) == 0
+    np.testing.assert_allclose(named.index @ [1, 6], np.arange(30))
 
 
 def test_rectangular_lattice() -> None:
