@@ -16,7 +16,7 @@ WORKFLOW := Snakefile $(wildcard pipeline/rules/*.smk)
 # By the environment: names of folders never are words of a shell's command.
 export TARGET = $@
 
-.PHONY: help setup dev publish reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
+.PHONY: help setup dev publish reproduce wheels test nightly test-slow pythons clients cluster docs lint format bench bench-tracking stress survive mutants lock clean $(PAGES) $(STUDIES) $(PRODUCTS)
 
 help:
 	$(info make fig2      build Figure 2: results/fig2/report/index.html (studies here: $(STUDIES)))
@@ -44,7 +44,8 @@ help:
 	@echo "make bench     measure speed against the baselines"
 	@echo "make bench-tracking   measure tracking: rendered clips, known pictures, VIDEOS=folder"
 	@echo "make stress    try to break the numbers: results/stress/index.html; fails if any is wrong"
-	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs kills places)"
+	@echo "make survive   damaged files, killed runs, full disks: results/survival (PARTS=inputs fuzz kills places)"
+	@echo "make mutants   change 200 places of the source, one by one, and count what no test notices"
 	@echo "make lint      ruff, mypy, snakefmt, snakemake --lint"
 	@echo "make setup     only make .venv from requirements.lock; with WHEELS=folder, from that folder alone"
 	@echo "make dev       the same, with the tools of tests, linters and documentation"
@@ -143,6 +144,13 @@ stress: dev
 survive: dev
 	@$(BIN)/python -m tests.hostile $(PARTS); code=$$?; \
 	    $(BIN)/python -m reports survival --out-dir results/survival --quiet && exit $$code
+
+# In an environment of its own: cosmic-ray mutates the source, and imports nothing of it.
+mutants: dev
+	@test -x .cache/mutants/bin/cosmic-ray || { $(PYTHON) -m venv .cache/mutants && \
+	    .cache/mutants/bin/pip install --quiet --disable-pip-version-check cosmic-ray==8.7.0; }
+	@nice -n 15 $(BIN)/python tests/mutants/run.py --cosmic-ray "$(CURDIR)/.cache/mutants/bin/python" \
+	    --count $(or $(COUNT),200)
 
 # Pins that still fit stay; those of the tools agree with those of users.
 LOCK = CUSTOM_COMPILE_COMMAND="make lock" .cache/lock/bin/pip-compile --quiet --strip-extras --allow-unsafe \

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import importlib
 import sys
 from argparse import Namespace
 from collections.abc import Sequence
@@ -64,7 +63,7 @@ def _work(stage: Stage, given: Namespace | list[str]) -> None:
         UserError: a package is missing, which an extra installs; or a fault of the stage.
     """
     try:
-        importlib.import_module(PREFIX + stage.module).work(given)
+        cli.imported(PREFIX + stage.module).work(given)
     except ModuleNotFoundError as error:
         if (missing := str(error.name).partition(".")[0]) in ("sim", "pipeline", "metacloak"):
             raise

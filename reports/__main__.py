@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 
 from pipeline.runtime import PREFIX, cli, delegate, streams
 from reports.catalogue import OPTIONS, REPORTS, ReportCommand
@@ -36,7 +35,7 @@ def _run(kind: str, command: ReportCommand, words: Sequence[str]) -> int:
     for word in command.options.split():
         flag = word.rstrip("?")
         parser.add_argument(flag, required=word == flag, **OPTIONS[flag])
-    return cli.run(lambda args: import_module(PREFIX + command.module).report(args), parser, words)
+    return cli.run(lambda args: cli.imported(PREFIX + command.module).report(args), parser, words)
 
 
 if __name__ == "__main__":

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import logging
 import signal
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
-from types import FrameType
+from types import FrameType, ModuleType
 
 from pipeline.runtime import streams
 from pipeline.runtime.errors import UserError, refusal
 from pipeline.runtime.progress import Progress as progress  # noqa: N813  (reads as a verb at its callers)
 from pipeline.runtime.stage_table import PROBLEM, Option, Stage, option
 
-__all__ = ["command_line", "parser", "progress", "run"]
+__all__ = ["command_line", "imported", "parser", "progress", "run"]
 
 Work = Callable[[argparse.Namespace], None]
 
@@ -95,6 +97,16 @@ def run(work: Work, made: argparse.ArgumentParser, argv: Sequence[str] | None = 
     except UserError as error:  # the log itself could not be written
         print(f"error: {error}", file=sys.stderr)  # noqa: T201
         return 2
+
+
+def imported(name: str) -> ModuleType:
+    """Imports a module with all that it needs: it stays, and is not looked through as garbage."""
+    gc.disable()
+    try:
+        return import_module(name)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def _guarded(work: Work, args: argparse.Namespace) -> int:

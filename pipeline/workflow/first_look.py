@@ -8,18 +8,17 @@ import sys
 from collections.abc import Iterable
 
 from pipeline.runtime import PREFIX, WORK
-from pipeline.workflow.studies import Study, check_names, problem_of
+from pipeline.workflow.studies import Study, check_names
 
 
 def work(args: argparse.Namespace) -> None:
     """Shows one study.
 
     Raises:
-        UserError: there is no such study, or its problem has a fault.
+        UserError: the study, its preset or a recording has a name that none can have.
     """
     study = Study.parse(args.study)
     check_names(study)
-    problem_of(study)
     sys.exit(_show(study))
 
 

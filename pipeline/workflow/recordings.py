@@ -4,12 +4,18 @@ A recording is a file experiments/STUDY/recordings/NAME.yaml. It names a video b
 how the virtual lab films the study's own response.
 """
 
-from pathlib import Path
+from __future__ import annotations
 
-from snakemake.iocontainers import Wildcards
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.runtime import WORK, UserError
-from pipeline.tracking.frames import Recording, load_recording
+from pipeline.tracking import frames
+
+if TYPE_CHECKING:
+    from snakemake.iocontainers import Wildcards
+
+    from pipeline.tracking.frames import Recording
 
 RECORDINGS = "_recordings"
 """Ends the targets that render and track the recordings of a study."""
@@ -97,7 +103,7 @@ def described(wildcards: Wildcards) -> Recording | None:
 
 def _read(path: Path) -> Recording | None:
     try:
-        return load_recording(path)
+        return frames.load_recording(path)
     except UserError:
         return None
 

@@ -10,12 +10,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from pipeline.problem import Problem
-from pipeline.problem.reading import joint_figure, load, overlay_keys, preset_names, yaml_file
-from pipeline.problem.sections import design_count, design_name
+from pipeline.problem import reading, sections
 from pipeline.runtime import ROOT, WORK, UserError
 from pipeline.workflow.recordings import RECORDINGS
+
+if TYPE_CHECKING:
+    from pipeline.problem import Problem
 
 PRODUCTS = ("_fabrication", "_spectrum", "_sweep", "_gains", "_certificate", RECORDINGS)
 """Ends of the targets of a study beside its report."""
@@ -62,11 +64,14 @@ def families(root: Path = WORK) -> Mapping[Study, list[Study]]:
     """
     found = {}
     for path in sorted(root.glob("experiments/*/problem.yaml")):
-        content = yaml_file.skim_yaml(path)
+        content = reading.yaml_file.skim_yaml(path)
         presets = content.pop("presets", None)
         for preset, laid in {"": {}, **(presets if isinstance(presets, dict) else {})}.items():
-            whole = overlay_keys(content, laid if isinstance(laid, dict) else {})
-            names = (design_name(str(preset), k + 1) for k in range(design_count(whole)))
+            whole = reading.overlay_keys(content, laid if isinstance(laid, dict) else {})
+            names = (
+                sections.design_name(str(preset), k + 1)
+                for k in range(sections.design_count(whole))
+            )
             study = Study(path.parent.name, str(preset))
             found[study] = [Study(study.name, name) for name in names]
     return found
@@ -87,10 +92,10 @@ def joints(root: Path = WORK) -> Mapping[str, list[Study]]:
     for path in sorted(root.glob("experiments/*/figure.yaml")):
         name = path.parent.name
         try:
-            members = joint_figure.load_joint_figure(path).studies
+            members = reading.joint_figure.load_joint_figure(path).studies
         except UserError:
             members = ()
-        presets = [set(preset_names(path.parents[1] / m / "problem.yaml")) for m in members]
+        presets = [set(reading.preset_names(path.parents[1] / m / "problem.yaml")) for m in members]
         for preset in ("", *sorted(set.intersection(*presets) if presets else ())):
             found[str(Study(name, preset))] = [Study(member, preset) for member in members]
     return found
@@ -234,4 +239,4 @@ def problem_of(study: Study) -> Problem:
     Raises:
         UserError: the problem file is wrong; tells where and what to do.
     """
-    return load(study.problem, study.preset or None)
+    return reading.load(study.problem, study.preset or None)

@@ -311,7 +311,7 @@ def listed(
 
 
 def _counter_clockwise(ring: Floats) -> Floats:
-    area = _moments(ring)[0]
+    area = _moments(ring)[0] if len(ring) > 0 else 0.0
     if abs(area) < 1e-9 or not np.isfinite(area):
         raise ValueError(f"a polygon of {len(ring)} corners has no area")
     return ring if area > 0 else ring[::-1]

@@ -1,4 +1,4 @@
-"""Tries to lose or to spoil something: ``python -m tests.hostile [inputs] [kills] [places]``."""
+"""Tries to lose or to spoil something: ``python -m tests.hostile [inputs fuzz kills places]``."""
 
 import argparse
 import json
@@ -17,12 +17,14 @@ from tests.hostile import inputs, kills, places
 
 Part = dict[str, Any]
 T = TypeVar("T")
+FUZZED = ("DXF", "SVG", "image", "CSV", "netCDF", "video")
+"""Sorts of files of which many more are damaged."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Tries what is asked for, and writes the counts and the page; 1 if something was lost."""
     asked = _parser().parse_args(arguments)
-    parts = {"inputs": _inputs, "kills": _kills, "places": _places}
+    parts = {"inputs": _inputs, "fuzz": _fuzz, "kills": _kills, "places": _places}
     lost = 0
     for name in asked.parts or parts:
         made = {**parts[name](asked), "seed": asked.seed, "commit": git_commit()}
@@ -35,8 +37,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(lost > 0)
 
 
+def _fuzz(asked: argparse.Namespace) -> Part:
+    sorts = asked.sorts or FUZZED
+    return _told([one for sort in sorts for one in inputs.outcomes(asked.fuzz, asked.seed, sort)])
+
+
 def _inputs(asked: argparse.Namespace) -> Part:
-    found = inputs.outcomes(asked.inputs, asked.seed)
+    return _told(inputs.outcomes(asked.inputs, asked.seed))
+
+
+def _told(found: list[inputs.Outcome]) -> Part:
     wrong = [each for each in found if each["end"] == "wrong"]
     rows = [{**row, "survived": row["tried"] - row["wrong"]} for row in inputs.counts(found)]
     faults = [f"{one['number']}: {one['subject']}, {one['damage']}: {one['note']}" for one in wrong]
@@ -106,8 +116,10 @@ def _tell(line: str) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m tests.hostile", description=__doc__)
     add, out = parser.add_argument, Path("results/survival")
-    add("parts", nargs="*", metavar="part", help="inputs, kills, places; all")
+    add("parts", nargs="*", metavar="part", help="inputs, fuzz, kills, places; all")
     add("--inputs", type=int, default=1000, help="damaged files (%(default)s)")
+    add("--fuzz", type=int, default=1000, help="damaged files of each sort (%(default)s)")
+    add("--sorts", nargs="*", choices=FUZZED, help="of them; all")
     add("--kills", type=int, default=50, help="killed runs (%(default)s)")
     add("--seed", type=int, default=0, help="of what is random (%(default)s)")
     add("--out", type=Path, default=out, help="folder (%(default)s)")

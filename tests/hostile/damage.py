@@ -85,6 +85,43 @@ ANY: Damages = (
 YAML: Damages = (*[("other value", _value)] * 2, ("other key", _key), ("other line", _line))
 CSV: Damages = (("other cell", _in_line(_other_cell)), ("other line", _line))
 
+TOKENS = (
+    *("-1", "0", "1e308", "-1e308", "1e-300", "1e400", "nan", "inf", "99999999999999999999"),
+    *(
+        "1e300mm",
+        "50%",
+        "-50%",
+        "none",
+        "url(#c)",
+        "#c",
+        "#nobody",
+        "javascript:1",
+        "\x00",
+        "<",
+        "]]>",
+    ),
+    *("matrix(0 0 0 0 0 0)", "scale(1e9)", "rotate(nan)", "A", "Z", "M 0 0 A 1e-300 1 0 0 1 9 9"),
+    *("LWPOLYLINE", "INSERT", "SPLINE", "HATCH", "EOF", "ENDSEC", "SECTION", "1000", "x" * 5000),
+)
+"""Words and numbers that a part of a drawing may be given."""
+
+
+def _other_token(content: bytes, random: Random) -> bytes:
+    text = content.decode("utf-8", "replace")
+    found = list(re.finditer(r"[\w.+-]+", text))
+    for one in sorted(random.sample(found, random.randint(1, 3)), key=lambda it: -it.start()):
+        text = text[: one.start()] + random.choice(TOKENS) + text[one.end() :]
+    return text.encode()
+
+
+def _repeated(content: bytes, random: Random) -> bytes:
+    start = random.randrange(len(content))
+    end = min(len(content), start + random.randint(1, 200))
+    return content[:end] + content[start:end] * random.choice((10, 1000, 20_000)) + content[end:]
+
+
+TEXT: Damages = (*[("other token", _other_token)] * 4, ("repeated", _repeated))
+
 OWN = "edited meant "
 """Starts the names of edits whose author says, by the attribute about the seal, that they are."""
 

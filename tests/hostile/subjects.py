@@ -31,7 +31,7 @@ from tests.pipeline import static
 from tests.pipeline.problem import test_lattices
 from tests.pipeline.samples import sample
 
-Sort = Literal["YAML", "netCDF", "CSV", "image", "video", "other"]
+Sort = Literal["YAML", "netCDF", "CSV", "image", "SVG", "DXF", "video", "other"]
 Told = list[Any]
 """What was read, as plain numbers and words."""
 
@@ -290,13 +290,23 @@ SUBJECTS: tuple[Subject, ...] = (
         _image(f"{end} of a void", partial(_picture, f"void.{end}"))
         for end in ("png", "jpg", "bmp", "tiff")
     ),
-    _image("SVG of a void", partial(_text, "void.svg", SVG)),
+    Subject(
+        "SVG of a void",
+        "SVG",
+        partial(_beside, partial(_text, "void.svg", SVG), _void),
+        _by_problem,
+        damage.TEXT,
+    ),
     Subject("picture of a film", "image", _frames, lambda p: _shown(p.parent)),
     Subject("video, H.264", "video", partial(_copied, CLIP.with_suffix(".mp4")), _shown),
     Subject("video, lossless", "video", partial(_film, "film.mkv", Codec(name="ffv1")), _shown),
     Subject("video, small", "video", partial(_film, "film.mp4", Codec()), _shown),
     Subject(
-        "lattice in DXF", "other", partial(_beside, partial(_lattice, "dxf"), _listed), _by_problem
+        "lattice in DXF",
+        "DXF",
+        partial(_beside, partial(_lattice, "dxf"), _listed),
+        _by_problem,
+        damage.TEXT,
     ),
     Subject(
         "manifest of a package",

@@ -131,14 +131,10 @@ def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint
 
 
 def _of_drawing(path: Path) -> list[NDArray[Any]]:
-    from svgelements import SVG, Shape
-    from svgelements import Path as Curve
-
     try:
         _check_depth(path)
         _check_copies(ElementTree.parse(path).getroot())
-        shapes = list(SVG.parse(str(path), reify=True).elements())
-        paths = [Curve(shape) for shape in shapes if isinstance(shape, Shape)]
+        shapes, paths = _parsed(path)
         _check_outlines(shapes, paths)
         count = min(SEGMENTS, MOST_POINTS // max(1, sum(map(len, paths))))
         if count < 2:
@@ -150,6 +146,22 @@ def _of_drawing(path: Path) -> list[NDArray[Any]]:
     except (OSError, ValueError, SyntaxError, ArithmeticError, RecursionError) as error:
         raise UserError(f"not a readable SVG: {error}", remedy="save it as plain SVG") from error
     return found
+
+
+def _parsed(path: Path) -> tuple[list[Any], list[SvgPath]]:
+    """Returns the elements of a drawing, and those that have an outline as paths.
+
+    Raises:
+        ValueError: they cannot be read.
+    """
+    from svgelements import SVG, Shape
+    from svgelements import Path as Curve
+
+    try:
+        elements = list(SVG.parse(str(path), reify=True).elements())
+        return elements, [Curve(each) for each in elements if isinstance(each, Shape)]
+    except Exception as error:  # whatever a parser of another project meets in a damaged file
+        raise ValueError(f"{type(error).__name__}: {error}") from error
 
 
 def _check_outlines(elements: list[Any], paths: list[SvgPath]) -> None:
@@ -192,8 +204,10 @@ def _check_copies(drawing: ElementTree.Element) -> None:
     """Refuses copies of copies, of which few lines make more than any memory holds.
 
     Raises:
-        ValueError: there are some, or too many copies.
+        ValueError: there are some, or too many copies, or it is no drawing.
     """
+    if drawing.tag.rpartition("}")[2] != "svg":
+        raise ValueError("it does not begin with an element svg")
     elements = list(drawing.iter())
     copies = [element for element in elements if _is_copy(element)]
     words = (element.get(key, "") for element in elements for key in ("d", "points"))

@@ -148,8 +148,16 @@ HOSTILE = {
     "many curves": f'<path d="M0,0{"C1,2 3,4 5,6" * 30_000}Z"/>',
     "many paths": TRIANGLE * 30_000,
     "no size": f'<g transform="scale(1e-300)">{TRIANGLE}</g>',
+    "no course": TRIANGLE.replace("d=", "e="),
     "no end": '<path d="M0 0 L1e400 1 L1 0 Z"/>',
 }
+
+
+def test_a_drawing_of_another_kind_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "void.svg"
+    path.write_text(SVG.format(TRIANGLE).replace("svg", "sug"))
+    with pytest.raises(UserError, match="does not begin with an element svg"):
+        images.read_outlines(path)
 
 
 @pytest.mark.parametrize("content", HOSTILE.values(), ids=HOSTILE)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.structure import Lattice, honeycomb, overlapping_pairs, quads, triangular
+from sim.structure import Lattice, honeycomb, listed, overlapping_pairs, quads, triangular
 from tests.sim.structures import mixed_polygons, rotating_squares
 
 
@@ -63,6 +63,11 @@ def test_regular_units_face_each_neighbour(named: Lattice, joined: int, n_ligame
     assert len(np.unique(named.ligaments)) == 2 * n_ligaments
     assert len(overlapping_pairs(named, named.vertices)) == 0
     np.testing.assert_allclose(named.index @ [1, 6], np.arange(30))
+
+
+def test_a_polygon_without_corners_has_no_area() -> None:
+    with pytest.raises(ValueError, match="a polygon of 0 corners has no area"):
+        listed([()], [], 15.0)
 
 
 def test_rectangular_lattice() -> None:
