@@ -81,7 +81,7 @@ def field(
     gradient, free = force(scene), np.sort(top.free_dofs)
 
     def motion(time: Array, displacement: Array) -> Array:
-        held = held_values(top.held, drive.units, drive.motion, time[None])[0]
+        held = held_values(top.held, drive.units, drive.motion(time[None]))[0]
         rest = jnp.zeros(top.n_dofs)
         return rest.at[top.held].set(held).at[free].set(displacement).reshape(-1, 3)
 

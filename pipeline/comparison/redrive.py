@@ -8,10 +8,8 @@ at the start of a drive. Frames in which a unit was not seen are bridged by it.
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from jax import Array
 from scipy.interpolate import UnivariateSpline
 
 from pipeline.posing import PosedStructure
@@ -40,12 +38,12 @@ class HermiteMotion(NamedTuple):
     value: Numbers
     slope: Numbers
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Computes the motion (n_times, n_units, 3) at times in s: cubic between the instants."""
-        value, slope = jnp.asarray(self.value), jnp.asarray(self.slope)
-        last = len(value) - 1
-        place = jnp.clip(jnp.asarray(times) / self.step, 0.0, last)
-        before = jnp.minimum(jnp.floor(place), last - 1).astype(int)
+        xp, last = times.__array_namespace__(), len(self.value) - 1
+        value, slope = xp.asarray(self.value), xp.asarray(self.slope)
+        place = xp.clip(times / self.step, 0.0, last)
+        before = xp.minimum(xp.floor(place), last - 1).astype(int)
         s = (place - before)[:, None, None]
         rise = value[before + 1] - value[before]
         bend = slope[before] * self.step - rise

@@ -3,9 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from pipeline.posing import PosedStructure, drawn
 from pipeline.problem.sections import DriveFaults, SpecimenFaults
@@ -44,32 +42,28 @@ class ImperfectDrive(NamedTuple):
     drift: Numbers
     delay: float
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Returns the motion (n_times, n_units, 3) at the given times, s."""
-        since = jnp.maximum(jnp.asarray(times) - self.delay, 0.0)
-        planned = self.planned(jnp.minimum(since, 2 * self.turning - since))
-        amplitude = jnp.hypot(*self.largest)
-        along = jnp.asarray(self.largest) / amplitude
+        xp = times.__array_namespace__()
+        since = xp.maximum(times - self.delay, 0.0)
+        planned = self.planned(xp.minimum(since, 2 * self.turning - since))
+        amplitude = xp.hypot(*self.largest)
+        along = xp.asarray(self.largest) / amplitude
         far = planned[:, :2] @ along / amplitude
         bent = planned[:, :2] + self.cross * amplitude * far[:, None] ** 2 * _left(along)
-        path = self.gain * bent @ _turned(self.turn).T
-        path += jnp.asarray(times)[:, None] / self.end * jnp.asarray(self.drift)
+        turned = xp.cos(self.turn) * bent + xp.sin(self.turn) * _left(bent)
+        path = self.gain * turned + times[:, None] / self.end * xp.asarray(self.drift)
         angle = self.tilt * far
-        cos, sin = jnp.cos(angle)[:, None, None] - 1, jnp.sin(angle)[:, None, None]
-        place = jnp.asarray(self.place)
+        cos, sin = xp.cos(angle)[:, None, None] - 1, xp.sin(angle)[:, None, None]
+        place = xp.asarray(self.place)
         swung = cos * place + sin * _left(place)
-        rotation = jnp.broadcast_to((planned[:, 2] + angle)[:, None], swung.shape[:2])
-        return jnp.concatenate([path[:, None] + swung, rotation[..., None]], axis=2)
+        rotation = xp.broadcast_to((planned[:, 2] + angle)[:, None], swung.shape[:2])
+        return xp.concatenate([path[:, None] + swung, rotation[..., None]], axis=2)
 
 
-def _left(vector: Array) -> Array:
+def _left(vector: Numbers) -> Numbers:
     """Turns vectors (..., 2) by a right angle counter-clockwise."""
-    return jnp.stack([-vector[..., 1], vector[..., 0]], axis=-1)
-
-
-def _turned(angle: float) -> Array:
-    cos, sin = jnp.cos(angle), jnp.sin(angle)
-    return jnp.array([[cos, -sin], [sin, cos]])
+    return vector.__array_namespace__().stack([-vector[..., 1], vector[..., 0]], axis=-1)
 
 
 def make_specimen(

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 from jax.custom_derivatives import SymbolicZero
 
-from sim.core import Floats, Ints, NewContactPairs
+from sim.core import Floats, Ints, NewContactPairs, Numbers
 from sim.energy import Topology
 from sim.solvers.loads import FORCE, MotionLaw, held_values, loaded_units
 from sim.solvers.validation import (
@@ -68,14 +68,19 @@ class PrescribedMotion(NamedTuple):
         shape = (len(times), len(self.units), 3)
         if self.control is None:
             return np.zeros(shape)
-        every = np.asarray(self.motion(_padded(times)))[: len(times)]
-        each = np.broadcast_to(every.reshape(len(times), -1, 3), shape)
+        each = np.broadcast_to(self._at(times).reshape(len(times), -1, 3), shape)
         return np.where(self.control == FORCE, each, 0.0)
 
     def values(self, held: Ints, times: Floats) -> Floats:
         """Values (n_times, n_held) of the held dofs."""
-        every = held_values(held, self.units, self.motion, _padded(times), self.control)
-        return np.asarray(every)[: len(times)]
+        return np.asarray(held_values(held, self.units, self._at(times), self.control))
+
+    def _at(self, times: Floats) -> Floats:
+        """Computes the motion in NumPy, whichever arrays its numbers are."""
+        plain = jax.tree.map(
+            lambda leaf: np.asarray(leaf) if isinstance(leaf, Array) else leaf, self.motion
+        )
+        return np.asarray(plain(times))
 
     def start(self, topology: Topology, time: float) -> Floats:
         """State (n_dofs,) in which a motion from rest begins: the held dofs are in place."""
@@ -85,22 +90,15 @@ class PrescribedMotion(NamedTuple):
 
     def rates(self, held: Ints, times: Floats) -> Floats:
         """Their rates of change, per s."""
-        every = _held_rates(held, self, self.motion, _padded(times))
-        return np.asarray(every)[: len(times)]
+        # of a length that is a power of 2: JAX compiles for every new one
+        padded = np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
+        rates = np.asarray(_rates(self.motion, padded))[: len(times)]
+        return np.asarray(held_values(held, self.units, rates, self.control))
 
 
-def _padded(times: Floats) -> Floats:
-    """Pads times to a power of 2 with copies of the last: JAX compiles for every new length."""
-    return np.pad(times, (0, (1 << (len(times) - 1).bit_length()) - len(times)), mode="edge")
-
-
-def _held_rates(held: Ints, drive: PrescribedMotion, motion: MotionLaw, times: Floats) -> Array:
-    at = jnp.asarray(times)
-
-    def values(t: Array) -> Array:
-        return held_values(held, drive.units, motion, t, drive.control)
-
-    return jax.jvp(values, (at,), (jnp.ones_like(at),))[1]
+@jax.jit
+def _rates(motion: MotionLaw, times: Array) -> Numbers:
+    return jax.jvp(motion, (times,), (jnp.ones_like(times),))[1]
 
 
 class Solver(Protocol):
@@ -382,15 +380,12 @@ def _drive_cotangent(
         times: those of the solver's stages and of the output.
         bars: derivatives by the held values at both, and by their rates at the output.
     """
-    within, outputs = times
+    within, outputs = (jnp.asarray(at) for at in times)
     units, control = np.asarray(drive.units), drive.control
 
-    def prescribed(motion: MotionLaw) -> tuple[Array, Array, Array]:
-        return (
-            held_values(held, units, motion, within, control),
-            held_values(held, units, motion, outputs, control),
-            _held_rates(held, drive, motion, outputs),
-        )
+    def prescribed(motion: MotionLaw) -> tuple[Numbers, ...]:
+        followed = (motion(within), motion(outputs), _rates(motion, outputs))
+        return tuple(held_values(held, units, each, control) for each in followed)
 
     _, pull_back = jax.vjp(prescribed, drive.motion)
     return PrescribedMotion(

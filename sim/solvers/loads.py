@@ -1,10 +1,13 @@
-"""Prescribes motions of held units as functions of time, in JAX."""
+"""Prescribes motions of held units as functions of time.
+
+A law computes in the library of the times that it is given: at once in NumPy, and in JAX where it
+is differentiated.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
@@ -21,16 +24,17 @@ the series's range."""
 class MotionLaw(Protocol):
     """Motion (n_times, 3) of the driven units: ux, uy (mm), theta (rad)."""
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion at the given times, s."""
         ...
 
 
-def _along(direction: float | Array, displacement: Array) -> Array:
+def _along(direction: float | Array, displacement: Numbers) -> Numbers:
     """Displacement along a direction (rad) without rotation, (n_times, 3)."""
-    still = jnp.zeros_like(displacement)
-    return jnp.stack(
-        [displacement * jnp.cos(direction), displacement * jnp.sin(direction), still], axis=-1
+    xp = displacement.__array_namespace__()
+    still = xp.zeros_like(displacement)
+    return xp.stack(
+        [displacement * xp.cos(direction), displacement * xp.sin(direction), still], axis=-1
     )
 
 
@@ -42,11 +46,11 @@ class Turning(NamedTuple):
 
     course: MotionLaw
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) at the given times, s."""
-        along = self.course(times)[:, 0]
-        still = jnp.zeros_like(along)
-        return jnp.stack([still, still, along], axis=-1)
+        xp, along = times.__array_namespace__(), self.course(times)[:, 0]
+        still = xp.zeros_like(along)
+        return xp.stack([still, still, along], axis=-1)
 
 
 class Harmonic(NamedTuple):
@@ -68,12 +72,12 @@ class Harmonic(NamedTuple):
     rise: float | None = None
     delay: float = 0.0
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) at the given times, s."""
-        shifted = times - self.delay
-        wave = self.amplitude * jnp.sin(2 * jnp.pi * self.frequency * shifted)
+        xp, shifted = times.__array_namespace__(), times - self.delay
+        wave = self.amplitude * xp.sin(2 * xp.pi * self.frequency * shifted)
         if self.rise is not None:
-            wave = wave * (1 + jnp.tanh(shifted / self.rise)) / 2
+            wave = wave * (1 + xp.tanh(shifted / self.rise)) / 2
         return _along(self.direction, wave)
 
 
@@ -85,10 +89,10 @@ class Pulse(NamedTuple):
     direction: float | Array = 0.0
     delay: float = 0.0
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) at the given times, s."""
-        phase = (jnp.asarray(times) - self.delay) / self.width
-        return _along(self.direction, self.amplitude * jnp.exp(-(phase**2)))
+        xp, phase = times.__array_namespace__(), (times - self.delay) / self.width
+        return _along(self.direction, self.amplitude * xp.exp(-(phase**2)))
 
 
 class TanhRamp(NamedTuple):
@@ -98,10 +102,10 @@ class TanhRamp(NamedTuple):
     duration: float
     direction: float | Array = 0.0
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) at the given times, s."""
-        phase = 2 * jnp.asarray(times) / self.duration - 1
-        return _along(self.direction, self.amplitude * (1 + jnp.tanh(6 * phase)) / 2)
+        xp, phase = times.__array_namespace__(), 2 * times / self.duration - 1
+        return _along(self.direction, self.amplitude * (1 + xp.tanh(6 * phase)) / 2)
 
 
 class LinearRamp(NamedTuple):
@@ -111,9 +115,9 @@ class LinearRamp(NamedTuple):
     duration: float
     direction: float | Array = 0.0
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) at the given times, s."""
-        return _along(self.direction, self.amplitude * jnp.asarray(times) / self.duration)
+        return _along(self.direction, self.amplitude * times / self.duration)
 
 
 class Together(NamedTuple):
@@ -127,10 +131,11 @@ class Together(NamedTuple):
     motions: tuple[MotionLaw, ...]
     shares: Floats | Array
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, n_units, 3) at the given times, s."""
-        each = jnp.stack([motion(times) for motion in self.motions])
-        return jnp.einsum("um,mtd->tud", self.shares, each)
+        xp = times.__array_namespace__()
+        each = xp.stack([motion(times) for motion in self.motions])
+        return xp.einsum("um,mtd->tud", self.shares, each)
 
 
 class TimeSeries(NamedTuple):
@@ -144,11 +149,11 @@ class TimeSeries(NamedTuple):
     times: Numbers
     motion: Numbers
 
-    def __call__(self, times: Numbers) -> Array:
+    def __call__(self, times: Numbers) -> Numbers:
         """Motion (n_times, 3) or (n_times, n_units, 3) at the given times, s."""
-        flat = jnp.reshape(self.motion, (len(self.times), -1))
-        columns = [jnp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
-        return jnp.stack(columns, axis=-1).reshape(len(times), *jnp.shape(self.motion)[1:])
+        xp, flat = times.__array_namespace__(), self.motion.reshape(len(self.times), -1)
+        columns = [xp.interp(times, self.times, flat[:, k]) for k in range(flat.shape[1])]
+        return xp.stack(columns, axis=-1).reshape(len(times), *self.motion.shape[1:])
 
 
 def breakpoints(motion: MotionLaw, end: float) -> Floats:
@@ -200,16 +205,13 @@ def held_dofs(clamped: Ints, driven: Ints) -> Ints:
     return (3 * units[:, None] + np.arange(3)).ravel()
 
 
-def held_values(
-    held: Ints, driven: Ints, motion: MotionLaw, times: Numbers, control: Ints | None = None
-) -> Array:
-    """Values (n_times, n_held) of the held dofs when ``driven`` follow ``motion``; the others rest.
+def held_values(held: Ints, driven: Ints, motion: Numbers, control: Ints | None = None) -> Numbers:
+    """Values (n_times, n_held) of the held dofs when ``driven`` follow a motion; the others rest.
 
     Args:
         held: (n_held,) ids, those of the loads last: three of each loaded unit, in their order.
         driven: (n_driven,) units.
-        motion: of them.
-        times: (n_times,) s.
+        motion: (n_times, 3) of all of them, or (n_times, n_driven, 3).
         control: (n_driven, 3) what each component of the motion is; by default a displacement.
 
     Raises:
@@ -225,13 +227,13 @@ def held_values(
     if not found[kinds == DISPLACEMENT].all():
         raise ValueError("every dof of a driven unit must be held")
     load = first + 3 * np.searchsorted(loaded, units)[:, None] + np.arange(3)
-    values = jnp.asarray(motion(jnp.asarray(times)))
-    if values.ndim == 2:
-        values = jnp.broadcast_to(values[:, None, :], (len(times), len(units), 3))
+    if motion.ndim == 2:
+        xp = motion.__array_namespace__()
+        motion = xp.broadcast_to(motion[:, None, :], (len(motion), len(units), 3))
     selection, acts = np.zeros((dofs.size, len(held))), (kinds != FREE).ravel()
     columns = np.where(kinds == FORCE, load, place).ravel()
     selection[np.flatnonzero(acts), columns[acts]] = 1.0
-    return values.reshape(len(times), -1) @ selection
+    return motion.reshape(len(motion), -1) @ selection
 
 
 def loaded_units(units: Ints, control: Ints) -> Ints:

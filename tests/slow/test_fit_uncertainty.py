@@ -8,13 +8,13 @@ import pytest
 from pipeline.calibration import computed_sets, computed_track
 from pipeline.calibration.experiments import full_field
 from pipeline.calibration.experiments.measured_drive import apply_changes
-from pipeline.calibration.experiments.simulated_experiment import KnownDrive
 from pipeline.calibration.fit_uncertainty import estimate_errors, information_lost
 from pipeline.calibration.inputs import TrackedMotion, start_constants
 from pipeline.calibration.least_squares import Fit, FitModel
 from pipeline.comparison import redrive
 from pipeline.runtime import ROOT
 from sim.core import Floats
+from sim.solvers import PrescribedMotion
 from tests.pipeline.calibration.specimens import TRUTH, described, loaded
 
 SPECIMEN = ROOT / "experiments/calibration/specimens/shaken.yaml"
@@ -64,7 +64,7 @@ def by_changes(fit: Fit, unknowns: Floats) -> Floats:
     for one in each.changes:
         ahead, behind = (
             each.simulation.predict(
-                constants, KnownDrive(units, apply_changes(motion, [one], size))
+                constants, PrescribedMotion(units, apply_changes(motion, [one], size))
             )
             for size in (np.array([step]), np.array([-step]))
         )

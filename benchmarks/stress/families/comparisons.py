@@ -6,7 +6,6 @@ from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize
@@ -31,7 +30,7 @@ from benchmarks.stress import (
 )
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
-from sim.solvers import LinearRamp, Solver, TimeSeries, held_values
+from sim.solvers import LinearRamp, Solver, TimeSeries
 from sim.structure import ContactModel, Lattice, listed
 from sim.time_integration import ExplicitSolver, ImplicitSolver
 
@@ -230,11 +229,10 @@ def _by_scipy(case: StressScene) -> Floats:
     top, drive = case.topology, case.drive
     free, held, n = top.free_dofs, top.held, top.n_dofs
     mass, damping = case.values.mass.ravel(), case.values.damping.ravel()
-    at = jax.jit(lambda t: held_values(held, drive.units, drive.motion, t))
     state = np.zeros(n)
 
     def rates(t: float, y: Floats) -> Floats:
-        state[free], state[held] = y[: len(free)], np.asarray(at(np.array([t])))[0]
+        state[free], state[held] = y[: len(free)], drive.values(held, np.array([t]))[0]
         force = balance(case.structure, state).force[free] - damping[free] * y[len(free) :]
         return np.concatenate([y[len(free) :], force / mass[free]])
 

@@ -14,11 +14,7 @@ from jax import Array
 from pipeline import datasets
 from pipeline.calibration.experiments.experiment import ELASTIC, LEAST_LINES, MeasuredValues
 from pipeline.calibration.experiments.load_cycles import prepare_record
-from pipeline.calibration.experiments.simulated_experiment import (
-    KnownDrive,
-    Seen,
-    SpecimenSimulation,
-)
+from pipeline.calibration.experiments.simulated_experiment import Seen, SpecimenSimulation
 from pipeline.calibration.inputs import (
     ConstantName,
     Constants,
@@ -34,7 +30,7 @@ from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
 from sim.scene import strain_energies
-from sim.solvers import TimeSeries, held_dofs
+from sim.solvers import PrescribedMotion, TimeSeries, held_dofs
 from sim.structure import Lattice, Parameters
 
 DIRECTIONS = {"tension": (0.0, 1.0), "compression": (0.0, -1.0), "shear": (1.0, 0.0)}
@@ -154,7 +150,7 @@ def pose_simulation(
         begin.material.density,
         0.0 if contact is None else contact.stiffness,
         StaticSolver(fixed, steps[1:], relative=TOLERANCE),
-        KnownDrive(top, TimeSeries(steps, motion)),
+        PrescribedMotion(top, TimeSeries(steps, motion)),
         force_on(lattice, top, towards),
     )
 

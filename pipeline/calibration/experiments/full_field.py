@@ -13,7 +13,6 @@ from pipeline.calibration.experiments.load_cell import LoadCellReadings, read_lo
 from pipeline.calibration.experiments.measured_drive import DriveChange, apply_changes, smooth_drive
 from pipeline.calibration.experiments.simulated_experiment import (
     AnySolver,
-    KnownDrive,
     Seen,
     SpecimenSimulation,
 )
@@ -26,6 +25,7 @@ from sim.core import Floats, Ints, Numbers
 from sim.energy import topology
 from sim.quasistatics import StaticSolver
 from sim.scene import TURN_ALLOWANCE, Scene
+from sim.solvers import PrescribedMotion
 from sim.structure import DistanceContact, Parameters
 from sim.time_integration import ImplicitSolver
 
@@ -61,7 +61,7 @@ class FullFieldExperiment:
     simulation: SpecimenSimulation
     sees: tuple[ConstantName, ...]
     changes: tuple[DriveChange, ...]
-    drive: KnownDrive | None = None
+    drive: PrescribedMotion | None = None
     part: Floats = field(default_factory=lambda: np.zeros(()))
 
     @property
@@ -109,11 +109,14 @@ class FullFieldExperiment:
         if len(self.measured.spread):
             size = self.measured.causes(self.measured.values - self.predict(constants, np.zeros(0)))
         units, motion = simulation.drive.units, apply_changes(filtered, self.changes, size)
-        drive = KnownDrive(units, motion)
+        drive = PrescribedMotion(units, motion)
         middle = simulation.predict(constants, drive)
         moved = (apply_changes(motion, [each], np.ones(1)) for each in self.changes)
         causes = np.stack(
-            [simulation.predict(constants, KnownDrive(units, each)) - middle for each in moved],
+            [
+                simulation.predict(constants, PrescribedMotion(units, each)) - middle
+                for each in moved
+            ],
             axis=1,
         )
         measured = self.measured.with_common(causes)
@@ -158,7 +161,7 @@ def pose_track(
         _solver(
             driven, shown["time"].values - track["time"].values[0], len(drive.held.motion.value)
         ),
-        KnownDrive(drive.held.unit, drive.held.motion),
+        PrescribedMotion(drive.held.unit, drive.held.motion),
         _seen(chosen, load),
         made.stiffer,
     )

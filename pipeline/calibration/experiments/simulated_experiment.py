@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import Literal
+from functools import cached_property
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from pipeline.calibration.inputs import Constants
-from sim.core import Floats, Ints, Numbers
+from sim.core import Floats, Numbers
 from sim.quasistatics import StaticSolver
 from sim.scene import GradientChain
 from sim.solvers import (
@@ -21,7 +20,6 @@ from sim.solvers import (
     PrescribedMotion,
     concrete,
     differentiable_motion,
-    held_values,
     solve_cases,
 )
 from sim.structure import Lattice, Material, Parameters, parameters, shape
@@ -31,43 +29,6 @@ AnySolver = StaticSolver | ImplicitSolver
 
 Seen = Callable[[Numbers, Parameters], Array]
 """What is measured of a motion (n_times, n_units, 3) of given parameters."""
-
-
-class KnownDrive(PrescribedMotion):
-    """Drives units by values that are computed once: a fit asks for the same ones often."""
-
-    def values(self, held: Ints, times: Floats) -> Floats:
-        """See ``sim.solvers.base.PrescribedMotion``."""
-        return self._once("values", held, times)
-
-    def rates(self, held: Ints, times: Floats) -> Floats:
-        """See ``sim.solvers.base.PrescribedMotion``."""
-        return self._once("rates", held, times)
-
-    def _once(self, what: Literal["values", "rates"], held: Ints, times: Floats) -> Floats:
-        memory = self.__dict__.setdefault("memory", {})
-        if (key := (what, held.tobytes(), times.tobytes())) not in memory:
-            units = np.asarray(self.units, dtype=np.int64)
-            compute = _followed(held.tobytes(), units.tobytes(), what)
-            memory[key] = np.asarray(compute(self.motion, times))
-        return memory[key]
-
-
-@lru_cache(maxsize=64)
-def _followed(
-    held: bytes, units: bytes, what: Literal["values", "rates"]
-) -> Callable[[MotionLaw, Numbers], Array]:
-    """Compiled function to the values or rates of the held dofs when units follow a motion."""
-    dofs, moved = (np.frombuffer(each, dtype=np.int64) for each in (held, units))
-
-    def values(motion: MotionLaw, times: Numbers) -> Array:
-        return held_values(dofs, moved, motion, times)
-
-    def rates(motion: MotionLaw, times: Numbers) -> Array:
-        at = jnp.asarray(times)
-        return jax.jvp(lambda t: values(motion, t), (at,), (jnp.ones_like(at),))[1]
-
-    return jax.jit(values if what == "values" else rates)
 
 
 @dataclass(frozen=True)
@@ -90,7 +51,7 @@ class SpecimenSimulation:
     density: float
     contact: float
     solver: AnySolver
-    drive: KnownDrive
+    drive: PrescribedMotion
     seen: Seen
     stiffer: Floats = field(default_factory=lambda: np.ones(1))
 
@@ -119,7 +80,7 @@ class SpecimenSimulation:
     def _compiled(self) -> Seen:
         return jax.jit(self.seen)
 
-    def predict(self, constants: Constants, drive: KnownDrive | None = None) -> Floats:
+    def predict(self, constants: Constants, drive: PrescribedMotion | None = None) -> Floats:
         """(n,) what is measured of a specimen, under another drive if one is given.
 
         Raises:
@@ -131,7 +92,7 @@ class SpecimenSimulation:
         return np.asarray(self._compiled(motion[0], made))
 
     def pulled_back(
-        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+        self, constants: Constants, bar: Floats, drive: PrescribedMotion | None = None
     ) -> Floats:
         """Derivatives (5,) of `bar @ predict` by the specimen's numbers, by the adjoint.
 
@@ -146,7 +107,7 @@ class SpecimenSimulation:
         )[1]
 
     def pulled_to_drive(
-        self, constants: Constants, bar: Floats, drive: KnownDrive | None = None
+        self, constants: Constants, bar: Floats, drive: PrescribedMotion | None = None
     ) -> MotionLaw:
         """Derivatives of `bar @ predict` by the numbers of the drive's motion, by the adjoint.
 

@@ -7,13 +7,11 @@ import pytest
 import xarray as xr
 
 from pipeline.calibration.experiments.measured_drive import SmoothedDrive, smooth_drive
-from pipeline.calibration.experiments.simulated_experiment import KnownDrive
 from pipeline.posing import scene_of
 from pipeline.problem.reading import load
 from pipeline.runtime import ROOT
 from sim.core import Floats
 from sim.scene import Scene
-from sim.solvers import LinearRamp
 
 SHAKEN = ROOT / "experiments/calibration/specimens/shaken.yaml"
 SIGMA = np.array([0.01, 0.01, 0.001])
@@ -93,12 +91,3 @@ def test_frames_without_a_unit_are_bridged(scene: Scene) -> None:
     error = np.sqrt(np.sum(spread, axis=0))
     assert (np.abs(along_x(found)[:, 0] - course(knots)) < 5 * error + 1e-12).all()
     assert error.max() > 2 * np.median(error)
-
-
-def test_a_known_drive_is_computed_once_for_each_set_of_held_dofs() -> None:
-    drive = KnownDrive(np.array([2]), LinearRamp(1.0, 1.0))
-    times = np.array([0.5, 1.0])
-    few, many = np.array([6, 7, 8]), np.array([0, 1, 6, 7, 8])
-    assert drive.values(few, times) is drive.values(few, times)
-    assert drive.values(many, times).shape == drive.rates(many, times).shape == (2, 5)
-    np.testing.assert_array_equal(drive.values(many, times)[:, 2:], drive.values(few, times))

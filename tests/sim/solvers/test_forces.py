@@ -168,7 +168,7 @@ def test_forces_are_shared_as_asked() -> None:
     forces = drive.forces(np.array([0.5]))
     np.testing.assert_allclose(forces[0], [[0.25, 0.0, 0.0], [0.75, 0.0, 1.5]])
     held = np.append([0, 1, 2], 75 + np.arange(6))
-    values = held_values(held, drive.units, motion, np.array([0.5]), drive.control)
+    values = held_values(held, drive.units, motion(np.array([0.5])), drive.control)
     np.testing.assert_allclose(values, [[0, 0, 0, 0.75, 0, 1.5, 0.25, 0, 0]])
 
 

@@ -6,9 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from sim.core import Floats, Numbers
 from sim.solvers import Harmonic
@@ -26,10 +24,11 @@ class Pulse(NamedTuple):
     duration: float
     direction: float
 
-    def __call__(self, times: Numbers) -> Array:
-        push = self.amplitude * jnp.sin(jnp.pi * times / (2 * self.duration)) ** 6
-        c, s = jnp.cos(self.direction), jnp.sin(self.direction)
-        return jnp.stack([c * push, s * push, 0.02 * push], axis=-1)
+    def __call__(self, times: Numbers) -> Numbers:
+        xp = times.__array_namespace__()
+        push = self.amplitude * xp.sin(xp.pi * times / (2 * self.duration)) ** 6
+        c, s = xp.cos(self.direction), xp.sin(self.direction)
+        return xp.stack([c * push, s * push, 0.02 * push], axis=-1)
 
 
 def pulsed() -> Rig:
