@@ -48,8 +48,8 @@ HEAVY = (
 PROJECT = ("sim", "pipeline", "reports", "benchmarks", "tests", "metacloak")
 LONGEST, BUDGET = 15.0, 25.0
 """Seconds of CPU that a file of tests may take unchanged, and all of a module's."""
-ENDS = {0: "survived", 1: "killed", 2: "killed"}
-"""By the exit code of pytest: some fail, or the module cannot be imported."""
+ENDS = {0: "survived", 1: "killed", 2: "killed", 4: "killed"}
+"""By the exit code of pytest: some fail, or a module cannot be imported."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +135,8 @@ def tried(root: Path, mutant: dict[str, str]) -> dict[str, object]:
     """Writes a mutant over its module, runs the tests, and puts the module back."""
     path = root / mutant["path"]
     tests, seconds = matching(root, mutant["path"])
+    if not tests:
+        return {"path": mutant["path"], "operator": mutant["operator"], "end": "no quick tests"}
     good, times = path.read_bytes(), path.stat()
     path.write_text(mutant["code"], encoding="utf-8")
     os.utime(path, (times.st_atime, times.st_mtime + 10))  # its bytecode is not that of before

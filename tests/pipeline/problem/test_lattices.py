@@ -55,12 +55,16 @@ def as_netcdf(path: Path, lattice: Lattice) -> None:
 
 
 def as_dxf(path: Path, lattice: Lattice) -> None:
-    """As one draws it by hand: in cm, some units clockwise, ends of ligaments not quite met."""
+    """As one draws it by hand: in cm, some units clockwise, ends of ligaments not quite met.
+
+    Some polylines are closed by their last corner, too.
+    """
     drawing = new(units=InsertUnits.Centimeters)
     space = drawing.modelspace()
     for unit in range(lattice.n_units):
         ring = lattice.vertices[lattice.unit == unit] / 10
-        space.add_lwpolyline(ring[:: -1 if unit % 3 else 1].tolist(), close=True)
+        corners = ring[:: -1 if unit % 3 else 1].tolist()
+        space.add_lwpolyline(corners + corners[:1] * (unit % 2), close=True)
     for start, end in (lattice.vertices[lattice.ligaments] / 10 + 0.01).tolist():
         space.add_line(start, end)
     drawing.saveas(path)

@@ -1,5 +1,7 @@
 from pathlib import Path
 
+import pytest
+
 from pipeline.runtime import CaseLog, SweepResult, case_log
 
 FOUND = {
@@ -20,3 +22,19 @@ def test_a_damaged_line_is_computed_again_and_no_other(tmp_path: Path) -> None:
         assert case_log.known(tmp_path) == {k: each for k, each in FOUND.items() if k != at - 1}
     path.write_bytes(text.encode()[:-20])
     assert case_log.known(tmp_path) == {k: each for k, each in FOUND.items() if k != 4}
+
+
+@pytest.mark.parametrize("setting", ["1 Hz", "10 Hz"])
+def test_what_a_kill_left_of_a_line_is_cut_off_and_nothing_else(
+    tmp_path: Path, setting: str
+) -> None:
+    path = tmp_path / "part_0.csv"
+    with CaseLog(path, ["drive.frequency"]) as book:
+        book.add([(0, [setting], FOUND[0])])
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"1,unfinish")
+    with CaseLog(path, ["drive.frequency"]) as book:
+        book.add([(1, [setting], FOUND[1])])
+    assert path.read_bytes().startswith(whole)
+    assert path.read_bytes().count(b"\n") == whole.count(b"\n") + 1
+    assert case_log.known(tmp_path) == {k: FOUND[k] for k in (0, 1)}
