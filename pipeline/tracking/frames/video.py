@@ -202,7 +202,8 @@ def _projected(frame: av.VideoFrame, axis: Floats) -> Picture:
 def _decoded(
     container: av.container.InputContainer, path: Path, start: float, end: float
 ) -> Iterator[Frame]:
-    if not container.streams.video:
+    # a file cut off within its index has a stream of which nothing tells how to decode it
+    if not container.streams.video or container.streams.video[0].codec_context is None:
         raise UserError("the file holds no video", file=path, remedy="give a video file")
     stream = container.streams.video[0]
     if stream.width * stream.height > _LARGEST:

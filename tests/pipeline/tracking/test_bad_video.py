@@ -137,3 +137,11 @@ def test_a_specimen_that_jumped_is_found_again(
     inside = ((wanted > 20) & (wanted < WIDTH - 21)).all(axis=1)
     assert (track.quality[1:, inside] == 0).all()
     assert np.abs(seen - wanted)[inside].max() < 0.5
+
+
+def test_a_video_cut_off_within_its_index_is_told(tmp_path: Path) -> None:
+    content = (CLIPS / "f_silhouette.mp4").read_bytes()
+    path = tmp_path / "cut.mp4"
+    path.write_bytes(content[:-583])
+    with pytest.raises(UserError, match="holds no video"):
+        list(read_frames(path))
