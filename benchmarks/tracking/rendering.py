@@ -13,6 +13,7 @@ from typing import NamedTuple, TypeAlias, cast
 import av
 import cv2
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.tracking.geometry import SpecimenOutlines
 from sim.core import Floats, Image, Singles
@@ -55,6 +56,11 @@ class View(NamedTuple):
     dark: float = 30.0
     light: float = 205.0
     noise: tuple[float, float] = (2.0, 0.12)
+
+    def variance(self, brightness: Floats) -> Floats:
+        """Computes the variance of the sensor's noise."""
+        still, shot = self.noise
+        return np.asarray(still**2 + shot**2 * np.maximum(brightness, 0))
 
     def project(self, points: Floats) -> Floats:
         """Maps points (..., 2) in mm about the specimen's middle to pixels, y down."""
@@ -101,12 +107,15 @@ class Renderer:
 
     def frame(self, time: float) -> Singles:
         """Returns brightness (rows, columns) of a frame whose exposure is centred about a time."""
+        clean = self.clean(time)
+        spread = np.sqrt(self._view.variance(clean))
+        return np.asarray(clean + spread * self._random.normal(size=clean.shape), np.float32)
+
+    def clean(self, time: float) -> Floats:
+        """Returns what a frame would be without noise."""
         instants = self._view.exposure * (np.arange(n := self._instants(time)) + 0.5) / n
         shown = [self._instant(time + at - self._view.exposure / 2) for at in instants]
-        clean = np.mean(shown, axis=0)
-        still, shot = self._view.noise
-        spread = np.sqrt(still**2 + shot**2 * np.maximum(clean, 0))
-        return np.asarray(clean + spread * self._random.normal(size=clean.shape), np.float32)
+        return np.asarray(np.mean(shown, axis=0))
 
     def _instants(self, time: float) -> int:
         if not self._view.exposure:
@@ -151,6 +160,42 @@ class Renderer:
         )
         shift = np.stack([x, y], axis=-1)
         return self._view.project(self._centre[unit] - self._middle + turned + shift)
+
+
+def pose_bound(
+    specimen: SpecimenOutlines, motion: Motion, view: View, time: float, cover: Covering | None
+) -> Floats:
+    """Computes the Cramer-Rao bound (units, 3), mm and rad, of poses in one frame of 8 bits.
+
+    It is NaN out of view. The covariance of a pose p is at least the inverse of
+    sum dI/dp dI/dp' / variance over the pixels, of which each is told off to the nearest unit.
+    """
+    steps = np.array([0.02, 0.02, 0.003])
+    slopes = []
+    for change in np.diag(steps):
+        ends = [
+            Renderer(specimen, _moved_by(motion, sign * change), view, cover).clean(time)
+            for sign in (1, -1)
+        ]
+        slopes.append((ends[0] - ends[1]) / (2 * change.sum()))
+    clean = Renderer(specimen, motion, view, cover).clean(time)
+    moved = specimen.centre - specimen.centre.mean(axis=0) + motion(np.array([time]))[0, :, :2]
+    rows, columns = np.indices(clean.shape)
+    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1)
+    nearest = cKDTree(view.project(moved)).query(pixels)[1]
+    weight = (1 / (view.variance(clean) + 1 / 12)).ravel()
+    information = np.empty((specimen.count, 3, 3))
+    for first, second in np.ndindex(3, 3):
+        product = slopes[first].ravel() * slopes[second].ravel() * weight
+        information[:, first, second] = np.bincount(nearest, product, specimen.count)
+    shown = np.linalg.matrix_rank(information) == 3
+    found = np.full((specimen.count, 3), np.nan)
+    found[shown] = np.sqrt(np.diagonal(np.linalg.inv(information[shown]), axis1=1, axis2=2))
+    return found
+
+
+def _moved_by(motion: Motion, change: Floats) -> Motion:
+    return lambda time: motion(time) + change
 
 
 def covered(shape: tuple[int, int], polygons: list[Floats]) -> Floats:

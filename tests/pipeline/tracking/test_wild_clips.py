@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.tracking.wild_clips import WildClip, errors, make, tracked
+from benchmarks.tracking.rendering import View, pose_bound
+from benchmarks.tracking.wild_clips import WildClip, errors, make, specimen, tracked
 from pipeline.runtime import UserError
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
@@ -53,6 +54,20 @@ def test_sigma_holds_while_a_specimen_sticks_and_slips(tmp_path: Path) -> None:
 def test_the_blur_of_a_camera_is_measured(tmp_path: Path) -> None:
     _, track = shown("soft_focus", tmp_path, 2)
     assert track.calibration.blur / track.calibration.pixel == pytest.approx(1.1, rel=0.2)
+
+
+def test_the_bound_of_squares_is_that_of_their_edges() -> None:
+    """Of edges that are blurred by b: a length l tells l cos^2 C^2 / 2 sqrt(pi) b of the place."""
+    squares, still = specimen(), np.zeros((1, 81, 3))
+    view = View(distance=1e6, tilt=0.0, noise=(2.0, 0.0))
+    found = pose_bound(squares, lambda _: still, view, 0.0, None)
+    side = 4.0 * (15.0 - 2.3) / np.cos(np.deg2rad(20.0)) / np.sqrt(2.0)  # px
+    contrast, noise, blur = 175.0, 4.0 + 1 / 12, np.sqrt(0.7**2 + 1 / 12)
+    along = contrast**2 / (2 * np.sqrt(np.pi) * blur * noise)
+    place = 1 / np.sqrt(along * 2 * side) / 4.0  # mm: of four edges, cos^2 and sin^2
+    turn = 1 / np.sqrt(along * 4 * side**3 / 12)  # each edge's lever along itself
+    np.testing.assert_allclose(found[:, :2], place, rtol=0.03)
+    np.testing.assert_allclose(found[:, 2], turn, rtol=0.12)  # the blur takes of the corners
 
 
 def test_a_picture_shown_again_is_told(tmp_path: Path) -> None:
