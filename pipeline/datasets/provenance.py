@@ -9,11 +9,15 @@ import hashlib
 import json
 import platform
 import subprocess
+import sys
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_info
 
 from pipeline.problem import Problem, canonical_json, section_hash
 from pipeline.runtime import INSTALLED, ROOT, UserError, version
@@ -110,13 +114,39 @@ def file_hash(path: Path) -> str:
 @lru_cache(maxsize=1)
 def package_versions() -> Mapping[str, str]:
     """Versions of Python and of the packages that results depend on, and the instructions used."""
-    found = {"python": platform.python_version(), "instructions": instruction_set.level()}
+    found = {"python": platform.python_version(), "instructions": instructions()}
     for name in PACKAGES:
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             found[name] = "absent"
     return found
+
+
+def instructions() -> str:
+    """Names the level of instructions, and what is loaded of NumPy, BLAS and Numba that leaves it.
+
+    A library keeps to the level only if it is loaded after that is asked for. Of XLA nothing can be
+    seen: it reads its flag when it first compiles.
+    """
+    core = np._core._multiarray_umath  # type: ignore[attr-defined]
+    wider = [
+        each
+        for each in core.__cpu_dispatch__
+        if core.__cpu_features__[each] and each.startswith(("X86_V4", "AVX512"))
+    ]
+    blas = {row.get("architecture", "Haswell") for row in threadpool_info()} - {"Haswell"}
+    numba = sys.modules.get("numba.core.config")
+    target = None if numba is None else numba.CPU_NAME
+    found = {
+        "NumPy": wider,
+        "OpenBLAS": sorted(blas),
+        "Numba": [] if target in (None, instruction_set.LEVEL) else [target],
+    }
+    told = ", ".join(f"{name} {' '.join(each)}" for name, each in found.items() if each)
+    if not (told and instruction_set.can_pin()):
+        return instruction_set.level()
+    return f"{instruction_set.LEVEL} asked for, but loaded before that: {told}"
 
 
 @lru_cache(maxsize=1)

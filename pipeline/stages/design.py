@@ -75,7 +75,10 @@ def work(args: argparse.Namespace) -> None:
     _check_symmetry(scene, args.problem)
     start = start_vector(asked, scene, args.start, args.problem)
     plan = _plan(scene, args)
-    results = [_descend(posed, scene, plan, start, args) for posed in _seeded(asked, args.method)]
+    results = [
+        _descend(posed, scene, plan, _kicked(start, number, posed, scene), args)
+        for number, posed in enumerate(_seeded(asked, args.method))
+    ]
     made = design_dataset(asked, scene, min(results, key=_merit))
     parents = {} if args.start is None else {"start": args.start}
     found = plan.record() | {"descents": [each.loss for each in results]}
@@ -87,6 +90,14 @@ def _seeded(asked: Problem, method: str) -> list[Problem]:
     """Poses the problem with the seed of each descent; MMA has no use for any."""
     first, count = asked.optimiser.seed, asked.optimiser.descents if method == "sqp" else 1
     return [asked.with_optimiser(seed=seed) for seed in range(first, first + count)]
+
+
+def _kicked(start: Floats | None, number: int, asked: Problem, scene: Scene) -> Floats | None:
+    """Shifts the start of every descent but the first at random, by the optimiser's kick."""
+    if number == 0:
+        return start
+    kick, random = asked.optimiser.kick, np.random.default_rng([asked.optimiser.seed, number])
+    return (0.0 if start is None else start) + random.uniform(-kick, kick, scene.space.n_variables)
 
 
 def _merit(result: Result) -> tuple[float, float]:

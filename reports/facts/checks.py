@@ -54,7 +54,7 @@ def history_facts(problem: Problem, design: xr.Dataset) -> Iterator[Fact]:
     if len(losses) > 1:
         unit, label = design["best_loss"].attrs["units"], f"Losses of {len(losses)} descents"
         words = f"{worded(min(losses), unit, 3)} to {worded(max(losses), unit, 3)}"
-        note = "with other seeds; the best is shipped"
+        note = "with other seeds and starts; the best is shipped"
         yield Fact("descents", label, max(losses) / min(losses), "1", words, note=note)
 
 
@@ -90,7 +90,7 @@ def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     found = json.loads(design.attrs["packages"])["instructions"]
     note = f"of its vertices; the same on every processor with {instruction_set.LEVEL}"
     if found != instruction_set.LEVEL:
-        note = f"of its vertices; by the instructions {found}, elsewhere it may be another design"
+        note = f"of its vertices; instructions: {found}; elsewhere it may be another design"
     yield Fact("design_hash", "Hash of the design", np.nan, "1", design_hash(design), note=note)
 
 

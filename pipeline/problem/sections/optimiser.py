@@ -51,7 +51,7 @@ class Optimiser(Section):
         trust_radius: at the start.
         trust_radius_max: at most.
         kick: random shifts with which an optimisation that has ended goes on, as far as its
-            budget allows.
+            budget allows, and with which descents after the first start.
         seed: of the kicks.
         descents: number of optimisations by SQP, with this seed and the next ones; the best is
             shipped, the losses of all are kept.

@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -6,6 +9,8 @@ import pytest
 from pipeline.datasets import provenance
 from pipeline.problem import from_canonical, section_hash
 from pipeline.problem.reading import load
+from pipeline.runtime import ROOT
+from sim.core.instruction_set import LEVEL, LIBRARIES, can_pin
 
 
 def test_attributes_tell_where_a_dataset_comes_from(fig2: Path) -> None:
@@ -54,3 +59,23 @@ def test_the_hash_of_a_folder_goes_by_names_and_contents(tmp_path: Path) -> None
     renamed = provenance.file_hash(second)
     (second / "2.png").write_bytes(b"other")
     assert len({provenance.file_hash(first), renamed, provenance.file_hash(second)}) == 3
+
+
+LATE = """
+import {first}
+from pipeline.datasets import provenance
+import scipy.linalg
+from sim.quasistatics import newton
+print(provenance.instructions())
+"""
+
+
+@pytest.mark.skipif(not can_pin(), reason="this processor lacks the level")
+@pytest.mark.parametrize("first", ["pipeline", "numpy"])
+def test_instructions_are_those_that_were_loaded(first: str) -> None:
+    words = [sys.executable, "-c", LATE.format(first=first)]
+    clean = {name: value for name, value in os.environ.items() if name not in LIBRARIES}
+    told = subprocess.run(words, cwd=ROOT, env=clean, capture_output=True, text=True, check=True)
+    late = first == "numpy" and "avx512f" in Path("/proc/cpuinfo").read_text()
+    assert (told.stdout.strip() == LEVEL) is not late
+    assert ("NumPy X86_V4" in told.stdout) is late
