@@ -1,5 +1,7 @@
 from . import newton as newton
 from . import static_solver as static_solver
+from .arc_length import Trace as Trace
+from .arc_length import trace as trace
 from .eigenvalue import eigenvalue_and_slopes as eigenvalue_and_slopes
 from .eigenvalue import lowest_eigenpair as lowest_eigenpair
 from .equilibrium_path import BRANCHING as BRANCHING

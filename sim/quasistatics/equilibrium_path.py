@@ -18,7 +18,6 @@ from sim.energy import Bars, System, Workspace, admissible_step, hessian_product
 from sim.quasistatics.newton import (
     INCREMENTS,
     KEEP_FROM_BARRIER,
-    SHIFTED,
     correct,
     factorise_shifted,
     factorise_tangent,
@@ -56,6 +55,8 @@ EIGENVALUE = 1e-6
 INCREMENT, VALUE, RATE, FIRST = 0, 1, 2, 3
 """Places in the pace: part of the way to go next, smallest eigenvalue, rate of change of its square
 over the length of the held dofs' way, and eigenvalue of the first state."""
+MOST_SNAPS = 64
+"""Snaps of a path that are recorded."""
 SMOOTH, LIMIT_POINT, BRANCHING = 0, 1, 2
 """Kinds of the way to a load."""
 
@@ -69,7 +70,10 @@ class Branch(NamedTuple):
         stable: (n_loads,) whether each is a minimum of the energy.
         jumped: (n_loads,) whether the path ended on the way there, in a limit point or a branching,
             and went on after a jump.
-        snapped: (n_loads,) part of the way from the load before at which it did; NaN if it did not.
+        snapped: (n_loads,) part of the way from the load before at which it last did; NaN if it did
+            not.
+        snaps: (MOST_SNAPS,) where the first of all did, in order: number of the load ahead, and the
+            part of the way to it; NaN behind them.
         eigenvalue: (n_loads,) smallest one of the tangent, with rotations times the scale, N/mm.
     """
 
@@ -78,6 +82,7 @@ class Branch(NamedTuple):
     stable: Ints
     jumped: Ints
     snapped: Floats
+    snaps: Floats
     eigenvalue: Floats
 
 
@@ -117,10 +122,8 @@ def _settle(
 
     The workspace then holds a factor of that.
     """
-    shifted = counts[SHIFTED]
-    found = correct(motion, relative, absolute, system, work, counts)
-    definite = found and counts[SHIFTED] == shifted
-    return definite and factorise_tangent(motion, system, work, 0.0, counts)
+    found = correct(motion, relative, absolute, False, system, work, counts)
+    return found and factorise_tangent(motion, system, work, 0.0, counts)
 
 
 @inlined
@@ -225,15 +228,26 @@ def _step_ahead(
 
 
 @inlined
+def _note(snaps: Floats, place: float) -> None:
+    """Appends a snap to those recorded."""
+    for i in range(len(snaps)):
+        if np.isnan(snaps[i]):
+            snaps[i] = place
+            break
+
+
+@inlined
 def _advance(
-    motion: Floats, load: Floats, sense: float, pace: Floats, mode: Floats, predicted: Floats,
-    drag: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints,
+    motion: Floats, load: Floats, number: int, sense: float, pace: Floats, mode: Floats,
+    predicted: Floats, drag: Floats, relative: float, absolute: float, system: System,
+    work: Workspace, snaps: Floats, counts: Ints,
 ) -> tuple[float, int, float]:  # fmt: skip
     """Follows the path to one load; the workspace holds a factor of the tangent before and after.
 
     Args:
         motion: moved.
         load: (n_held,).
+        number: of the load.
         sense: see ``_leave``.
         pace: (4,) see ``INCREMENT``; changed.
         mode: (n_free,) eigenvector of the smallest eigenvalue, S v; changed.
@@ -243,6 +257,7 @@ def _advance(
         absolute: its floor, N.
         system: the structure.
         work: see above.
+        snaps: gathers them, see ``Branch``.
         counts: gathers the work.
 
     Returns:
@@ -285,6 +300,7 @@ def _advance(
                 break
             if end != SMOOTH:
                 kind, ended = end, done
+                _note(snaps, number + done)
             done = 1.0 if share == 1.0 else done + share * (1.0 - done)
             pace[INCREMENT], pace[RATE] = CLOSE, 0.0
             pace[VALUE] = lowest_mode(system, work, mode, SWEEPS, 0.0)
@@ -341,7 +357,7 @@ def follow(
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
     mode = np.sin(1.0 + np.arange(len(system.dofs)))
     # rest itself may be out of balance: a void may start in contact
-    if not correct(motion, relative, absolute, system, work, counts):
+    if not correct(motion, relative, absolute, True, system, work, counts):
         return 0, 0.0
     if not factorise_tangent(motion, system, work, 0.0, counts):
         factorise_shifted(motion, system, work, counts)
@@ -349,7 +365,7 @@ def follow(
             motion, motion[system.held], 0.0, mode, sense, np.inf, drag, relative, absolute,
             system, work, counts,
         )  # fmt: skip
-        branch.snapped[0] = 0.0
+        branch.snapped[0] = branch.snaps[0] = 0.0
         if share < 0.0:
             return 0, 0.0
     first = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
@@ -365,8 +381,8 @@ def follow(
                 done, pace[RATE] = 1.0, 0.0
         if done < 1.0:
             done, kind, ended = _advance(
-                motion, loads[p], sense, pace, mode, step, drag, relative, absolute, system, work,
-                counts,
+                motion, loads[p], p, sense, pace, mode, step, drag, relative, absolute, system,
+                work, branch.snaps, counts,
             )  # fmt: skip
             branch.jumped[p], branch.snapped[p] = max(kind, branch.jumped[p]), ended
         branch.states[p] = motion

@@ -128,16 +128,23 @@ def _descend(
 
 @compiled
 def correct(
-    motion: Floats, relative: float, absolute: float, system: System, work: Workspace, counts: Ints
-) -> bool:
-    """Newton descent at fixed held dofs; True once the residual is below its tolerance."""
+    motion: Floats, relative: float, absolute: float, shifted: bool, system: System,
+    work: Workspace, counts: Ints,
+) -> bool:  # fmt: skip
+    """Newton descent at fixed held dofs; True once the residual is below its tolerance.
+
+    Unless tangents may be ``shifted``, it gives up at the first that is indefinite.
+    """
     energy, residual, reaction = balance(motion, system, work)
     counts[GRADIENTS] += 1
     keep, shift, first = False, 0.0, _first_shift(system)
     for _ in range(MAX_CORRECTIONS):
         if residual <= max(relative * reaction, absolute):
             return True
-        if not keep:
+        if not (keep or shifted):
+            if not factorise_tangent(motion, system, work, 0.0, counts):
+                return False
+        elif not keep:
             shift = _factorise(motion, system, work, first, counts)
             if shift < 0.0:
                 return False

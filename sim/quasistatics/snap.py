@@ -112,7 +112,7 @@ def relax(
         if moved < AT_REST and factorise_tangent(motion, system, work, 0.0, counts):
             solve_free(system, work)
             if _largest(work.step, system) < AT_REST:
-                found = correct(motion, relative, absolute, system, work, counts)
+                found = correct(motion, relative, absolute, True, system, work, counts)
                 return found and factorise_tangent(motion, system, work, 0.0, counts)
     return False
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, SimulationError
 from sim.energy import Topology, as_values, empty_bars, system_of
-from sim.quasistatics.equilibrium_path import Branch, adjoint, follow
+from sim.quasistatics.equilibrium_path import MOST_SNAPS, Branch, adjoint, follow
 from sim.solvers import PrescribedMotion, check_connected, check_ligaments, check_start
 from sim.structure import ConcreteParameters
 
@@ -33,6 +33,7 @@ class StaticRecord:
             the topology's scale, N/mm.
         counts: (4,) gradients, factorisations, shifted factorisations, increments.
         topology: as solved, with room for all units that met; None if it was the solver's.
+        snaps: (n_snaps,) load parameters at which it jumped, all of them in order.
     """
 
     states: Floats
@@ -43,6 +44,7 @@ class StaticRecord:
     eigenvalue: Floats
     counts: Ints
     topology: Topology | None = None
+    snaps: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,8 @@ class StaticSolver:
         last = slice(self.substeps - 1, None, self.substeps)
         before = np.concatenate([[0.0], self._passed[:-1]])
         snapped = (before + branch.snapped * (self._passed - before)).reshape(-1, self.substeps)
+        places = branch.snaps[np.isfinite(branch.snaps)]
+        ways = np.minimum(places.astype(np.int64), len(before) - 1)
         return StaticRecord(
             branch.states[last].copy(),
             branch.tangents[last].copy(),
@@ -141,6 +145,7 @@ class StaticSolver:
             branch.eigenvalue[last].copy(),
             counts,
             self.topology,
+            before[ways] + (places - ways) * (self._passed - before)[ways],
         )
 
     @property
@@ -180,4 +185,6 @@ def _empty_branch(n_loads: int, n_dofs: int) -> Branch:
     states, tangents = (np.zeros((n_loads, n_dofs)) for _ in range(2))
     stable, jumped = (np.zeros(n_loads, dtype=np.int64) for _ in range(2))
     snapped, eigenvalue = (np.full(n_loads, np.nan) for _ in range(2))
-    return Branch(states, tangents, stable, jumped, snapped, eigenvalue)
+    return Branch(
+        states, tangents, stable, jumped, snapped, np.full(MOST_SNAPS, np.nan), eigenvalue
+    )

@@ -1,0 +1,220 @@
+"""Traces paths of equilibria by arc length, past the points where they turn back.
+
+A path under a growing load ends where its tangent K becomes singular, and the structure snaps. The
+path itself goes on: with the scaled free dofs x = S u and the way a of the held dofs as unknowns,
+
+    g(x, a) = 0,    t . (x - x0, a - a0) = ds,
+
+t being the path's tangent at the point before, is regular in a limit point too (Riks 1979, Int. J.
+Solids Struct. 15, 529). Beyond it equilibria are unstable until the path turns forward again.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+from scipy.optimize import brentq
+
+from sim.collision import raise_new_pairs
+from sim.core import Floats, Ints, NewContactPairs
+from sim.energy import System, Topology, gradient, hessian_product, system_of, workspace
+from sim.solvers import PrescribedMotion
+from sim.structure import ConcreteParameters
+from sim.vibration import linearised
+
+FIRST_LENGTH, LONGEST, SHORTEST = 0.05, 2.0, 1e-6
+"""Arc length of a step, in mm of the root of the summed squares of all dofs."""
+BEND = 0.3
+"""Angle between the tangents at both ends of a step at most, rad."""
+CORRECTIONS, FAST = 8, 4
+"""Newton steps of a point at most, and those up to which the next step is longer."""
+BALANCED = 1e-9
+"""Newton step at which a point counts as found, mm."""
+NEAREST, FEW = 4, 20
+"""Eigenvalues about zero of which the smallest is told, and dofs below which all are computed."""
+
+
+class Trace(NamedTuple):
+    """Holds points of a path, in the order in which it passes them.
+
+    Attributes:
+        loads: (n_points,) load parameters.
+        states: (n_points, n_dofs) equilibria, stable or not.
+        eigenvalue: (n_points,) smallest one of the tangent, of those nearest to zero, with
+            rotations times the scale, N/mm; negative where the equilibrium is not stable.
+        falling: (n_points,) number of negative eigenvalues.
+    """
+
+    loads: Floats
+    states: Floats
+    eigenvalue: Floats
+    falling: Ints
+
+    @property
+    def turns(self) -> Ints:
+        """(n_turns,) numbers of the points at which the path turns back or forward again."""
+        return np.asarray(1 + np.flatnonzero(np.diff(np.sign(np.diff(self.loads)))))
+
+
+def trace(
+    topology: Topology,
+    values: ConcreteParameters,
+    drive: PrescribedMotion,
+    start: tuple[float, Floats],
+    end: float,
+    points: int = 200,
+) -> Trace:
+    """Traces the path of equilibria through a stable one.
+
+    It goes forward from there, and ends where its load passes ``end``, falls below that of rest, or
+    after so many ``points``; earlier where no step leads on, as in jammed contact.
+
+    Args:
+        topology: the structure.
+        values: its parameters.
+        drive: what moves the held dofs.
+        start: load parameter and equilibrium (n_dofs,).
+        end: load parameter.
+        points: at most.
+    """
+    try:
+        return _trace(topology, values, drive, start, end, points)
+    except NewContactPairs as met:
+        return trace(topology.coupling(met.pairs), values, drive, start, end, points)
+
+
+def _trace(
+    topology: Topology, values: ConcreteParameters, drive: PrescribedMotion,
+    start: tuple[float, Floats], end: float, points: int,
+) -> Trace:  # fmt: skip
+    path = _Path(topology, values, drive)
+    point, ahead = path.point(*start), np.append(np.zeros(topology.n_free), 1.0)
+    ahead = path.tangent(point, ahead)
+    found, length = [point], FIRST_LENGTH
+    while len(found) < points and length > SHORTEST and 0.0 <= point.load <= end:
+        after, fast = path.correct(point, ahead, length)
+        turned = None if after is None else path.tangent(after, ahead)
+        if after is None or turned is None or ahead @ turned < np.cos(BEND):
+            length *= 0.5
+            continue
+        if ahead[-1] * turned[-1] < 0.0:
+            found.append(path.turn(point, ahead, length))
+        length = min(LONGEST, 1.5 * length) if fast else length
+        point, ahead = after, turned
+        found.append(point)
+    eigenvalue, falling = zip(*map(path.stability, found), strict=True)
+    raise_new_pairs(path.system.contacts)
+    return Trace(
+        np.array([one.load for one in found]),
+        np.stack([one.state for one in found]),
+        np.array(eigenvalue),
+        np.array(falling),
+    )
+
+
+class _Point(NamedTuple):
+    load: float
+    state: Floats
+
+
+class _Path:
+    """Evaluates balance and tangent of a structure along its drive."""
+
+    def __init__(
+        self, topology: Topology, values: ConcreteParameters, drive: PrescribedMotion
+    ) -> None:
+        self.system: System = system_of(topology, values)
+        self._drive, self._work = drive, workspace(self.system)
+        self._topology, self._values, self._scale = topology, values, topology.scale
+        self._held, self._free = topology.held, np.sort(topology.free_dofs)
+
+    def point(self, load: float, state: Floats) -> _Point:
+        """Places the held dofs of a state where the drive has them."""
+        placed = np.array(state, dtype=float)
+        placed[self._held] = self._drive.values(self._held, np.array([load]))[0]
+        return _Point(load, placed)
+
+    def correct(self, begin: _Point, ahead: Floats, length: float) -> tuple[_Point | None, bool]:
+        """Finds the equilibrium an arc length ahead; tells whether it was found fast."""
+        pace = self._pace(begin.load)
+        step = length * ahead
+        for number in range(CORRECTIONS):
+            state = begin.state.copy()
+            state[self._free] += step[:-1] / self._scale[self._free]
+            point = self.point(begin.load + step[-1] / pace, state)
+            residual = np.append(self._force(point), ahead @ step - length)
+            if not np.isfinite(residual).all():
+                return None, False
+            change = self._solved(point, ahead, -residual, pace)
+            if change is None or np.linalg.norm(change) > 2.0 * length:
+                return None, False
+            step += change
+            if np.linalg.norm(change) < BALANCED:
+                return point, number < FAST
+        return None, False
+
+    def tangent(self, point: _Point, before: Floats) -> Floats | None:
+        """Returns the unit tangent (n_free + 1,) of the path, in the sense of the one before."""
+        right = np.append(np.zeros(len(self._free)), 1.0)
+        found = self._solved(point, before, right, self._pace(point.load))
+        return None if found is None else found / np.linalg.norm(found)
+
+    def turn(self, begin: _Point, ahead: Floats, length: float) -> _Point:
+        """Finds the point within an arc length at which the load does not change."""
+
+        def forward(share: float) -> float:
+            point = self.correct(begin, ahead, share * length)[0] if share else begin
+            turned = None if point is None else self.tangent(point, ahead)
+            return -float(ahead[-1]) if turned is None else float(turned[-1])
+
+        share = brentq(forward, 0.0, 1.0, xtol=1e-9, disp=False)
+        return self.correct(begin, ahead, share * length)[0] or begin
+
+    def stability(self, point: _Point) -> tuple[float, int]:
+        """Returns the smallest eigenvalue of those about zero, and how many are negative."""
+        stiffness = self._stiffness(point)
+        factor = spla.splu(
+            stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+        size, falling = len(self._free), int((factor.U.diagonal() < 0.0).sum())
+        if size < FEW:
+            return float(np.linalg.eigvalsh(stiffness.toarray())[0]), falling
+        inverse = spla.LinearOperator((size, size), matvec=factor.solve, dtype=float)
+        near = spla.eigsh(
+            stiffness, NEAREST, sigma=0.0, OPinv=inverse, v0=np.sin(1.0 + np.arange(size)),
+            return_eigenvectors=False,
+        )  # fmt: skip
+        return float(near.min()), falling
+
+    def _pace(self, load: float) -> float:
+        """Returns the way of the held dofs over the load parameter, mm."""
+        rates = self._drive.rates(self._held, np.array([load]))[0]
+        return max(float(np.linalg.norm(rates * self._scale[self._held])), 1e-12)
+
+    def _force(self, point: _Point) -> Floats:
+        gradient(point.state, self.system, self._work.turn, self._work.force)
+        return np.asarray(self._work.force[self._free] / self._scale[self._free])
+
+    def _stiffness(self, point: _Point) -> sp.csc_array:
+        weights = sp.diags_array(1.0 / self._scale[self._free])
+        motion = point.state[: 3 * self._topology.n_units]
+        stiffness = linearised(self._topology, self._values, motion).stiffness
+        return sp.csc_array(weights @ stiffness @ weights)
+
+    def _solved(self, point: _Point, ahead: Floats, right: Floats, pace: float) -> Floats | None:
+        """Solves [K f; t] y = right with f the force of the held dofs' way; None if singular."""
+        way = np.zeros_like(point.state)
+        way[self._held] = self._drive.rates(self._held, np.array([point.load]))[0] / pace
+        along = np.empty_like(way)
+        hessian_product(point.state, self.system, self._work.turn, way, along)
+        column = sp.csc_array((along[self._free] / self._scale[self._free])[:, None])
+        whole = sp.block_array(
+            [[self._stiffness(point), column], [ahead[None, :-1], ahead[None, -1:]]], format="csc"
+        )
+        try:
+            return np.asarray(spla.splu(whole).solve(right))
+        except RuntimeError:
+            return None
