@@ -33,8 +33,8 @@ CORRECTIONS, FAST = 8, 4
 """Newton steps of a point at most, and those up to which the next step is longer."""
 BALANCED = 1e-9
 """Newton step at which a point counts as found, mm."""
-NEAREST, FEW = 4, 20
-"""Eigenvalues about zero of which the smallest is told, and dofs below which all are computed."""
+FEW = 20
+"""Degrees of freedom below which all eigenvalues are computed."""
 
 
 class Trace(NamedTuple):
@@ -43,8 +43,8 @@ class Trace(NamedTuple):
     Attributes:
         loads: (n_points,) load parameters.
         states: (n_points, n_dofs) equilibria, stable or not.
-        eigenvalue: (n_points,) smallest one of the tangent, of those nearest to zero, with
-            rotations times the scale, N/mm; negative where the equilibrium is not stable.
+        eigenvalue: (n_points,) smallest one of the tangent, with rotations times the scale, N/mm;
+            of several negative ones that nearest to zero.
         falling: (n_points,) number of negative eigenvalues.
     """
 
@@ -174,7 +174,7 @@ class _Path:
         return self.correct(begin, ahead, share * length)[0] or begin
 
     def stability(self, point: _Point) -> tuple[float, int]:
-        """Returns the smallest eigenvalue of those about zero, and how many are negative."""
+        """Returns the smallest eigenvalue, or the last negative one, and how many are negative."""
         stiffness = self._stiffness(point)
         factor = spla.splu(
             stiffness, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
@@ -183,11 +183,11 @@ class _Path:
         if size < FEW:
             return float(np.linalg.eigvalsh(stiffness.toarray())[0]), falling
         inverse = spla.LinearOperator((size, size), matvec=factor.solve, dtype=float)
-        near = spla.eigsh(
-            stiffness, NEAREST, sigma=0.0, OPinv=inverse, v0=np.sin(1.0 + np.arange(size)),
+        of_inverse = spla.eigsh(
+            inverse, 1, which="SA" if falling else "LA", v0=np.sin(1.0 + np.arange(size)),
             return_eigenvectors=False,
         )  # fmt: skip
-        return float(near.min()), falling
+        return float(1.0 / of_inverse[0]), falling
 
     def _pace(self, load: float) -> float:
         """Returns the way of the held dofs over the load parameter, mm."""
