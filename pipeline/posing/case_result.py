@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
-from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver
+from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver, trace
 from sim.scene import (
     drive_force,
     estimated_errors,
@@ -62,6 +62,20 @@ class Times(NamedTuple):
     sampled: Ints
 
 
+class TracedPath(NamedTuple):
+    """Holds a path of equilibria through a snap, point by point; one of NaN where there is none.
+
+    Attributes:
+        load: (n_points,) load parameters, s.
+        force: (n_points, 2) of the drive, N.
+        eigenvalue: (n_points,) smallest of the tangent, N/mm.
+    """
+
+    load: Floats
+    force: Floats
+    eigenvalue: Floats
+
+
 class CaseResult(NamedTuple):
     """Holds a simulated case at the times shown, those of the loss, and (region) at all."""
 
@@ -75,6 +89,8 @@ class CaseResult(NamedTuple):
     stability: NDArray[np.int8]
     snap: Floats
     eigenvalue: Floats
+    snaps: Floats
+    traced: TracedPath
     region: Floats
     loss: float
     loss_other_branch: float
@@ -140,6 +156,8 @@ def measure(
             stability=path.stability,
             snap=path.snap,
             eigenvalue=path.eigenvalue,
+            snaps=getattr(solved.record, "snaps", np.zeros(0)),
+            traced=_traced(solved, scene),
             region=motion[:, scene.objective.region],
             loss=loss,
             loss_other_branch=other_loss(solved),
@@ -187,7 +205,7 @@ def _path(solved: Solved, at: Ints) -> _Path:
     record, nothing = solved.record, np.full(len(at), np.nan)
     if not isinstance(record, StaticRecord):
         return _Path(np.full(len(at), NOT_ASKED, dtype=np.int8), nothing, nothing)
-    for load in record.snapped[record.jumped > 0]:
+    for load in record.snaps:
         share = load / solved.case.solver.output_times[-1]
         LOG.warning("the structure snaps at %.4g of the load", share)
     if not record.stable.all():
@@ -197,6 +215,26 @@ def _path(solved: Solved, at: Ints) -> _Path:
     flags = np.where(record.stable[at] == 1, STABLE + jumped, UNSTABLE)
     snap = np.fmax.reduceat(record.snapped, ways)
     return _Path(flags.astype(np.int8), snap, record.eigenvalue[at])
+
+
+def _traced(solved: Solved, scene: Scene) -> TracedPath:
+    """Traces the path that the first snap leaves, from the last load before it."""
+    record, case = solved.record, solved.case
+    nothing = TracedPath(np.full(1, np.nan), np.full((1, 2), np.nan), np.full(1, np.nan))
+    if not isinstance(record, StaticRecord) or not len(record.snaps) or record.snaps[0] <= 0.0:
+        return nothing
+    loads, top = case.solver.output_times, record.topology or case.solver.topology
+    number = int(np.searchsorted(loads, record.snaps[0]))
+    rest = 0.0, np.zeros(top.n_dofs)
+    before = (float(loads[number - 1]), record.states[number - 1]) if number else rest
+    found = trace(top, case.values, case.drive, before, float(loads[-1]))
+    turns = ", ".join(f"{found.loads[at] / loads[-1]:.4g}" for at in found.turns)
+    LOG.info("the path that it leaves turns at %s of the load", turns or "none")
+    motion = found.states[:, : 3 * top.n_units].reshape(len(found.loads), -1, 3)
+    seen = observe(scene.topology, case.values, motion)
+    return TracedPath(
+        found.loads, drive_force(scene, seen, case.drive, found.loads), found.eigenvalue
+    )
 
 
 def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:

@@ -54,6 +54,7 @@ def assemble_response(
         **_over_units(asked, structures, measured),
         **_over_steps(measured),
         **_over_cases(measured),
+        **_snaps(measured),
         **by_contact(structures, contact_laws(asked)),
         "drive_displacement": (("case", "time", "xy"), _drive(structures, times)),
     }
@@ -121,6 +122,32 @@ def _over_cases(measured: Table) -> Variables:
         **{name: (_CASE, kept(name)) for name in _OF_CASES},
         "min_gap": (_CASE, _gather(measured, lambda case: np.nanmin(case.gap))),
         "overlaps": (_CASE, _gather(measured, lambda case: int(np.nanmax(case.overlapping)))),
+    }
+
+
+def _snaps(measured: Table) -> Variables:
+    """Lists snaps, and paths through the first of them, each filled up with NaN."""
+
+    def filled(of_case: Callable[[CaseResult], Floats]) -> Floats:
+        parts = [[of_case(case) for case in cases] for cases in measured.values()]
+        most = max(1, *(len(part) for cases in parts for part in cases))
+        return np.array(
+            [
+                [
+                    np.pad(part, [(0, most - len(part)), *((0, 0),) * (part.ndim - 1)],
+                           constant_values=np.nan)
+                    for part in cases
+                ]
+                for cases in parts
+            ]
+        )  # fmt: skip
+
+    points = (*_CASE, "traced_point")
+    return {
+        "snap_load": ((*_CASE, "snap_number"), filled(lambda case: case.snaps)),
+        "traced_load": (points, filled(lambda case: case.traced.load)),
+        "traced_force": ((*points, "xy"), filled(lambda case: case.traced.force)),
+        "traced_eigenvalue": (points, filled(lambda case: case.traced.eigenvalue)),
     }
 
 

@@ -60,6 +60,8 @@ SIZES = {
     "part": 3,
     "frame": 4,
     "snap": 3,
+    "snap_number": 2,
+    "traced_point": 9,
     "loop": 2,
     "band": 12,
     "preset": 3,

@@ -143,6 +143,10 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
     drive = np.zeros((1, len(time), 2))
     drive[0, :, 0] = -_amplitude(chosen) * time
     loss = np.array([[LOSS[name]] for name in lattices])
+    untraced: dict[str, tuple[int, ...]] = {
+        **dict.fromkeys(("snap_load", "traced_load", "traced_eigenvalue"), ()),
+        "traced_force": (2,),
+    }
     shapes = [spread(each.padded(each.vertices), each, whole.n_units) for each in lattices.values()]
     return xr.Dataset(
         filled
@@ -156,6 +160,10 @@ def response(chosen: Problem, path: Path) -> xr.Dataset:
             "loss": (("structure", "case"), loss),
             "loss_other_branch": (("structure", "case"), np.full(loss.shape, np.nan)),
             "snap": (("structure", "case", "time"), np.full(motion.shape[:3], np.nan)),
+            **{
+                name: (TABLES["response"][name].dims, np.full((*loss.shape, 1, *more), np.nan))
+                for name, more in untraced.items()
+            },
         },
         unit_coordinates(whole)
         | {

@@ -215,6 +215,13 @@ def response(chosen: Problem, lattice: Lattice) -> xr.Dataset:
             "stability": (per_time, np.full(zeros.shape, -1)),
             "snap": (per_time, np.full(zeros.shape, np.nan)),
             "eigenvalue": (per_time, np.full(zeros.shape, np.nan)),
+            "snap_load": ((*per_case, "snap_number"), np.full((*loss.shape, 1), np.nan)),
+            "traced_load": ((*per_case, "traced_point"), np.full((*loss.shape, 1), np.nan)),
+            "traced_force": (
+                (*per_case, "traced_point", "xy"),
+                np.full((*loss.shape, 1, 2), np.nan),
+            ),
+            "traced_eigenvalue": ((*per_case, "traced_point"), np.full((*loss.shape, 1), np.nan)),
             "drive_displacement": (("case", "time", "xy"), np.zeros((*motion.shape[1:3], 2))),
             "drive_force": ((*per_time, "xy"), np.zeros((*motion.shape[:3], 2))),
             "min_gap": (per_case, np.full(loss.shape, 0.08)),

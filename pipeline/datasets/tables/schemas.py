@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import yaml
 
-SCHEMA_VERSION = 3
+SCHEMA_VERSION = 4
 
 Kind = (
     Literal["design", "design_method", "response", "sweep", "scatter", "verification", "spectrum"]

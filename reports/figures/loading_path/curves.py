@@ -188,6 +188,7 @@ def reaction_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
             transform=axes.transAxes, ha="right", fontsize=style.SMALL,
         )  # fmt: skip
     if path.static:
+        _traced(axes, study, path)
         _eigenvalues(axes, study, path)
     measured.forces(axes, study)
     if study.problem.objective.target == "rest":  # or another panel has told it
@@ -201,6 +202,24 @@ def displacement_panel(axes: Axes, study: StudyResults, path: Abscissa) -> None:
     _eigenvalues(axes, study, path)
     if study.problem.objective.target == "rest":
         _sides(axes, study)
+
+
+def _traced(axes: Axes, study: StudyResults, path: Abscissa) -> None:
+    """Draws the paths that snaps leave, dashed, and a line at the load of each snap."""
+    response = study.response
+    angles = np.radians(response["direction"].values)
+    for name in structures(response):
+        part, colour = response.sel(structure=name), style.STRUCTURE_COLOURS[name]
+        for case, angle in enumerate(angles):
+            load, force = (
+                part[key].isel(case=case).values for key in ("traced_load", "traced_force")
+            )
+            along = force @ [np.cos(angle), np.sin(angle)]
+            way = np.interp(load, part["time"].values, path.values, right=np.nan)
+            axes.plot(way, along, color=colour, lw=0.8, ls=(0, (2.0, 1.2)), zorder=3)
+        for place in np.interp(part["snap_load"].values.ravel(), part["time"].values, path.values):
+            if np.isfinite(place):
+                axes.axvline(place, color=colour, lw=0.6, ls=(0, (1.0, 2.0)), zorder=2)
 
 
 def _eigenvalues(axes: Axes, study: StudyResults, path: Abscissa) -> None:

@@ -38,6 +38,7 @@ from reports.figures.loading_path.abscissa import (
 from reports.figures.loading_path.curves import over_cases
 from reports.page import RobustTable
 from reports.study import StudyResults, from_dataset
+from sim.core import Floats
 
 
 def loading_path_facts(study: StudyResults) -> list[Fact]:
@@ -220,7 +221,9 @@ def mean_losses(study: StudyResults) -> tuple[float, float]:
 def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> Iterator[Fact]:
     """Yields where the cloaked structure snaps, and its losses where the path branches."""
     part = study.response.sel(structure="cloaked")
-    loads = np.unique(part["snap"].values[np.isfinite(part["snap"].values)])
+    of_ways, each = part["snap"].values, part["snap_load"].values
+    known = each if np.isfinite(each).any() else of_ways  # a response of an older version
+    loads = np.unique(known[np.isfinite(known)])
     if not len(loads):
         return
     places = np.interp(loads, part["time"].values, path.values)
@@ -232,8 +235,21 @@ def _snap_facts(study: StudyResults, path: Abscissa, loss: float, unit: str) -> 
     if np.isfinite(other):
         words += f" or {worded(other, unit, 3)}"
         note = "where the path branches; the loss on either branch"
+    turns = _turns(part["traced_load"].values)
+    if len(turns):
+        way = np.interp(turns, part["time"].values, path.values)
+        to = " and ".join(worded(float(place), path.unit, 3) for place in way)
+        note += f"; traced by arc length, the path that it leaves turns at {to}"
     ours = f"snaps at {where}: {words}"
     yield Fact("snaps", "Loss, cloaked", float(places[0]), path.unit, ours, note=note)
+
+
+def _turns(loads: Floats) -> Floats:
+    """Lists loads at which traced paths (n_cases, n_points) turn back or forward again."""
+    paths = [each[np.isfinite(each)] for each in loads]
+    return np.concatenate(
+        [each[1:-1][np.diff(np.sign(np.diff(each))) != 0.0] for each in paths] or [np.zeros(0)]
+    )
 
 
 def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:

@@ -159,6 +159,10 @@ def _answer(study: StudyResults, path: Abscissa) -> Curve:
         panel = curves.displacement_panel
         return "Displacement", lambda axes: panel(axes, study, path), f"{words}{stiffness}.", ()
     words = "Force of the drive along its direction" + (stiffness if path.static else "")
+    if np.isfinite(study.response["snap_load"]).any():
+        words += (
+            "; vertical lines, snaps; dashed, the path that the first leaves, traced by arc length"
+        )
     return "Reaction", lambda axes: curves.reaction_panel(axes, study, path), f"{words}.", ()
 
 

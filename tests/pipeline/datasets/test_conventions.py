@@ -81,17 +81,23 @@ def test_a_file_of_the_first_version_is_read(kind: Kind, tmp_path: Path) -> None
             variable.units = "px" if pixels else OLD.get(table.units, table.units)
     migrated = datasets.read(path, kind)
     xr.testing.assert_identical(migrated, now)
-    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 3
+    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 4
 
 
-def test_a_response_of_the_second_version_is_read(tmp_path: Path) -> None:
+TRACED = ["snap_load", "traced_load", "traced_force", "traced_eigenvalue"]
+STABILITY = ["snap", "eigenvalue", "loss_other_branch", "snaps_by_contact"]
+
+
+@pytest.mark.parametrize(("version", "added"), [(2, [*STABILITY, *TRACED]), (3, TRACED)])
+def test_a_response_of_an_older_version_is_read(
+    version: int, added: list[str], tmp_path: Path
+) -> None:
     """It said less of stability; what it did not say reads NaN."""
     path = written("response", tmp_path)
-    added = ["snap", "eigenvalue", "loss_other_branch", "snaps_by_contact"]
     with xr.open_dataset(path) as opened:
         old = opened.load().drop_vars(added)
     del old.attrs[seal.ATTRIBUTE]
-    old.attrs["schema_version"] = np.int64(2)
+    old.attrs["schema_version"] = np.int64(version)
     old.to_netcdf(path)
     migrated = datasets.read(path, "response")
     assert all(np.isnan(migrated[name]).all() for name in added)

@@ -228,6 +228,30 @@ def test_a_snap_is_a_headline_with_the_losses_of_both_branches(shield: StudyResu
     assert "snaps" in {fact.key for fact in text.headline}
 
 
+def test_several_snaps_and_the_path_that_they_leave_are_told(shield: StudyResults) -> None:
+    response, end = shield.response, float(shield.response["time"][-1])
+    shape, points = (2, 1), np.array([0.4, 0.5, 0.3, 0.6, 1.0]) * end
+    snaps, traced = np.full((*shape, 2), np.nan), np.full((*shape, 5), np.nan)
+    snaps[1, 0], traced[1, 0] = [0.5 * end, 0.8 * end], points
+    force = np.zeros((*shape, 5, 2))
+    force[1, 0, :, 0] = -points
+    of_case = ("structure", "case")
+    response = response.drop_vars([name for name in response if str(name).startswith("traced")])
+    response = response.assign(
+        snap_load=((*of_case, "snap_number"), snaps),
+        traced_load=((*of_case, "traced_point"), traced),
+        traced_eigenvalue=((*of_case, "traced_point"), traced),
+        traced_force=((*of_case, "traced_point", "xy"), force),
+    )
+    told = dataclasses.replace(shield, datasets=shield.datasets | {"response": response})
+    fact = values(told)["snaps"]
+    assert fact.ours == "snaps at 7.5 mm and 12 mm: 0.05 N mm"
+    assert "turns at 7.5 mm and 4.5 mm" in fact.note
+    curves = [line.get_xydata() for axes in made(told).axes for line in axes.lines]
+    wanted = np.column_stack([15.0 * points / end, points])
+    assert any(np.shape(each) == wanted.shape and np.allclose(each, wanted) for each in curves)
+
+
 def test_absent_units_are_not_in_the_player(smile: StudyResults) -> None:
     intact, voided, _ = payload(figure.loading_path_animation(smile))["structures"]
     count = [len(part["owner"]) for part in (intact, voided)]
