@@ -1,6 +1,6 @@
 from . import newton as newton
 from . import static_solver as static_solver
-from .arc_length import Trace as Trace
+from .arc_length import EquilibriumTrace as EquilibriumTrace
 from .arc_length import trace as trace
 from .eigenvalue import eigenvalue_and_slopes as eigenvalue_and_slopes
 from .eigenvalue import lowest_eigenpair as lowest_eigenpair

@@ -37,7 +37,7 @@ FEW = 20
 """Degrees of freedom below which all eigenvalues are computed."""
 
 
-class Trace(NamedTuple):
+class EquilibriumTrace(NamedTuple):
     """Holds points of a path, in the order in which it passes them.
 
     Attributes:
@@ -66,7 +66,7 @@ def trace(
     start: tuple[float, Floats],
     end: float,
     points: int = 200,
-) -> Trace:
+) -> EquilibriumTrace:
     """Traces the path of equilibria through a stable one.
 
     It goes forward from there, and ends where its load passes ``end``, falls below that of rest, or
@@ -89,12 +89,14 @@ def trace(
 def _trace(
     topology: Topology, values: ConcreteParameters, drive: PrescribedMotion,
     start: tuple[float, Floats], end: float, points: int,
-) -> Trace:  # fmt: skip
+) -> EquilibriumTrace:  # fmt: skip
     path = _Path(topology, values, drive)
-    point, ahead = path.point(*start), np.append(np.zeros(topology.n_free), 1.0)
-    ahead = path.tangent(point, ahead)
+    point = path.point(*start)
+    ahead = path.tangent(point, np.append(np.zeros(topology.n_free), 1.0))
     found, length = [point], FIRST_LENGTH
-    while len(found) < points and length > SHORTEST and 0.0 <= point.load <= end:
+    while (
+        ahead is not None and len(found) < points and length > SHORTEST and 0.0 <= point.load <= end
+    ):
         after, fast = path.correct(point, ahead, length)
         turned = None if after is None else path.tangent(after, ahead)
         if after is None or turned is None or ahead @ turned < np.cos(BEND):
@@ -107,7 +109,7 @@ def _trace(
         found.append(point)
     eigenvalue, falling = zip(*map(path.stability, found), strict=True)
     raise_new_pairs(path.system.contacts)
-    return Trace(
+    return EquilibriumTrace(
         np.array([one.load for one in found]),
         np.stack([one.state for one in found]),
         np.array(eigenvalue),
