@@ -21,6 +21,7 @@ from .stress_scenes import posed as posed
 from .stress_scenes import pressed as pressed
 from .stress_scenes import shaken as shaken
 from .stress_scenes import squares as squares
+from .verdicts import STATED_OVER_TRUE as STATED_OVER_TRUE
 from .verdicts import Check as Check
 from .verdicts import StressCase as StressCase
 from .verdicts import StressFamily as StressFamily

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from benchmarks.harness import aligned
 from benchmarks.stress import families
 from benchmarks.stress.verdicts import StressFamily, Tally, attempted
@@ -26,6 +28,7 @@ FAMILIES: dict[str, StressFamily] = {
         *(families.barrier, families.designs, families.slender, families.constants),
         *(families.times, families.windings, families.sizes, families.pieces, families.inputs),
         *(families.branches, families.balances, families.symmetry, families.agreement),
+        *(families.skips, families.drives, families.pulses, families.grids, families.bifurcations),
     )
 }
 """In the order of the table."""
@@ -74,6 +77,9 @@ def _failures(tally: Tally) -> Iterator[str]:
     for outcome in tally.outcomes:
         if outcome.verdict == "wrong":
             yield f"wrong: {tally.family.name}: {outcome.case.name}: {outcome.message}"
+    for share, value, limit in zip(("median", "95 %"), tally.overstated, (5.0, 50.0), strict=True):
+        if value > limit:
+            yield f"overstated: {tally.family.name}: {share} {value:.3g} times the true error"
     if solved < ENOUGH * tried:
         yield f"too few solved: {tally.family.name}: {solved} of {tried} in range"
 
@@ -100,6 +106,7 @@ def _record(tally: Tally) -> dict[str, Any]:
         "tried_what": tally.family.tried,
         "judged_how": tally.family.judged,
         **_counts(tally),
+        "stated_over_true": [None if np.isnan(each) else each for each in tally.overstated],
         "worst": [
             {"name": name, "value": float(f"{value:.2e}"), "limit": float(limit)}
             for name, value, limit, _ in tally.worst

@@ -11,11 +11,15 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
 from sim.core import SimulationError
 
 Verdict = Literal["solved", "refused", "wrong"]
 Wanted = Literal["solution", "either", "refusal"]
 
+STATED_OVER_TRUE = "stated error over the true one"
+"""Names the check whose median and 95 % are told of a family."""
 REMEDIES = ("; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make ")
 """How the messages of actionable refusals begin to say what to do."""
 
@@ -117,6 +121,19 @@ class Tally:
         """Counts the cases that a study may ask for: tried, and solved."""
         asked = [outcome for outcome in self.outcomes if outcome.case.wanted == "solution"]
         return len(asked), sum(outcome.verdict == "solved" for outcome in asked)
+
+    @property
+    def overstated(self) -> tuple[float, float]:
+        """Returns median and 95 % of stated errors over true ones; NaN where none is stated."""
+        found = [
+            check.value
+            for outcome in self.outcomes
+            for check in outcome.checks
+            if check.name == STATED_OVER_TRUE
+        ]
+        return (
+            (float(np.median(found)), float(np.quantile(found, 0.95))) if found else (np.nan,) * 2
+        )
 
     @property
     def worst(self) -> list[Check]:

@@ -9,5 +9,10 @@ from .manufacturable import designs as designs
 from .manufacturable import slender as slender
 from .paths import branches as branches
 from .paths import windings as windings
+from .random_tries import bifurcations as bifurcations
+from .random_tries import drives as drives
+from .random_tries import grids as grids
+from .random_tries import pulses as pulses
+from .random_tries import skips as skips
 from .structures import pieces as pieces
 from .structures import sizes as sizes
