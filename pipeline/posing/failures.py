@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from sim.optimise import InfeasibleStartError
     from sim.scene import PathConstraints, Scene
 
-_KEYS = {"convexity": "constraints.convex", "snap": "objective.snap"}
+_KEYS = {
+    "convexity": "constraints.convex",
+    "snap": "objective.snap",
+    **dict.fromkeys(("slot_angle", "slot_wall", "slot_gap"), "constraints.straight_shims"),
+}
 
 
 def infeasible_start(

@@ -176,6 +176,7 @@ def limits_of(problem: Problem) -> Limits:
         convex=asked.convex,
         void_angle=asked.void_angle,
         gap=asked.gap,
+        slots=problem.fabrication.slot_room if asked.straight_shims else None,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Any
 
 from pipeline.problem.fields import SIM_UNITS
@@ -25,14 +26,29 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
     data = problem.model_dump(mode="json", by_alias=True, exclude_none=True)
     for name in () if stage == REPORT else STAGES[stage].unused or ():
         data.pop(name, None)
-    if "shim_strain" in data.get("constraints", ()) and "fabrication" not in data:
-        data["fabrication"] = {"shims": {"thickness": problem.shim_thickness}}
+    limits = data.get("constraints")
+    if isinstance(limits, dict) and not limits["straight_shims"]:
+        limits.pop("straight_shims")  # as before there was the key
+    if "fabrication" not in data and (needed := _fabrication_of_design(problem, limits or {})):
+        data["fabrication"] = needed
     if stage not in ("redesign", REPORT):
         data["optimiser"].pop("geometric")
     if method is not None:
         methods = data["optimiser"]["methods"]
         data["optimiser"]["methods"] = {method: methods[method]}
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _fabrication_of_design(problem: Problem, limits: Mapping[str, Any]) -> dict[str, Any]:
+    """Lists what a design with bounded strains, or with straight shims, depends on besides."""
+    needed: dict[str, Any] = {}
+    if "shim_strain" in limits or "straight_shims" in limits:
+        needed["shims"] = {"thickness": problem.shim_thickness}
+    if "straight_shims" in limits:
+        made = problem.fabrication
+        sizes = made.slots.model_dump(include={"depth_min", "depth_max", "clearance", "tip"})
+        needed |= {"slots": sizes, "minimum_wall": made.minimum_wall}
+    return needed
 
 
 def from_canonical(text: str | dict[str, Any]) -> Problem:

@@ -107,6 +107,8 @@ class ConstraintLimits(Section):
         convex: whether units must be convex.
         shim_strain: largest strain of the shims' foil, under all loads of the loss; of
             `material.foil`, or of foil as thick as `fabrication.shims.thickness`.
+        straight_shims: whether units must have room for slots along their ligaments (of
+            `fabrication.slots`), so that no shim is bent before any load; for convex units.
     """
 
     edge_length: Length | None = None
@@ -115,6 +117,7 @@ class ConstraintLimits(Section):
     gap: Gap | None = None
     convex: bool = True
     shim_strain: Positive | None = None
+    straight_shims: bool = False
 
 
 class SolverOptions(Section):

@@ -30,7 +30,7 @@ from pipeline.posing import (
 from pipeline.problem import Problem
 from pipeline.problem.sections import Methods
 from pipeline.runtime import UserError, cli, source_hash
-from sim.constraints import KIND_NAMES, margins
+from sim.constraints import margins
 from sim.core import Floats, SimulationError
 from sim.optimise import (
     Evaluation,
@@ -247,7 +247,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         "centroid": (("unit", "xy"), whole(np.asarray(shape(lattice, vertices).centroid))),
         "constraint_margin": (
             ("constraint",),
-            [found[kind].value if kind in found else np.nan for kind in KIND_NAMES],
+            [margin.value for margin in found.values()],
         ),
         "smallest_gap": ((), smallest_gap(lattice, vertices).distance),
         "overlaps": ((), len(overlapping_pairs(lattice, vertices))),
@@ -267,10 +267,10 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         **unit_coordinates(intact),
         "direction": (("case",), np.rad2deg(case_directions(asked))),
         "evaluation": (("evaluation",), np.arange(len(history))),
-        "constraint": (("constraint",), list(KIND_NAMES)),
+        "constraint": (("constraint",), list(found)),
         "constraint_units": (
             ("constraint",),
-            ["mm" if kind in ("edge_length", "gap") else "rad" for kind in KIND_NAMES],
+            [margin.unit for margin in found.values()],
         ),
     }
     made = xr.Dataset(variables, coordinates)

@@ -24,6 +24,9 @@ _MARGINS = {
     "void_angle": "Void angles",
     "convexity": "Convexity",
     "gap": "Gaps",
+    "slot_angle": "Angles of slots",
+    "slot_wall": "Walls at slots",
+    "slot_gap": "Walls between slots",
 }
 
 
@@ -77,20 +80,21 @@ def bias_fact(initial: RigidUnits) -> Fact:
 
 def design_facts(design: xr.Dataset) -> Iterator[Fact]:
     """Yields margins of the constraints, gaps, overlaps and hash of the design at rest."""
-    margins = zip(design["constraint"].values, design["constraint_margin"].values, strict=True)
-    for name, margin in margins:
+    margins = design["constraint_margin"]
+    found = (margins[each].values for each in ("constraint", "constraint_units"))
+    for name, unit, margin in zip(*found, margins.values, strict=True):
         label = f"{_MARGINS[str(name)]}: margin to the bound"
-        length, left = str(name) in {"edge_length", "gap"}, settled(float(margin))
+        length, left = str(unit) == "mm", settled(float(margin))
         value = left if length else float(np.degrees(left))
         note = "smallest of the design at rest; 0 is active, negative violated"
         yield number(f"margin_{name}", label, value, "mm" if length else "deg", digits=3, note=note)
     rest, gap = "at rest, by geometry", float(design["smallest_gap"])
     yield number("gap", "Smallest gap between units", gap, "mm", digits=3, note=rest)
     yield number("overlaps", "Overlapping pairs of units", int(design["overlaps"]), note=rest)
-    found = json.loads(design.attrs["packages"])["instructions"]
+    used = json.loads(design.attrs["packages"])["instructions"]
     note = f"of its vertices; the same on every processor with {instruction_set.LEVEL}"
-    if found != instruction_set.LEVEL:
-        note = f"of its vertices; instructions: {found}; elsewhere it may be another design"
+    if used != instruction_set.LEVEL:
+        note = f"of its vertices; instructions: {used}; elsewhere it may be another design"
     yield Fact("design_hash", "Hash of the design", np.nan, "1", design_hash(design), note=note)
 
 

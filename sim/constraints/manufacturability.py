@@ -7,7 +7,7 @@ units) that depends on a few vertices only.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import jax
@@ -15,8 +15,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from sim.constraints.straight_slots import (
+    SlotGap,
+    SlotWall,
+    slot_angles,
+    slot_pairs,
+    slot_walls,
+)
 from sim.core import Floats, Ints, Numbers
-from sim.structure import VOID_BRANCH, Lattice, angle_between, close_pairs, unwrap
+from sim.structure import VOID_BRANCH, Lattice, SlotRoom, angle_between, close_pairs, unwrap
 
 ANGLE_LENGTH = 5.0
 """Length (mm) that turns a margin in radians into one comparable to the margins in mm."""
@@ -33,6 +40,7 @@ class Limits:
         void_angle: smallest signed angle on either side of a ligament, rad.
         gap: smallest distance between neighbouring units, bonded or across a void, mm. Exact for
             convex units; for others that of their convex hulls, which is smaller.
+        slots: room for slots along the ligaments, that leave the shims straight; for convex units.
     """
 
     edge_length: float | None = None
@@ -40,6 +48,7 @@ class Limits:
     convex: bool = False
     void_angle: float | None = None
     gap: float | None = None
+    slots: SlotRoom | None = None
 
 
 def edge_length(ends: Array) -> Array:
@@ -118,7 +127,8 @@ class Margin:
     """Smallest margin of one kind of requirement.
 
     Attributes:
-        kind: edge_length, block_angle, convexity, void_angle or gap.
+        kind: edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall or
+            slot_gap.
         value: distance to the limit, negative if violated.
         unit: "mm" or "rad".
         units: ids of the units at the worst place.
@@ -159,6 +169,12 @@ def kinds(
         found.append(ConstraintKind("void_angle", "rad", void_angle, voids, limits.void_angle))
     if limits.gap is not None:
         found.append(ConstraintKind("gap", "mm", separation, _pairs(lattice, free), limits.gap))
+    if (room := limits.slots) is not None:
+        listed = (slot_angles, slot_walls, slot_pairs)
+        angles, walls, pairs = (_touched(each(lattice), free) for each in listed)
+        found.append(ConstraintKind("slot_angle", "rad", void_angle, angles, room.angle))
+        found.append(ConstraintKind("slot_wall", "mm", SlotWall(room), walls, room.wall))
+        found.append(ConstraintKind("slot_gap", "mm", SlotGap(room), pairs, room.wall))
     return tuple(found)
 
 
@@ -231,7 +247,3 @@ def vertices_of(lattice: Lattice, place: Ints) -> str:
         i, j = lattice.index[unit]
         words.append(f"vertex {', '.join(map(str, own))} of unit [{i}, {j}]")
     return " and ".join(words)
-
-
-KIND_NAMES = tuple({"convex": "convexity"}.get(field.name, field.name) for field in fields(Limits))
-"""Names of the kinds, in the order of the constraint vector."""

@@ -6,6 +6,7 @@ from .design_variables import Symmetry as Symmetry
 from .design_variables import design_space as design_space
 from .foil import Foil as Foil
 from .foil import FoilLimit as FoilLimit
+from .foil import SlotRoom as SlotRoom
 from .foil import face_strains as face_strains
 from .gaps import clearance as clearance
 from .gaps import close_pairs as close_pairs

@@ -12,6 +12,7 @@ it is long cannot curl across: it is up to 1 / (1 - nu^2) stiffer, 17 % of polye
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
@@ -52,6 +53,34 @@ class FoilLimit(NamedTuple):
 
     thickness: float
     strain: float
+
+
+class SlotRoom(NamedTuple):
+    """Holds the size of the slots that hold foil, and the walls that they need; all in mm.
+
+    Attributes:
+        grip: least length in which foil is held.
+        depth: largest one of a slot, from the vertex.
+        width: of a slot.
+        wall: thinnest one around the inner end of a slot and between two slots.
+        tip: units are cut back at a slot's mouth to walls of this thickness.
+    """
+
+    grip: float
+    depth: float
+    width: float
+    wall: float
+    tip: float
+
+    @property
+    def cover(self) -> float:
+        """Distance of a slot's inner end, taken as round, from an edge that leaves the wall."""
+        return self.wall + self.width / 2.0
+
+    @property
+    def angle(self) -> float:
+        """Least angle between a slot and an edge at its vertex, rad."""
+        return math.asin(min(self.cover / self.depth, 1.0))
 
 
 def face_strains(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 import shapely
 from numpy.typing import NDArray
@@ -12,13 +13,15 @@ from shapely import Polygon
 from pipeline.fabrication.parts import Slot
 from pipeline.fabrication.units.prebend import peak_curvature, signed_angle
 from pipeline.problem.sections import Fabrication
+from sim.constraints import slot_depth
 from sim.core import Floats, Ints
 
+_slot_depth = jax.jit(slot_depth, static_argnums=0)
 _TURNS = np.deg2rad(np.arange(-85.0, 86.0, 5.0))
 _DEPTH_STEP = 0.25  # mm; few different lengths of shims
 _HAIR = 1e-6  # mm
 _COST_OF_TURN = 1 / np.deg2rad(30.0)  # as dear as 1 mm less depth
-_DEAR_STRAIN = 0.02  # of the shim before any load: as dear as 1 mm less depth; its square counts
+_DEAR_STRAIN = 0.002  # of the shim before any load: as dear as 1 mm less depth; its square counts
 _STRAIGHT = np.deg2rad(0.01)
 
 
@@ -108,12 +111,25 @@ def _turns_and_depths(
 ) -> tuple[Floats, Floats]:
     """Lists turns and depths to try, also along the ways that slots may be asked to point."""
     slots = settings.slots
-    steps = np.arange(slots.depth_min, slots.depth_max + _HAIR, _DEPTH_STEP)
-    depths = np.unique(np.append(steps, slots.depth))
+    depths = np.unique([*_depths(settings), _straight_depth(polygon, corner, settings)])
     _, ways = _ways(polygon, corner)
     exact = [signed_angle(ways[slots.direction], way) for way in ways.values()]
     turns, depths = np.meshgrid(np.unique(np.round([*_TURNS, *exact], 6)), depths)
     return turns.ravel(), depths.ravel()
+
+
+def _depths(settings: Fabrication) -> Floats:
+    """Lists the depths of few different shims."""
+    slots = settings.slots
+    steps = np.arange(slots.depth_min, slots.depth_max + _HAIR, _DEPTH_STEP)
+    return np.append(steps, slots.depth)
+
+
+def _straight_depth(polygon: Polygon, corner: Corner, settings: Fabrication) -> float:
+    """Computes the depth that a design with straight shims keeps room for."""
+    points = np.asarray(polygon.exterior.coords)[:-1]
+    behind, here, ahead = (points[(corner.vertex + k) % len(points)] for k in (-1, 0, 1))
+    return float(_slot_depth(settings.slot_room, corner.along, behind - here, ahead - here))
 
 
 def _candidates(
@@ -131,6 +147,7 @@ def _candidates(
     directions, depths, walls, turns = (x[thick] for x in (directions, depths, walls, turns))
     truncation = truncations(room, mouth, directions, depths, settings).max(axis=0)
     cost = np.abs(depths - settings.slots.depth) + truncation
+    cost += np.where(np.isin(depths, _depths(settings)), 0.0, _DEPTH_STEP)
     cost += (_strains(mouth, directions, truncation, corner, settings) / _DEAR_STRAIN) ** 2
     if settings.slots.direction != "ligament":
         cost += np.abs(turns) * _COST_OF_TURN

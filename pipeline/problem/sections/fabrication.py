@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from pipeline.problem.fields import Gap, Length, Modulus, Positive, Ratio, Section, fault
+from sim.structure import SlotRoom
 
 DENSITIES = {
     "PLA": 1.24e-9,
@@ -268,3 +269,9 @@ class Fabrication(Section):
     def slot_width(self) -> float:
         """Width of a slot in mm."""
         return self.shims.thickness + 2.0 * self.slots.clearance
+
+    @property
+    def slot_room(self) -> SlotRoom:
+        """Room that slots along the ligaments need, which leave the shims straight."""
+        cut = self.slots
+        return SlotRoom(cut.depth_min, cut.depth_max, self.slot_width, self.minimum_wall, cut.tip)

@@ -10,15 +10,20 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_bvp
+from shapely import Polygon
 
 from pipeline.fabrication.checks.package_check import page_words
 from pipeline.fabrication.papers import read_bill
-from pipeline.fabrication.parts import Slot, UnbuildableUnitError
+from pipeline.fabrication.parts import Slot, UnbuildableUnitError, labels
 from pipeline.fabrication.units import build_specimen, network
 from pipeline.fabrication.units.prebend import peak_curvature, prebend
+from pipeline.fabrication.units.unit_bodies import UnitBody, unit_bodies
+from pipeline.fabrication.units.unit_network import UnitNetwork
 from pipeline.problem.fields import SIM_UNITS
 from pipeline.problem.sections import Fabrication
+from sim.constraints import ConstraintVector, Limits
 from sim.core import Floats
+from sim.structure import Lattice, design_space, quads
 from tests.pipeline.fabrication import built, handmade
 
 DESIGN = Path("design.nc")
@@ -122,3 +127,59 @@ def test_papers_tell_how_every_shim_is_bent(tmp_path: Path) -> None:
     last = page_words(tmp_path / "cloaked/assembly.pdf")[-1]
     assert "7 of 7 shims are bent before any load" in last[0]
     assert "worst 7" in last
+
+
+def network_of(lattice: Lattice, vertices: Floats) -> UnitNetwork:
+    """All units and ligaments of a lattice with its vertices there."""
+    rings = np.split(vertices, lattice.first_vertex[1:-1])
+    own = np.arange(lattice.n_vertices) - lattice.first_vertex[lattice.unit]
+    joints = [
+        (
+            number,
+            (int(lattice.unit[a]), int(own[a])),
+            (int(lattice.unit[b]), int(own[b])),
+            (vertices[b] - vertices[a]) / np.linalg.norm(vertices[b] - vertices[a]),
+        )
+        for number, (a, b) in enumerate(lattice.ligaments)
+    ]
+    index = [(int(i), int(j)) for i, j in lattice.index]
+    units = range(lattice.n_units)
+    return UnitNetwork(
+        tuple(units),
+        {unit: Polygon(ring) for unit, ring in zip(units, rings, strict=True)},
+        dict(zip(units, labels(index), strict=True)),
+        dict(zip(units, index, strict=True)),
+        tuple(joints),
+        (),
+        (),
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) -> None:
+    """Random shifts, as large as the limits allow: the rule of slots finds straight ones."""
+    settings, lattice = Fabrication(), quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
+    space = design_space(lattice, np.array([5, 6, 9, 10]))
+    room = settings.slot_room
+    limits = Limits(edge_length=3.0, convex=True, void_angle=0.0, gap=0.2, slots=room)
+    constraints = ConstraintVector(space, limits)
+    way = np.random.default_rng(seed).uniform(-1.0, 1.0, space.n_variables)
+    shares = np.linspace(0.0, 6.0, 121)
+    least = np.array([constraints.values(share * way).min() for share in shares])
+    last = int(np.argmax(least < 0.0)) - 1
+    kept, lost = (constraints.vertices(shares[last + more] * way) for more in (0, 30))
+    straight, bent = (
+        strains(lattice, unit_bodies(network_of(lattice, each), settings, DESIGN), settings)
+        for each in (kept, lost)
+    )
+    assert straight.max() < 1e-9
+    assert bent.max() > 0.01
+
+
+def strains(lattice: Lattice, made: dict[int, UnitBody], settings: Fabrication) -> Floats:
+    """Strains (n_ligaments,) of the shims before any load."""
+    ends: dict[int, list[Slot]] = {number: [] for number in range(lattice.n_ligaments)}
+    for body in made.values():
+        for slot in body.slots:
+            ends[slot.ligament].append(slot)
+    return np.array([prebend(one, other, settings).strain for one, other in ends.values()])

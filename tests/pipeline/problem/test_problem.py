@@ -26,7 +26,7 @@ from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES, Stage, UserError
 
 ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased")
-NAMES = ("edge3", "free", "text", *ROBUST, "quick")
+NAMES = ("edge3", "free", "text", *ROBUST, "straight", "quick")
 PRESETS = (None, *NAMES)
 
 
@@ -336,3 +336,19 @@ def test_infill_is_little_where_mass_plays_no_part(fig2: Path) -> None:
     moving = load(fig2)
     assert moving.infill == pytest.approx(6.18e-9 / (1.24e-9 * 8.1))
     assert load(fig2.parents[1] / "fig4/problem.yaml").infill == 0.15
+
+
+def test_a_design_with_straight_shims_depends_on_slots_and_shims_alone(
+    fig2: Path, tmp_path: Path
+) -> None:
+    plain, straight = "constraints:", "constraints:\n  straight_shims: true"
+
+    def hashed(new: str, made: str) -> str:
+        text = edited(fig2, tmp_path, plain, f"fabrication: {{ {made} }}\n{new}")
+        return section_hash(text, "design", "sqp")
+
+    thin, deep = "shims: { thickness: 0.1 mm }", "slots: { depth_max: 6 mm }"
+    tall, first = "thickness: 9 mm", "labels: { height: 3 mm }"
+    assert hashed(plain, thin) == hashed(plain, deep)
+    assert hashed(straight, tall) == hashed(straight, first)
+    assert len({hashed(straight, each) for each in (thin, deep, tall)}) == 3
