@@ -29,7 +29,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     **{
         f"--{name}": _path("NC", f"the {name} dataset")
         for name in (
-            *("design", "response", "sweep", "constants", "scatter", "verification"),
+            *("design", "response", "built", "sweep", "constants", "scatter", "verification"),
             *("geometric-design", "geometric-response", "spectrum", "gains", "certificate"),
             *("calibration", "track"),
             *("samples", "cycles", "pictures"),

@@ -13,6 +13,7 @@ from pipeline.runtime import UserError
 Output = Literal[
     "design",
     "response",
+    "built",
     "sweep",
     "constants",
     "scatter",
@@ -29,6 +30,7 @@ def outputs(problem: Problem) -> tuple[Output, ...]:
     asked: dict[Output, bool] = {
         "design": True,
         "response": True,
+        "built": problem.report.as_built,
         "sweep": problem.sweep is not None,
         "constants": problem.report.measured_constants is not None,
         "scatter": problem.robustness is not None,

@@ -123,6 +123,16 @@ _ROWS = (
         options=(_OUT, option("--geometric", action="store_true", help="with contact on distance")),
     ),
     Stage(
+        "as_built",
+        "simulate the structures of a design with their shims bent as their slots are drawn",
+        kind="response",
+        datasets=("built",),
+        inputs=("design",),
+        unused=(*_APART, "sweep", "robustness"),
+        threads="cases",
+        options=(_OUT,),
+    ),
+    Stage(
         "redesign",
         "evaluate a design with contact on distance, and optimise it again if that matters",
         kind="design",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
@@ -41,7 +41,8 @@ class PageText:
     """Holds what a page says of itself.
 
     `caption` is HTML; `headline` are the facts above all others, `note` is told of the animation;
-    `robust` stands below the headline, if there is one.
+    `robust` stands below the headline, if there is one; `built` are the words for facts of the
+    headline of the structures as built, by key.
     """
 
     title: str
@@ -52,6 +53,7 @@ class PageText:
     headline: Sequence[Fact]
     note: str = ""
     robust: RobustTable | None = None
+    built: Mapping[str, str] = field(default_factory=dict)
 
 
 def study_text(

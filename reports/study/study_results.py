@@ -1,7 +1,9 @@
 """Describes a study as a report sees it: its problem and the datasets that its stages made."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import cast
@@ -82,6 +84,15 @@ class StudyResults:
     def response(self) -> xr.Dataset:
         """Tells what the structures do."""
         return self.datasets["response"]
+
+    @property
+    def as_built(self) -> StudyResults | None:
+        """Returns the study with the response as built, if the report asks for it."""
+        if "built" not in self.datasets:
+            return None
+        apart = {"built", "constants", "scatter", "verification"}
+        kept = {name: data for name, data in self.datasets.items() if name not in apart}
+        return replace(self, datasets=kept | {"response": self.datasets["built"]}, compared={})
 
     @property
     def sweep(self) -> xr.Dataset:

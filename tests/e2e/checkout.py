@@ -29,7 +29,7 @@ SMALLER = {
     "solver": {"accuracy": "draft"},
     "response": {"cycles": 1, "samples": 21},
     "sweep": {"grid": {"drive.directions": {"points": 3}, "drive.frequency": {"points": 2}}},
-    "report": {"measured_constants": None},
+    "report": {"measured_constants": None, "as_built": False},
     "presets": {},
 }
 ROOMS = ("benchmarks", "experiments", "metacloak", "pipeline", "profiles", "reports", "sim")

@@ -27,7 +27,7 @@ AS_FILMED = {
     "solver": {"accuracy": "draft"},
     "response": {"cycles": 0.5, "samples": 26},
     "prediction": {"samples": 4},
-    "report": {"measured_constants": None},
+    "report": {"measured_constants": None, "as_built": False},
 }
 
 

@@ -45,6 +45,12 @@ def written(folder: Path, preset: str | None = None) -> StudyResults:
         files["constants"] = folder / "constants.nc"
         about = provenance.of_study(posed, "sweep")
         datasets.write(constants(posed), files["constants"], "sweep", about)
+    if chosen.report.as_built:
+        files["built"] = folder / "built.nc"
+        about = provenance.of_study(chosen, "as_built", plan={})
+        datasets.write(
+            datasets.read(files["response"], "response"), files["built"], "response", about
+        )
     return study_results.load(PROBLEM, preset, files)
 
 

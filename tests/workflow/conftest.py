@@ -17,6 +17,7 @@ STAGES = (
     "pipeline/stages/design",
     "pipeline/stages/select",
     "pipeline/stages/simulate",
+    "pipeline/stages/as_built",
     "pipeline/stages/virtual_specimen",
     "pipeline/stages/sweep",
     "pipeline/stages/monte_carlo",

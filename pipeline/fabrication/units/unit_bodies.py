@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import shapely
 from shapely import Polygon
 
@@ -20,9 +21,10 @@ from pipeline.fabrication.parts import STRAIGHT, Slot, UnbuildableUnitError
 from pipeline.fabrication.units.prebend import prebend
 from pipeline.fabrication.units.slot_candidates import Corner, side_truncations
 from pipeline.fabrication.units.slots import NoRoomError, place_slots
-from pipeline.fabrication.units.unit_network import UnitNetwork, corners
+from pipeline.fabrication.units.unit_network import UnitNetwork, corners, refuse_overlaps
 from pipeline.fabrication.units.unit_outlines import cut, filleted, lugs, room_to_grow, wall
 from pipeline.problem.sections import Fabrication
+from sim.core import Floats
 
 _STAGES = (0.0, 0.25, 0.5, 0.75, 1.0)  # of the most that a unit may grow
 _NEAR = 3.0  # mm; farther neighbours never matter
@@ -163,3 +165,21 @@ def _no_slot(
         remedy=f"lower it {wider}or fabrication.slots.depth_min, raise fabrication.slots.thicken,"
         " or ask for longer edges in the design (constraints.edge_length)",
     )
+
+
+def end_angles(net: UnitNetwork, settings: Fabrication, file: Path) -> Floats:
+    """Measures the slots of all shims against their ligaments (n_ligaments, 2), rad.
+
+    Args:
+        net: the structure.
+        settings: of the fabrication.
+        file: the design dataset, for messages.
+
+    Raises:
+        UnbuildableUnitError: units overlap, or a slot has no room.
+    """
+    refuse_overlaps(net, file)
+    made = unit_bodies(net, settings, file)
+    slots = {(number, slot.vertex): slot for number in made for slot in made[number].slots}
+    pairs = ((slots[one], slots[other]) for _, one, other, _ in net.ligaments)
+    return np.array([prebend(*pair, settings).angles for pair in pairs]).reshape(-1, 2)

@@ -64,6 +64,8 @@ class ReportOptions(Section):
         places: the units nearest to these are followed over time, at most three.
         shim_strain_limit: the strain up to which the foil of the shims counts as sound (polyester
             yields at about 5 %).
+        as_built: whether it also tells what the structures do with their shims bent as the slots of
+            `fabrication` are drawn.
         measured_constants: constants over which the losses are shown as well.
         paper: what a publication tells.
     """
@@ -72,5 +74,6 @@ class ReportOptions(Section):
     instants: tuple[Delay, ...] = ()
     places: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(max_length=3)] = ()
     shim_strain_limit: Positive = 0.05
+    as_built: bool = False
     measured_constants: MeasuredConstants | None = None
     paper: Paper | None = None

@@ -16,7 +16,7 @@ from reports.figures import kinds
 from reports.figures.loading_path import abscissa, figure, measures, monte_carlo
 from reports.figures.loading_path import facts as path_facts
 from reports.figures.shielding import facts as shielding
-from reports.figures.study_report import study_report
+from reports.figures.study_report import as_built_facts, study_report
 from reports.page import publish
 from reports.panels import payload
 from reports.study import StudyResults
@@ -129,6 +129,17 @@ def test_the_copies_stand_in_a_table_of_their_own(shield: StudyResults) -> None:
     worst = values(shield)["rotation_cloaked_copies"]
     assert worst.ours in {high for _, _, high in table.rows[1:]}
     assert worst.value > values(shield)["rotation_cloaked"].value
+
+
+def test_the_headline_is_told_as_built_too(shield: StudyResults) -> None:
+    response = shield.response.assign(displacement=1.5 * shield.response["displacement"])
+    study = dataclasses.replace(shield, datasets=shield.datasets | {"built": response})
+    known = values(shield)
+    headline = [known[key] for key in ("rotation_cloaked", "rotation_cloaked_copies")]
+    (fact,) = as_built_facts(study, kinds.LOADING_PATH, headline)
+    assert (fact.key, fact.group) == ("built_rotation_cloaked", "As built")
+    assert fact.value == pytest.approx(1.5 * known["rotation_cloaked"].value)
+    assert as_built_facts(shield, kinds.LOADING_PATH, headline) == []
 
 
 def test_a_paper_is_quoted_by_the_keys_of_the_facts(

@@ -1,0 +1,39 @@
+"""Structures with their shims bent as the slots are drawn, from a problem to their response."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline import datasets, problem
+from pipeline.__main__ import run_stage
+from pipeline.fabrication.units import end_angles, network
+from pipeline.posing import read_design, scene_of, structures_of
+from sim.scene import as_built
+from tests.pipeline import static
+
+SHIELD = (
+    "cloak: { ring: { inner: 16 mm, outer: 25 mm } }\n"
+    "objective: { kind: strain_energy, target: rest, region: { disc: { radius: 16 mm } } }\n"
+)
+BENT = "fabrication: { slots: { direction: centroid } }\n"
+
+
+def test_losses_are_those_of_the_relaxed_structures(tmp_path: Path) -> None:
+    source, design = static.write(tmp_path, SHIELD + BENT, 5, 3.0), tmp_path / "design.nc"
+    words = ["--problem", str(source), "--quiet", "--out"]
+    made, told = tmp_path / "design_sqp.nc", tmp_path / "built.nc"
+    assert run_stage("design", [*words, str(made), "--method", "sqp"]) == 0
+    assert run_stage("select", [*words, str(design), "--designs", str(made)]) == 0
+    assert run_stage("as_built", [*words, str(told), "--design", str(design)]) == 0
+    asked, built = problem.load(source), datasets.read(told, "response")
+    read = read_design(asked, design)
+    for name, structure in structures_of(scene_of(asked, tmp_path), read).items():
+        angles = end_angles(network(read, name), asked.fabrication, design)
+        found = as_built(*structure, angles)
+        assert abs(found.loss_as_built / found.loss_as_designed - 1.0) > 0.01
+        loss = float(built["loss"].sel(structure=name).mean())
+        assert loss == pytest.approx(found.loss_as_built, rel=1e-6)
+    start = built.isel(time=0)
+    assert np.allclose(start["displacement"], 0.0, atol=1e-9)
+    assert np.allclose(start["roi_energy"], 0.0, atol=1e-12)
