@@ -25,8 +25,12 @@ START = 20.0
 def cost_line(asked: Problem, scene: Scene) -> str:
     """Says size, unknowns, memory and time to expect of a problem's optimisation."""
     cost = estimate_cost(scene, len(sample_times(scene)))
-    methods = asked.optimiser.methods.chosen
-    evaluations = sum(method.evaluations for method in methods.values())
+    optimiser = asked.optimiser
+    budget = {name: method.evaluations for name, method in optimiser.methods.chosen.items()}
+    if "sqp" in budget:
+        first = optimiser.angle.evaluations if optimiser.angle else 0
+        budget["sqp"] = optimiser.descents * (first + budget["sqp"])
+    evaluations = sum(budget.values())
     seconds = START + evaluations * cost.seconds
     longest = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
     return (

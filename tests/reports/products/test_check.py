@@ -35,6 +35,14 @@ def test_a_picture_and_a_line_of_its_cost(
         assert min(picture.size) > 500
 
 
+def test_every_descent_and_the_one_before_it_cost(tmp_path: Path) -> None:
+    path = static.write(tmp_path, static.HOLE, size=5, amplitude=3.0)
+    more = "law: geometric", "optimiser: { angle: { evaluations: 3 }, descents: 2,"
+    text = path.read_text().replace("law: angle", more[0]).replace("optimiser: {", more[1])
+    path.write_text(text)
+    assert "14 evaluations of the design" in cost_line(load(path), scene_of(load(path), tmp_path))
+
+
 def test_the_cost_grows_as_the_factor_does(tmp_path: Path) -> None:
     costs = []
     for size in (15, 30):
