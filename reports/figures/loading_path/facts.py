@@ -5,7 +5,7 @@ A publication's words for them stand in the problem, under `report.paper.values`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -305,14 +305,20 @@ def _displacement_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         yield number(f"displacement_{name}", label, value, "mm", digits=3, note=note)
 
 
-def robustness_facts(study: StudyResults) -> Iterator[Fact]:
-    """Yields spread of the measure over the imperfect copies."""
+def _spreads_of_copies(study: StudyResults) -> Sequence[monte_carlo.Spread]:
+    """Spreads the measure at the end over the imperfect copies, if there are any."""
     copies = study.scatter
     if copies is None:
-        return
+        return ()
     measure = measures.measure_of(study.problem)
     values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
-    for spread in monte_carlo.spreads(values, copies):
+    return monte_carlo.spreads(values, copies)
+
+
+def robustness_facts(study: StudyResults) -> Iterator[Fact]:
+    """Yields spread of the measure over the imperfect copies."""
+    measure = measures.measure_of(study.problem)
+    for spread in _spreads_of_copies(study):
         key = spread.noise.replace(" %", "").replace(" ", "_")
         note = (
             f"5 % to 95 %: {spread.low:.3g} to {spread.high:.3g}; {spread.count} copies, "
@@ -323,16 +329,18 @@ def robustness_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def robust_table(study: StudyResults) -> RobustTable | None:
-    """Lists the measure at the end of the path of the cloak as designed, and of its copies."""
-    copies = study.scatter
-    if copies is None:
+    """Lists the measure at the end of the path of the cloak as designed, built, and of copies."""
+    spreads = _spreads_of_copies(study)
+    if not spreads:
         return None
     measure = measures.measure_of(study.problem)
-    ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
-    nominal = worded(float(ends.sel(structure="cloaked")), measure.unit, 3)
-    rows = [("as designed", nominal, ABSENT)]
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
-    for spread in monte_carlo.spreads(values, copies):
+    rows = []
+    for name, each in (("as designed", study), ("as built", study.as_built)):
+        if each is not None:
+            ends = over_cases(each.problem, measure.of(each.response)).isel(time=-1)
+            nominal = worded(float(ends.sel(structure="cloaked")), measure.unit, 3)
+            rows.append((name, nominal, ABSENT))
+    for spread in spreads:
         failed = f", {spread.failed} failed" if spread.failed else ""
         name = f"{_in_words(spread.noise)} ({spread.count} copies{failed})"
         middle, high = (worded(x, measure.unit, 3) for x in (spread.middle, spread.high))
@@ -342,12 +350,8 @@ def robust_table(study: StudyResults) -> RobustTable | None:
 
 def worst_copy_fact(study: StudyResults) -> Iterator[Fact]:
     """Yields the value that 95 % of the copies keep to, under their most harmful imperfection."""
-    copies = study.scatter
-    if copies is None:
-        return
     measure = measures.measure_of(study.problem)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
-    found = [each for each in monte_carlo.spreads(values, copies) if np.isfinite(each.high)]
+    found = [each for each in _spreads_of_copies(study) if np.isfinite(each.high)]
     if found:
         worst = max(found, key=lambda each: each.high)
         label = f"{measure.label}, cloaked, in 95 % of copies at most"

@@ -140,6 +140,9 @@ def test_the_headline_is_told_as_built_too(shield: StudyResults) -> None:
     assert (fact.key, fact.group) == ("built_rotation_cloaked", "As built")
     assert fact.value == pytest.approx(1.5 * known["rotation_cloaked"].value)
     assert as_built_facts(shield, kinds.LOADING_PATH, headline) == []
+    table = path_facts.robust_table(study)
+    assert table is not None
+    assert table.rows[1] == ("as built", fact.ours, fact_records.ABSENT)
 
 
 def test_a_paper_is_quoted_by_the_keys_of_the_facts(
