@@ -43,6 +43,17 @@ def test_the_stated_uncertainties_are_those_of_the_result() -> None:
     np.testing.assert_allclose(np.std(off, axis=0), 1.0, atol=0.12)
 
 
+def test_few_units_leave_fewer_degrees_of_freedom() -> None:
+    """The four numbers that are fitted take half of what four units tell."""
+    random = np.random.default_rng(2)
+    few = GRID[[0, 6, 42, 48]]
+    variance = [
+        register(few, few + random.normal(0, 0.05, few.shape)).shift_sigma[0] ** 2 * len(few)
+        for _ in range(1000)
+    ]
+    assert np.mean(variance) == pytest.approx(0.05**2, rel=0.1)
+
+
 def test_the_scale_is_not_taken_out_of_motions() -> None:
     found = register(GRID, moved(np.pi / 2, 1.1, (3.0, 0.0)))
     upright = found.upright(np.array([0.0, 2.0, 0.3]))

@@ -101,6 +101,8 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert float(first["volume_mm3"]) == pytest.approx(specimen.units[0].outline.area * 8.1)
     (shim,) = (row for row in found if row["item"] == "shim")
     assert (shim["count"], shim["length_mm"], shim["width_mm"]) == ("8", "8.2500", "8.1000")
+    foil = 8.25e-3 * 8.1e-3 * ASKED.shims.thickness * 1e-3 * 1380.0  # kg, of 1380 kg/m^3
+    assert float(shim["mass_g"]) == pytest.approx(1e3 * foil, abs=1e-4)
     assert [row["item"] for row in found if "/" in row["id"]] == ["sheet", "plate"]
     total = next(row for row in found if row["item"] == "total")
     assert float(total["mass_g"]) == pytest.approx(
