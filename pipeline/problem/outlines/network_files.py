@@ -112,7 +112,7 @@ def _of_netcdf(path: Path) -> NetworkContent:
     remedy = "give vertices (unit, vertex, xy), ligament_unit and ligament_vertex (ligament, end)"
     try:
         with xr.open_dataset(path, engine="netcdf4") as data:
-            vertices = data["vertices"].transpose("unit", "vertex", "xy").to_numpy()
+            vertices = data["vertices"].transpose("unit", "vertex", "xy").to_numpy().astype(float)
             unit = data["ligament_unit"].transpose("ligament", "end").to_numpy()
             corner = data["ligament_vertex"].transpose("ligament", "end").to_numpy()
             ends = vertices[unit, corner]

@@ -166,6 +166,15 @@ def test_the_authors_kagome_lattice(tmp_path: Path) -> None:
     assert len(void_units(problem)) + len(cloak_units(problem)) == pytest.approx(157, abs=4)
 
 
+def test_corners_that_are_words_are_told(tmp_path: Path) -> None:
+    as_netcdf(tmp_path / "x.nc", SQUARES)
+    data = xr.load_dataset(tmp_path / "x.nc")
+    data["vertices"] = data["vertices"].astype(str).str.replace(".", ",")
+    data.to_netcdf(tmp_path / "x.nc")
+    with pytest.raises(UserError, match="not a readable lattice"):
+        load(from_file(tmp_path, "x.nc"))
+
+
 @pytest.mark.parametrize(
     ("name", "content", "what"),
     [
