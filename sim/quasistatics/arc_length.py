@@ -66,6 +66,7 @@ def trace(
     start: tuple[float, Floats],
     end: float,
     points: int = 200,
+    longest: float = LONGEST,
 ) -> EquilibriumTrace:
     """Traces the path of equilibria through a stable one.
 
@@ -79,16 +80,17 @@ def trace(
         start: load parameter and equilibrium (n_dofs,).
         end: load parameter.
         points: at most.
+        longest: arc length of a step at most, mm; a longer one may come to another branch.
     """
     try:
-        return _trace(topology, values, drive, start, end, points)
+        return _trace(topology, values, drive, start, end, points, longest)
     except NewContactPairs as met:
-        return trace(topology.coupling(met.pairs), values, drive, start, end, points)
+        return trace(topology.coupling(met.pairs), values, drive, start, end, points, longest)
 
 
 def _trace(
     topology: Topology, values: ConcreteParameters, drive: PrescribedMotion,
-    start: tuple[float, Floats], end: float, points: int,
+    start: tuple[float, Floats], end: float, points: int, longest: float,
 ) -> EquilibriumTrace:  # fmt: skip
     path = _Path(topology, values, drive)
     point = path.point(*start)
@@ -104,7 +106,7 @@ def _trace(
             continue
         if ahead[-1] * turned[-1] < 0.0:
             found.append(path.turn(point, ahead, length))
-        length = min(LONGEST, 1.5 * length) if fast else length
+        length = min(longest, 1.5 * length) if fast else length
         point, ahead = after, turned
         found.append(point)
     eigenvalue, falling = zip(*map(path.stability, found), strict=True)

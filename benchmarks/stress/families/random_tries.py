@@ -35,6 +35,8 @@ MOST = 3.0
 """Largest true error over the stated one."""
 ROUNDING = 1e-9
 """Relative error below which nothing is stated."""
+SHORT = 0.2
+"""Steps of a path that counts as true, mm."""
 AMPLITUDE = 1.0
 """Of motions in time, mm."""
 
@@ -222,19 +224,20 @@ def _traced(case: StressScene, loads: Floats) -> Sequence[Check]:
     snap = record.snaps[0] if len(record.snaps) else np.inf
     rest = np.zeros(case.topology.n_dofs)
     end = min(snap * (1.0 + 1e-6), 1.0)
-    path = trace(case.topology, case.values, case.drive, (0.0, rest), end, points=400)
+    path = trace(case.topology, case.values, case.drive, (0.0, rest), end, 2000, SHORT)
     # a step may pass from a branch that is nearly straight to the straight one, which is unstable
     lost = np.flatnonzero(path.falling)
     turns = path.loads[path.turns]
-    known = min(snap, path.loads[lost[0] - 1] if len(lost) else np.inf)
+    stable = path.loads[: lost[0]] if len(lost) else path.loads
+    known = min(snap, stable[-1] if len(lost) else np.inf)
     if not np.isfinite(snap):
         checks.append(Check("turns of a path that does not snap", len(turns), 0))
     elif len(turns):
         checks.append(Check("load of a snap off the turn", abs(turns[0] - snap), 1e-6))
     for load, state in zip(loads[loads < known], record.states, strict=False):
-        before = int(np.flatnonzero(path.loads <= load)[-1])
+        before = int(np.flatnonzero(stable <= load)[-1])
         start = float(path.loads[before]), path.states[before]
-        near = trace(case.topology, case.values, case.drive, start, float(load), points=60)
+        near = trace(case.topology, case.values, case.drive, start, float(load), 60, SHORT)
         share = (load - near.loads[-2]) / (near.loads[-1] - near.loads[-2])
         between = near.states[-2] + share * (near.states[-1] - near.states[-2])
         off = np.abs((between - state) * case.topology.scale).max()
