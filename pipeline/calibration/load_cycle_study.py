@@ -11,10 +11,13 @@ from pipeline.calibration.inputs import Constants, CycleRecord, LoadCycles
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
-from sim.energy import observe, topology
-from sim.quasistatics import StaticSolver
+from sim.energy import Observables, Topology, observe, topology
+from sim.quasistatics import StaticRecord, StaticSolver, trace
 from sim.solvers import PrescribedMotion, TimeSeries, held_dofs, solve_case
 from sim.structure import ConcreteParameters, Material, Parameters, parameters, shape
+
+PAST = 1e-6
+"""Share of its load by which a traced path may pass a jump: it turns there."""
 
 
 class CyclePath(NamedTuple):
@@ -26,6 +29,8 @@ class CyclePath(NamedTuple):
         energy: (n,) stored, N mm.
         turn: number of the farthest equilibrium.
         jumps: number of times that the structure jumped.
+        traced: (m, 2) approach, mm, and tension, N, along the path that the first jump leaves, not
+            stable from where the approach turns back to where it rises again; empty without a jump.
     """
 
     approach: Floats
@@ -33,10 +38,15 @@ class CyclePath(NamedTuple):
     energy: Floats
     turn: int
     jumps: int
+    traced: Floats
 
     def with_play(self, play: float) -> Self:
         """Shifts the clamps by half their play, against the force that they transmit."""
-        return self._replace(approach=self.approach - np.sign(self.tension) * play / 2)
+        approach, tension = self.traced.T
+        return self._replace(
+            approach=self.approach - np.sign(self.tension) * play / 2,
+            traced=np.column_stack([approach - np.sign(tension) * play / 2, tension]),
+        )
 
 
 def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CyclePath:
@@ -67,20 +77,42 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     )
     units_held = (np.array([asked.drive.held]), np.array([asked.drive.driven]))
     fixed = topology(lattice, held_dofs(*units_held), begin.law)
-    there_and_back = np.concatenate([path[1:], path[-2::-1]])
-    motion = np.concatenate([path[:1], there_and_back])
-    motion = np.column_stack([motion[:, :2], np.zeros(len(motion))])
-    steps = np.arange(len(motion), dtype=float)
+    whole = np.concatenate([path, path[-2::-1]])
+    direction = np.gradient(path[:, :2], path[:, 2], axis=0, edge_order=2)
+    along = np.concatenate([direction, direction[-2::-1]])
+    steps = np.arange(len(whole), dtype=float)
+    motion = np.column_stack([whole[:, :2], np.zeros(len(whole))])
     drive = PrescribedMotion(units_held[1], TimeSeries(steps, motion))
     state, _, found = solve_case(StaticSolver(fixed, steps[1:]), values, drive)
-    seen = observe(fixed, values, state.reshape(len(state), -1, 3))
-    force = seen.force_on(units_held[1])
-    direction = np.gradient(path[:, :2], path[:, 2], axis=0, edge_order=2)
-    along = np.concatenate([direction[1:], direction[-2::-1]])
-    tension = -(force * along).sum(axis=1)
-    energy = seen.strain_energy + seen.contact_energy
-    jumps = int(found.jumped.sum())
-    return CyclePath(there_and_back[:, 2], tension, energy, len(path) - 2, jumps)
+
+    def seen_at(loads: Floats, states: Floats) -> tuple[Observables, Floats]:
+        seen = observe(fixed, values, states.reshape(len(states), fixed.n_units, 3))
+        slope = np.column_stack([np.interp(loads, steps, each) for each in along.T])
+        return seen, -(seen.force_on(units_held[1]) * slope).sum(axis=1)
+
+    seen, tension = seen_at(steps[1:], state)
+    loads, states = _past_first_jump(found.topology or fixed, values, drive, found)
+    traced = np.interp(loads, steps, whole[:, 2]), seen_at(loads, states)[1]
+    return CyclePath(
+        whole[1:, 2], tension, seen.strain_energy + seen.contact_energy, len(path) - 2,
+        int(found.jumped.sum()), np.column_stack(traced),
+    )  # fmt: skip
+
+
+def _past_first_jump(
+    fixed: Topology, values: ConcreteParameters, drive: PrescribedMotion, found: StaticRecord
+) -> tuple[Floats, Floats]:
+    """Traces the path that the first jump leaves: loads (m,) and equilibria (m, n_dofs).
+
+    It begins at the last load before the jump, and ends where it comes by the jump's load again.
+    """
+    if not len(found.snaps):
+        return found.snaps, found.states[:0]
+    number = int(found.snaps[0])
+    before = found.states[number - 1] if number else np.zeros(fixed.n_dofs)
+    end = float(found.snaps[0] * (1.0 + PAST))
+    path = trace(fixed, values, drive, (float(number), before), end)
+    return path.loads[path.loads <= end], path.states[path.loads <= end]
 
 
 class MeasuredCycle(NamedTuple):
@@ -144,6 +176,7 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
         for role, part in ((2, slice(cycle.turn + 1)), (3, slice(cycle.turn, None))):
             none = np.full(len(shown.tension[part]), np.nan)
             curves.append((k, role, shown.approach[part], shown.tension[part], none))
+        curves.append((k, 4, *shown.traced.T, np.full(len(shown.traced), np.nan)))
     lengths = [len(each[2]) for each in curves]
     points = {
         "record_of_point": np.repeat([each[0] for each in curves], lengths),

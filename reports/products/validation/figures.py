@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from pipeline.datasets.tables import TABLES
 from reports.base import style
+from sim.core import Floats
 
 SYMBOLS = (r"$k_\ell$", r"$k_s$", r"$k_\theta$")
 COLOURS = (style.ALTERED, "#1d7f78", style.CLOAKED, "#2f86b4", "#a33c00", "#5b6067")
@@ -110,6 +111,7 @@ _STYLES = {
     "opening": ("-", style.GREY, "measured, parting"),
     "equilibrium_closing": ("-", style.CLOAKED, "equilibria, nearing"),
     "equilibrium_opening": ("--", style.ALTERED, "equilibria, parting"),
+    "equilibrium_traced": ((0, (2.0, 1.2)), style.INTACT, "equilibria, by arc length"),
 }
 
 
@@ -123,17 +125,7 @@ def draw_cycles(made: xr.Dataset) -> Figure:
         left, top = 12.0 + 89.0 * column, 58.0 * row
         style.letter(drawn, left - 10.0, top + 1.0, "abcdefgh"[k], str(made["title"].values[k]))
         axes = style.place(drawn, left, top + 8.0, 72.0, 40.0)
-        mine = made["record_of_point"].values == k
-        seen = made["force"].values[mine & (made["role"].values < 2)]
-        for role, number in TABLES["load_cycles"]["role"].flags.items():
-            chosen = mine & (made["role"].values == number)
-            if chosen.any():
-                line, colour, label = _STYLES[role]
-                x, y = made["displacement"].values[chosen], made["force"].values[chosen]
-                axes.plot(x, y, line, color=colour, linewidth=0.8, label=label)
-                if number < 2:
-                    wide = np.nan_to_num(made["scatter"].values[chosen])
-                    axes.fill_between(x, y - wide, y + wide, color=style.PALE, linewidth=0)
+        seen = _draw_ways(axes, made, k)
         snaps = made["record_of_snap"].values == k
         for end, force in (("snap_start", "snap_peak"), ("snap_end", "snap_rest")):
             named = "ends of a snap" if end == "snap_start" and snaps.any() else None
@@ -143,4 +135,36 @@ def draw_cycles(made: xr.Dataset) -> Figure:
         axes.set(xlabel="approach of the clamps, mm", ylabel="tension, N", ylim=(-reach, reach))
         axes.axhline(0, color=style.GREY, linewidth=0.4)
         axes.legend(loc="best")
+        _enlarge_trace(axes, made, k)
     return drawn
+
+
+def _draw_ways(axes: Axes, made: xr.Dataset, record: int) -> Floats:
+    """Draws force over displacement of a record and its equilibria; returns the measured force."""
+    mine, role = made["record_of_point"].values == record, made["role"].values
+    for name, number in TABLES["load_cycles"]["role"].flags.items():
+        chosen = mine & (role == number)
+        if chosen.any():
+            line, colour, label = _STYLES[name]
+            x, y = made["displacement"].values[chosen], made["force"].values[chosen]
+            width = 0.5 if name == "equilibrium_traced" else 0.8
+            axes.plot(x, y, linestyle=line, color=colour, linewidth=width, label=label)
+            if number < 2:
+                wide = np.nan_to_num(made["scatter"].values[chosen])
+                axes.fill_between(x, y - wide, y + wide, color=style.PALE, linewidth=0)
+    return np.asarray(made["force"].values[mine & (role < 2)])
+
+
+def _enlarge_trace(axes: Axes, made: xr.Dataset, record: int) -> None:
+    """Draws once more, enlarged, where the path is that a jump leaves, unstable in its midst."""
+    traced = TABLES["load_cycles"]["role"].flags["equilibrium_traced"]
+    on_it = (made["record_of_point"].values == record) & (made["role"].values == traced)
+    if not on_it.any():
+        return
+    inset = axes.inset_axes((0.12, 0.7, 0.38, 0.3))
+    _draw_ways(inset, made, record)
+    for name, limit in (("displacement", inset.set_xlim), ("force", inset.set_ylim)):
+        ends = made[name].values[on_it].min(), made[name].values[on_it].max()
+        limit(1.5 * ends[0] - 0.5 * ends[1], 1.5 * ends[1] - 0.5 * ends[0])
+    inset.tick_params(labelsize="small", length=1.5)
+    axes.indicate_inset_zoom(inset, edgecolor=style.GREY)

@@ -7,12 +7,17 @@ import pytest
 import xarray as xr
 
 from pipeline import datasets
-from pipeline.calibration import study_cycles
+from pipeline.calibration import load_cycle_study, study_cycles
 from pipeline.calibration.experiments import force_displacement, load_cycles
 from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOptions
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT, UserError
+from sim.core import Floats
+from sim.energy import Topology, observe
+from sim.quasistatics import EquilibriumTrace, StaticSolver, trace
+from sim.solvers import PrescribedMotion
+from sim.structure import ConcreteParameters
 from tests.pipeline.calibration.specimens import LATTICE
 
 FOLDER = ROOT / "experiments/validation"
@@ -170,6 +175,40 @@ def test_equilibria_along_the_arc(
     np.testing.assert_allclose(slope, force, atol=0.006)  # they have two decimals
     smooth = np.interp(at, found.approach[way], -found.tension[way])
     np.testing.assert_allclose(smooth[:4], slope[:4], atol=0.01 * max(force))
+
+
+def test_the_first_jump_leaves_a_path_that_turns_back(
+    morpher: LoadCycles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It turns forward where the last jump of the way back begins; stable parts are as solved."""
+    made = []
+
+    def kept(
+        fixed: Topology, values: ConcreteParameters, drive: PrescribedMotion,
+        start: tuple[float, Floats], end: float,
+    ) -> EquilibriumTrace:  # fmt: skip
+        made.append((fixed, values, drive, trace(fixed, values, drive, start, end)))
+        return made[-1][-1]
+
+    monkeypatch.setattr(load_cycle_study, "trace", kept)
+    assert follow_cycle(morpher, morpher.records[0], FOLDER).traced.shape == (0, 2)  # no jump
+    found = follow_cycle(morpher, morpher.records[1], FOLDER)
+    ((fixed, values, drive, path),) = made
+    first, last = path.turns
+    assert (path.falling[first + 1 : last] == 1).all()
+    assert (np.diff(found.traced[first : last + 1, 0]) < 0).all()
+    below = path.loads[last + 1 :] < 65  # above, the way back is on another branch
+    back = last + 1 + np.flatnonzero(below)[::-1]
+    near, far = path.loads[1:first], 240 - path.loads[back]
+    loads = np.unique(np.concatenate([np.arange(1.0, 240), near, far]))
+    solved = StaticSolver(fixed, loads).forward(values, drive)[2]
+    limits = solved.snaps[0], 240 - solved.snaps[-1]
+    np.testing.assert_allclose(path.loads[path.turns], limits, rtol=0, atol=1e-6)
+    for at, ours in ((near, path.states[1:first]), (far, path.states[back])):
+        assert len(at) > 3
+        pair = np.stack([ours, solved.states[np.searchsorted(loads, at)]])
+        force = observe(fixed, values, pair.reshape(-1, 64, 3)).force_on(np.array([35]))
+        np.testing.assert_allclose(force[: len(at)], force[len(at) :], rtol=0, atol=1e-6)
 
 
 def test_play_opens_a_gap_without_force(morpher: LoadCycles) -> None:
