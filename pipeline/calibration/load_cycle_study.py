@@ -18,6 +18,8 @@ from sim.structure import ConcreteParameters, Material, Parameters, parameters, 
 
 PAST = 1e-6
 """Share of its load by which a traced path may pass a jump: it turns there."""
+LONGEST = 0.5
+"""Arc length of a step of it at most, mm: with 1 mm it comes back to where it began."""
 
 
 class CyclePath(NamedTuple):
@@ -111,7 +113,7 @@ def _past_first_jump(
     number = int(found.snaps[0])
     before = found.states[number - 1] if number else np.zeros(fixed.n_dofs)
     end = float(found.snaps[0] * (1.0 + PAST))
-    path = trace(fixed, values, drive, (float(number), before), end)
+    path = trace(fixed, values, drive, (float(number), before), end, longest=LONGEST)
     return path.loads[path.loads <= end], path.states[path.loads <= end]
 
 

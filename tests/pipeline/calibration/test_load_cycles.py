@@ -185,9 +185,10 @@ def test_the_first_jump_leaves_a_path_that_turns_back(
 
     def kept(
         fixed: Topology, values: ConcreteParameters, drive: PrescribedMotion,
-        start: tuple[float, Floats], end: float,
+        start: tuple[float, Floats], end: float, longest: float,
     ) -> EquilibriumTrace:  # fmt: skip
-        made.append((fixed, values, drive, trace(fixed, values, drive, start, end)))
+        path = trace(fixed, values, drive, start, end, longest=longest)
+        made.append((fixed, values, drive, path))
         return made[-1][-1]
 
     monkeypatch.setattr(load_cycle_study, "trace", kept)
