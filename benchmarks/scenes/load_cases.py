@@ -172,6 +172,7 @@ def _small(
         cases=(drive,),
         weights=None,
         cloak=CLOAK,
+        frozen=None,
         region=REGION,
         **changes,
     )

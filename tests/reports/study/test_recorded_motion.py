@@ -135,8 +135,7 @@ def test_pages_say_that_it_is_synthetic(filmed: dict[str, StudyResults]) -> None
     study = filmed["smile"]
     html = rendered(study_report(study), {})
     assert f"<b>{LABEL}</b>: these recordings were rendered" in html
-    for name in ("intact_0", "altered_0", "cloaked_0"):
-        assert f'href="../recordings/{name}/index.html"' in html
+    assert html.count(f" <strong>{LABEL}</strong></li>") == len(study.recordings) > 1
 
 
 def test_a_recording_that_was_filmed_is_not_called_synthetic(

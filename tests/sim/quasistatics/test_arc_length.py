@@ -58,7 +58,8 @@ def test_a_path_turns_where_the_structure_snaps_and_its_points_are_equilibria() 
             shift[dof] = step / length
             tangent[:, column] = (force(state + shift) - force(state - shift)) / (2.0 * step)
         spectrum = np.linalg.eigvalsh((tangent + tangent.T) / 2.0)
-        assert np.count_nonzero(spectrum < 0.0) == found.falling[k]
+        if abs(spectrum[0]) > 1e-6:  # at a turn it is zero but for rounding
+            assert np.count_nonzero(spectrum < 0.0) == found.falling[k]
         assert found.eigenvalue[k] == pytest.approx(spectrum[0], rel=1e-3, abs=1e-5)
 
 
