@@ -18,6 +18,9 @@ from sim.core import Floats, SimulationError
 from sim.scene import relaxed
 
 LOG = logging.getLogger(__name__)
+BENT = np.radians(30.0)
+"""Angle between the ends of a shim and its ligament beyond which the law of ligaments, that of a
+beam of small slopes, is an indication only: its tangent is 10 % longer."""
 _KEY, _REMEDY = "report.as_built", "or leave report.as_built out"
 
 
@@ -32,9 +35,10 @@ def work(args: argparse.Namespace) -> None:
     posed = structures_of(scene_of(asked, args.problem.parent), design)
     name = "altered"
     try:
-        built = {}
+        built, angles = {}, {}
         for name, structure in posed.items():
-            built[name] = _built(name, structure, asked, design, args)
+            angles[name] = end_angles(network(design, name), asked.fabrication, args.design)
+            built[name] = _built(name, structure, angles[name])
         made, plans = response_dataset(asked, built, args.threads)
     except UnbuildableUnitError as error:
         error.remedy = f"{error.remedy}, {_REMEDY}"
@@ -43,6 +47,8 @@ def work(args: argparse.Namespace) -> None:
         raise _failure(error, name, posed, args, np.zeros(0)) from error
     except StoppedError as stopped:
         raise _failure(stopped.error, stopped.name, posed, args, stopped.asked) from stopped
+    for name, each in angles.items():
+        plans[name]["warnings"] += bent_warning(name, each)
     origin = provenance.of_study(asked, "as_built", parents={"design": args.design}, plan=plans)
     datasets.write(counted_from_rest(made, asked), args.out, "response", origin)
 
@@ -60,25 +66,30 @@ def _failure(
     return failures.simulation_failure(error, tried, None)
 
 
-def _built(
-    name: str,
-    structure: PosedStructure,
-    asked: Problem,
-    design: xr.Dataset,
-    args: argparse.Namespace,
-) -> PosedStructure:
+def bent_warning(name: str, angles: Floats) -> list[str]:
+    """Warns of shims of a structure whose ends (n, 2), rad, are bent beyond the ligaments' law."""
+    most = np.abs(angles).max(axis=1, initial=0.0)
+    if (count := np.count_nonzero(most > BENT)) == 0:
+        return []
+    return [
+        f"as built: {count} of {len(most)} shims of the {name} structure are bent by more than"
+        f" {np.degrees(BENT):.0f}° before any load, at most by {np.degrees(most.max()):.0f}°, where"
+        " the law of ligaments is an indication only; ask for constraints.straight_shims"
+    ]
+
+
+def _built(name: str, structure: PosedStructure, angles: Floats) -> PosedStructure:
     """Bends the shims of a structure, and lets it come to rest; one of straight shims is as it is.
 
     Raises:
-        UnbuildableUnitError: a slot has no room.
         SimulationError: there is no equilibrium.
     """
     scene, vertices = structure
-    angles = end_angles(network(design, name), asked.fabrication, args.design)
     if np.abs(angles).max(initial=0.0) < STRAIGHT:
         return structure
-    material = scene.structure.material._replace(end_angles=angles)
-    rest = relaxed(scene.updated(material=material), vertices)
+    rest = relaxed(
+        scene.updated(material=scene.structure.material._replace(end_angles=angles)), vertices
+    )
     turns = np.degrees(np.abs(rest.motion[:, 2]))
     LOG.info("%s: units turn by %.2f deg, at most %.2f, to rest", name, turns.mean(), turns.max())
     return PosedStructure(rest.scene, rest.vertices)

@@ -3,6 +3,7 @@
 import argparse
 import logging
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -98,7 +99,7 @@ def _until(scene: Scene, steps: int) -> Scene:
 
 def response_dataset(
     asked: Problem, structures: dict[str, PosedStructure], threads: int
-) -> tuple[xr.Dataset, dict[str, object]]:
+) -> tuple[xr.Dataset, dict[str, dict[str, Any]]]:
     """The dataset ``response`` of the structures, and the plan of each.
 
     Raises:
@@ -111,14 +112,14 @@ def response_dataset(
 
 def measured_cases(
     structures: dict[str, PosedStructure], times: Times, threads: int
-) -> tuple[dict[str, list[CaseResult]], dict[str, object]]:
+) -> tuple[dict[str, list[CaseResult]], dict[str, dict[str, Any]]]:
     """Every case of every structure, and the plan of each structure.
 
     Raises:
         UserError: a structure cannot be simulated.
     """
     measured: dict[str, list[CaseResult]] = {}
-    plans: dict[str, object] = {}
+    plans: dict[str, dict[str, Any]] = {}
     n_cases = len(structures["altered"].scene.loads.motions)
     with cli.progress(len(structures) * n_cases, "response") as bar:
         for name, structure in structures.items():

@@ -177,7 +177,8 @@ def _skipped(study: StudyResults) -> list[str]:
 
 def _warnings(study: StudyResults) -> list[str]:
     """Lists what may not be meant in the structures that were simulated, each once."""
-    plans = json.loads(study.response.attrs["plan"]).values()
+    told = [study.response] if study.as_built is None else [study.response, study.as_built.response]
+    plans = [plan for each in told for plan in json.loads(each.attrs["plan"]).values()]
     said = list(dict.fromkeys(text for plan in plans for text in plan.get("warnings", ())))
     return [*said, *foil.strain_warning(study.problem, study.response)]
 

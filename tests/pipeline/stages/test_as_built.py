@@ -9,6 +9,7 @@ from pipeline import datasets, problem
 from pipeline.__main__ import run_stage
 from pipeline.fabrication.units import end_angles, network
 from pipeline.posing import read_design, scene_of, structures_of
+from pipeline.stages.as_built import bent_warning
 from sim.scene import as_built
 from tests.pipeline import static
 
@@ -37,3 +38,11 @@ def test_losses_are_those_of_the_relaxed_structures(tmp_path: Path) -> None:
     start = built.isel(time=0)
     assert np.allclose(start["displacement"], 0.0, atol=1e-9)
     assert np.allclose(start["roi_energy"], 0.0, atol=1e-12)
+
+
+def test_shims_bent_beyond_the_law_of_ligaments_are_warned_of() -> None:
+    angles = np.radians([[5.0, -29.0], [31.0, 0.0], [-40.0, 103.0]])
+    assert bent_warning("cloaked", angles[:1]) == []
+    (told,) = bent_warning("cloaked", angles)
+    assert "2 of 3 shims of the cloaked structure" in told
+    assert "at most by 103°" in told
