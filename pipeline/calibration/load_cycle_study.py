@@ -11,13 +11,11 @@ from pipeline.calibration.inputs import Constants, CycleRecord, LoadCycles
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
-from sim.energy import Observables, Topology, observe, topology
-from sim.quasistatics import StaticRecord, StaticSolver, trace
+from sim.energy import Observables, observe, topology
+from sim.quasistatics import StaticSolver, trace_first_snap
 from sim.solvers import PrescribedMotion, TimeSeries, held_dofs, solve_case
 from sim.structure import ConcreteParameters, Material, Parameters, parameters, shape
 
-PAST = 1e-6
-"""Share of its load by which a traced path may pass a jump: it turns there."""
 LONGEST = 0.5
 """Arc length of a step of it at most, mm: with 1 mm it comes back to where it began."""
 
@@ -85,7 +83,8 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
     steps = np.arange(len(whole), dtype=float)
     motion = np.column_stack([whole[:, :2], np.zeros(len(whole))])
     drive = PrescribedMotion(units_held[1], TimeSeries(steps, motion))
-    state, _, found = solve_case(StaticSolver(fixed, steps[1:]), values, drive)
+    solver = StaticSolver(fixed, steps[1:])
+    state, _, found = solve_case(solver, values, drive)
 
     def seen_at(loads: Floats, states: Floats) -> tuple[Observables, Floats]:
         seen = observe(fixed, values, states.reshape(len(states), fixed.n_units, 3))
@@ -93,28 +92,13 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
         return seen, -(seen.force_on(units_held[1]) * slope).sum(axis=1)
 
     seen, tension = seen_at(steps[1:], state)
-    loads, states = _past_first_jump(found.topology or fixed, values, drive, found)
+    past = trace_first_snap(solver, values, drive, found, LONGEST)
+    loads, states = (found.snaps, found.states[:0]) if past is None else past[:2]
     traced = np.interp(loads, steps, whole[:, 2]), seen_at(loads, states)[1]
     return CyclePath(
         whole[1:, 2], tension, seen.strain_energy + seen.contact_energy, len(path) - 2,
         int(found.jumped.sum()), np.column_stack(traced),
     )  # fmt: skip
-
-
-def _past_first_jump(
-    fixed: Topology, values: ConcreteParameters, drive: PrescribedMotion, found: StaticRecord
-) -> tuple[Floats, Floats]:
-    """Traces the path that the first jump leaves: loads (m,) and equilibria (m, n_dofs).
-
-    It begins at the last load before the jump, and ends where it comes by the jump's load again.
-    """
-    if not len(found.snaps):
-        return found.snaps, found.states[:0]
-    number = int(found.snaps[0])
-    before = found.states[number - 1] if number else np.zeros(fixed.n_dofs)
-    end = float(found.snaps[0] * (1.0 + PAST))
-    path = trace(fixed, values, drive, (float(number), before), end, longest=LONGEST)
-    return path.loads[path.loads <= end], path.states[path.loads <= end]
 
 
 class MeasuredCycle(NamedTuple):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 from pipeline.posing.structure_variables import flat_vertices
 from sim.core import Floats, Ints
 from sim.energy import observe
-from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver, trace
+from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver, trace_first_snap
 from sim.scene import (
     drive_force,
     estimated_errors,
@@ -32,8 +32,6 @@ from sim.scene import (
 from sim.solvers import solve_case
 from sim.structure import clearance
 
-PAST = 1e-6
-"""Share of its load by which a traced path may pass a snap: it turns there."""
 CLEARANCE_STRIDE = 4
 """Gaps and overlaps of a motion in time are looked for in every so many samples."""
 NOT_ASKED, UNSTABLE, STABLE = -1, 0, 1
@@ -220,25 +218,18 @@ def _path(solved: Solved, at: Ints) -> _Path:
 
 
 def _traced(solved: Solved, scene: Scene) -> TracedPath:
-    """Traces the path that the first snap leaves, from the last load before it.
-
-    It ends where it comes by the snap's load again; where it branches, at the full load.
-    """
-    record, case = solved.record, solved.case
-    nothing = TracedPath(np.full(1, np.nan), np.full((1, 2), np.nan), np.full(1, np.nan))
-    if not isinstance(record, StaticRecord) or not len(record.snaps) or record.snaps[0] <= 0.0:
-        return nothing
-    loads, top = case.solver.output_times, record.topology or case.solver.topology
-    number = int(np.searchsorted(loads, record.snaps[0]))
-    rest = 0.0, np.zeros(top.n_dofs)
-    before = (float(loads[number - 1]), record.states[number - 1]) if number else rest
-    limit_point = record.jumped[number] != BRANCHING
-    end = float(record.snaps[0] * (1.0 + PAST) if limit_point else loads[-1])
-    found = trace(top, case.values, case.drive, before, end)
+    """Traces the path that the first snap leaves."""
+    record, case, top = solved.record, solved.case, scene.topology
+    found = None
+    if isinstance(record, StaticRecord) and isinstance(case.solver, StaticSolver):
+        found = trace_first_snap(case.solver, case.values, case.drive, record)
+    if found is None:
+        return TracedPath(np.full(1, np.nan), np.full((1, 2), np.nan), np.full(1, np.nan))
+    loads = case.solver.output_times
     turns = ", ".join(f"{found.loads[at] / loads[-1]:.4g}" for at in found.turns)
     LOG.info("the path that it leaves turns at %s of the load", turns or "none")
     motion = found.states[:, : 3 * top.n_units].reshape(len(found.loads), -1, 3)
-    seen = observe(scene.topology, case.values, motion)
+    seen = observe(top, case.values, motion)
     return TracedPath(
         found.loads, drive_force(scene, seen, case.drive, found.loads), found.eigenvalue
     )

@@ -21,6 +21,8 @@ from scipy.optimize import brentq
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs
 from sim.energy import System, Topology, gradient, hessian_product, system_of, workspace
+from sim.quasistatics.equilibrium_path import BRANCHING
+from sim.quasistatics.static_solver import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 from sim.vibration import linearised
@@ -33,6 +35,8 @@ CORRECTIONS, FAST = 8, 4
 """Newton steps of a point at most, and those up to which the next step is longer."""
 BALANCED = 1e-9
 """Newton step at which a point counts as found, mm."""
+PAST = 1e-6
+"""Share of its load by which a path may pass the snap that it turns at."""
 FEW = 20
 """Degrees of freedom below which all eigenvalues are computed."""
 
@@ -86,6 +90,42 @@ def trace(
         return _trace(topology, values, drive, start, end, points, longest)
     except NewContactPairs as met:
         return trace(topology.coupling(met.pairs), values, drive, start, end, points, longest)
+
+
+def trace_first_snap(
+    solver: StaticSolver,
+    values: ConcreteParameters,
+    drive: PrescribedMotion,
+    record: StaticRecord,
+    longest: float = LONGEST,
+) -> EquilibriumTrace | None:
+    """Traces the path that the first snap of a solution leaves, from the last load before it.
+
+    It ends where it comes by the snap's load again; where it branches, at the full load.
+
+    Args:
+        solver: of the solution.
+        values: parameters of the structure.
+        drive: what moves the held dofs.
+        record: of the solution.
+        longest: arc length of a step at most, mm.
+
+    Returns:
+        the path; None without a snap, or with one at rest.
+    """
+    if not len(record.snaps) or record.snaps[0] <= 0.0:
+        return None
+    loads, top = solver.output_times, record.topology or solver.topology
+    number = int(np.searchsorted(loads, record.snaps[0]))
+    rest = 0.0, np.zeros(top.n_dofs)
+    before = (float(loads[number - 1]), record.states[number - 1]) if number else rest
+    limit_point = record.jumped[number] != BRANCHING
+    end = float(record.snaps[0] * (1.0 + PAST) if limit_point else loads[-1])
+    found = trace(top, values, drive, before, end, longest=longest)
+    kept = found.loads <= end
+    return EquilibriumTrace(
+        found.loads[kept], found.states[kept], found.eigenvalue[kept], found.falling[kept]
+    )
 
 
 def _trace(

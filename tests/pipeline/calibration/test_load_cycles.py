@@ -13,9 +13,8 @@ from pipeline.calibration.inputs import ForceDisplacement, LoadCycles, RecordOpt
 from pipeline.calibration.load_cycle_study import follow_cycle, measure_cycle
 from pipeline.problem.reading import load_section
 from pipeline.runtime import ROOT, UserError
-from sim.core import Floats
-from sim.energy import Topology, observe
-from sim.quasistatics import EquilibriumTrace, StaticSolver, trace
+from sim.energy import observe
+from sim.quasistatics import EquilibriumTrace, StaticRecord, StaticSolver, trace_first_snap
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
 from tests.pipeline.calibration.specimens import LATTICE
@@ -184,14 +183,15 @@ def test_the_first_jump_leaves_a_path_that_turns_back(
     made = []
 
     def kept(
-        fixed: Topology, values: ConcreteParameters, drive: PrescribedMotion,
-        start: tuple[float, Floats], end: float, longest: float,
-    ) -> EquilibriumTrace:  # fmt: skip
-        path = trace(fixed, values, drive, start, end, longest=longest)
-        made.append((fixed, values, drive, path))
-        return made[-1][-1]
+        solver: StaticSolver, values: ConcreteParameters, drive: PrescribedMotion,
+        record: StaticRecord, longest: float,
+    ) -> EquilibriumTrace | None:  # fmt: skip
+        path = trace_first_snap(solver, values, drive, record, longest)
+        if path is not None:
+            made.append((record.topology or solver.topology, values, drive, path))
+        return path
 
-    monkeypatch.setattr(load_cycle_study, "trace", kept)
+    monkeypatch.setattr(load_cycle_study, "trace_first_snap", kept)
     assert follow_cycle(morpher, morpher.records[0], FOLDER).traced.shape == (0, 2)  # no jump
     found = follow_cycle(morpher, morpher.records[1], FOLDER)
     ((fixed, values, drive, path),) = made
