@@ -18,7 +18,7 @@ LEVEL = 0.95
 REPEATS = 64
 """New samples for every draw from the posterior."""
 _REACH = np.linspace(-5.0, 5.0, 201)
-"""Where the law of a spread is summed, in standard deviations of its prior."""
+"""Sums the law of a spread at these, in standard deviations of its prior."""
 _JITTER = 1e-10
 
 
