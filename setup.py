@@ -4,8 +4,6 @@ What imports `sim`, `pipeline` or `reports` here imports `metacloak.sim` and so 
 runs `python -m pipeline` runs `python -m metacloak.pipeline`. All else is in pyproject.toml.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Draws the tables of docs/benchmarks.md as docs/benchmarks.svg: `python -m benchmarks.picture`."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Installed, `sim`, `pipeline` and `reports` lie in this package. In a checkout th
 and `metacloak.sim` is `sim` itself: one module under two names.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Sequence

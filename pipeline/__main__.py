@@ -1,7 +1,5 @@
 """Runs a stage by its name: `python -m pipeline STAGE ...`, or `metacloak STAGE ...`."""
 
-from __future__ import annotations
-
 import difflib
 import sys
 from argparse import Namespace

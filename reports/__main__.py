@@ -1,7 +1,5 @@
 """Makes a report: `python -m reports KIND ...`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ Nothing of a report is imported here, so that --help is instant and the hash of 
 follows its own kind alone.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ them: as damped dynamics of a scene whose mass is scaled up, slow enough to end 
 equilibrium.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Lists our own solvers as methods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial

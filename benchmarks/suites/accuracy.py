@@ -1,7 +1,5 @@
 """Measures the errors of motions under all kinds of drives: true beside stated, and their time."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from dataclasses import replace

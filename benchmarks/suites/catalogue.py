@@ -1,7 +1,5 @@
 """Lists the suites, by name: those that run in turn, and those of `snakemake benchmark`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Measures Figure 4's loss and gradient at the final load: equilibrium against damped dynamics."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

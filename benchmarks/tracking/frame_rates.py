@@ -1,7 +1,5 @@
 """Measures accuracy of tracking against frame rate, on videos with known truth."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Callable, Iterator

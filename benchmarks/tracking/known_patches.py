@@ -4,8 +4,6 @@ Every patch is found unaided, then fitted by the tracker's correlation and, from
 OpenCV's pyramidal optical flow.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from pathlib import Path

@@ -3,8 +3,6 @@
 Pixels are covered exactly, by signed areas of the outlines' pieces; OpenCV blurs and adds hands.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Makes clips as labs film them: a specimen that leaves, hands, little light, rolling shutters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType

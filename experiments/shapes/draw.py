@@ -5,8 +5,6 @@ y up, filled without antialiasing; the leaves of the shamrock are hearts. `logo.
 might hand in: painted with a round brush, turned by a few degrees, blurred and compressed.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

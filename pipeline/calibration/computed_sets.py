@@ -1,7 +1,5 @@
 """Computes measurements from known constants, with noise."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Computes values with intervals from a fit, and warns of what weakens them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The rigid part is taken out of what is compared. The scale is told and left in: 
 made too large, or a pixel of the wrong size, is a finding.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

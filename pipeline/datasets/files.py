@@ -1,7 +1,5 @@
 """Stores datasets as netCDF-4, whole or not at all: the same bytes for the same data."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Checks datasets against their tables, those of older versions as if they were written today."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

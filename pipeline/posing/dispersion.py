@@ -1,7 +1,5 @@
 """Computes waves in the unit cell of a problem's lattice, at rest and compressed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.posing.structure_variables import Variables

@@ -1,7 +1,5 @@
 """Looks at a problem before it is computed: what it costs, and what may not be meant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Imperfect copies of a design: how they are drawn, simulated and measured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple

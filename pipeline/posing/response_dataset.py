@@ -1,7 +1,5 @@
 """Assembles the dataset of a study's responses from the results of structures and cases."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

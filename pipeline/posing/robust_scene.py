@@ -1,7 +1,5 @@
 """Poses the scene that a design is optimised for, and the loads that it must hold."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulates the losses of the altered structure and of a design in one problem."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reads the start of an optimisation: the initial lattice, or a design."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

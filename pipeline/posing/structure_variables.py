@@ -1,7 +1,5 @@
 """Converts a structure to variables of a dataset, and back."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Canonical text and hashes of a problem, whole or as far as one stage depends on it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

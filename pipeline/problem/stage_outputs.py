@@ -1,7 +1,5 @@
 """Lists the datasets that stages make of a problem, and poses it over measured constants."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Selects units by their part in a problem: removed, made rigid, redesigned, looked at."""
 
-from __future__ import annotations
-
 from pipeline.problem.model import Problem
 from pipeline.problem.sections import (
     Region,

@@ -1,7 +1,5 @@
 """Writes files and folders that appear complete or not at all."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

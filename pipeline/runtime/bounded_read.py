@@ -1,7 +1,5 @@
 """Reads files that others wrote, up to a bound."""
 
-from __future__ import annotations
-
 import errno
 import stat
 from pathlib import Path

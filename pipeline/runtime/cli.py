@@ -1,7 +1,5 @@
 """Frames every command line: options, logs, and errors that people can read."""
 
-from __future__ import annotations
-
 import argparse
 import gc
 import logging

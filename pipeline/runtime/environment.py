@@ -5,8 +5,6 @@ byte-reproducible without them; work is spread over cores as processes instead. 
 these variables once, when they are imported, so `pipeline` sets them on its own import.
 """
 
-from __future__ import annotations
-
 import os
 
 import platformdirs

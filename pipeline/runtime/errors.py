@@ -1,7 +1,5 @@
 """Defines the error that people read: what is wrong, where, and what to do about it."""
 
-from __future__ import annotations
-
 import errno
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ In a checkout all three are there. Of an installed package the code lies in site
 is the folder in which a command runs, and the caches are the user's.
 """
 
-from __future__ import annotations
-
 import tomllib
 from importlib import metadata
 from pathlib import Path

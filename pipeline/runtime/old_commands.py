@@ -1,7 +1,5 @@
 """Runs commands by the names that they had: `python -m pipeline.track` for one more release."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.abc import InspectLoader, MetaPathFinder

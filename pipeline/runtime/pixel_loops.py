@@ -1,7 +1,5 @@
 """Compiles loops over pixels, and names the type of a picture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

@@ -4,8 +4,6 @@ Snakemake does not see an edit in an imported module; a hash of these files amon
 makes it see.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator
 from functools import cache

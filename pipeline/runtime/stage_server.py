@@ -7,8 +7,6 @@ forks while it has one thread, so nothing of it may start JAX. Where there is no
 macOS, a command typed by hand) a stage runs by itself.
 """
 
-from __future__ import annotations
-
 import atexit
 import ctypes
 import importlib

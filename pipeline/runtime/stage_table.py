@@ -1,7 +1,5 @@
 """Lists the stages: one row each, from which the command line, the rules and hashes follow."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple

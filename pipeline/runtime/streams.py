@@ -1,7 +1,5 @@
 """Completes the standard streams of a process that was started without some of them."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Stage: optimises the cloak of a problem by one method and writes the design with its history."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 from dataclasses import replace

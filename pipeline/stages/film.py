@@ -1,7 +1,5 @@
 """Stage: films a simulated response, so that a study has a recording before a lab has made one."""
 
-from __future__ import annotations
-
 import argparse
 import logging
 import os

@@ -1,7 +1,5 @@
 """Stage: ships the better feasible design of several methods, with all their histories."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import logging

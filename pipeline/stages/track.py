@@ -1,7 +1,5 @@
 """Stage: turns the video of a specimen into the motions of its units, with their uncertainty."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import logging

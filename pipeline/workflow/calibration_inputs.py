@@ -4,8 +4,6 @@ A calibration is a file experiments/calibration/NAME.yaml. It names measured fil
 tells how they are computed.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from snakemake.iocontainers import Wildcards

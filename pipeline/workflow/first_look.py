@@ -1,7 +1,5 @@
 """Shows studies before they are computed: each in a picture, with its cost and what is doubtful."""
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

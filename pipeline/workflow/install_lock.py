@@ -5,8 +5,6 @@ well; it is told the settings of pip by its environment, since command lines are
 Byte code is left to the first import, unless Python is told to write none then.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import os

@@ -5,8 +5,6 @@ problem it ran, and what it made (https://w3id.org/ro/wfrun/workflow). Rebuilt i
 folder, results have the same bytes as those below `published/`.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import shutil

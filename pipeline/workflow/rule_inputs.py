@@ -5,8 +5,6 @@ Both enter the rules as hashes: a rerun follows from what a file says, never fro
 heavy is imported here: this is the time one waits for "nothing to be done".
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Sequence

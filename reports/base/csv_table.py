@@ -1,7 +1,5 @@
 """Describes data tables of a report, as CSV."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ that it will have in print. Colour maps are straight in lightness and even in OK
 2020), hence readable in grey and with any colour vision. Saved files carry no date.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """States facts that any design and response have: evaluations, margins, gaps, stability."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """States how far the foil of the ligaments is strained by the loads of a study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import jax.numpy as jnp

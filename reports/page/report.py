@@ -3,8 +3,6 @@
 They are made in a folder beside the wanted one and moved in when all of them are whole.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Lays out the page of one or several studies: one HTML file that works from disk."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -7,8 +7,6 @@ the tangent has no room for ("new pairs") are noted before they come within reac
 counts as not admissible, and the solve is to be repeated with more room.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Outlines of units in a state: where they are, how near two come, and whether they cross."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ bounded; as long as it stays on the far side of one of the lines that bound the 
 far as that bound vouches for, again and again, until a meeting is close or the step's end reached.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Values and local derivatives are evaluated together, place by place, and scatter
 through a map computed once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Every requirement is one number per place (an edge, a corner, a side of a ligame
 units) that depends on a few vertices only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -8,8 +8,6 @@ Three requirements say so: the angle between slot and edge at the vertex, for th
 have its walls there; the wall to all other edges; and that to other slots.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import jax.numpy as jnp

@@ -1,7 +1,5 @@
 """Defines the types of arrays, all of 64 bits where nothing else is said."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np

@@ -5,8 +5,6 @@ takes a copy of what it calls and optimises that again. Here a library stays LLV
 code, inlined at little cost, until somebody asks for the address of a function in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from types import FunctionType

@@ -3,8 +3,6 @@
 It says nothing about how long the work takes, so whoever tells of progress leaves it out.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Compiles loops: once on a machine, however many processes want them at the same time."""
 
-from __future__ import annotations
-
 import fcntl
 import logging
 import time

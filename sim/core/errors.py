@@ -1,7 +1,5 @@
 """Defines the errors that a solve may end with; each says where it failed and what to try."""
 
-from __future__ import annotations
-
 from sim.core.arrays import Floats, Ints
 
 

@@ -1,7 +1,5 @@
 """Follows import statements of this project to the files that decide what a module does."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable, Iterator
 from functools import cache

@@ -6,8 +6,6 @@ AVX2 with fused multiply-add, which processors have had since 2013 (Intel) and 2
 compute with what they have.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -10,8 +10,6 @@ touch anywhere. It is the definition that the compiled kernels
 (sim/energy/distance_contact_kernels.py) are tested against.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

@@ -11,8 +11,6 @@ The term of an edge is a function of the vertex's distance s outside its line an
 along it; with t and n the edge's direction and outer normal g = E_s n + E_x t.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ The compiled kernels (sim/energy/ligament_kernels.py) are tested against the aut
 derivatives of these functions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

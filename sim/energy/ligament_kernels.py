@@ -13,8 +13,6 @@ and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b
 r_a).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrays of one structure as the compiled kernels take them, and derivatives by them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from sim.core import Floats, Ints

@@ -1,7 +1,5 @@
 """Computes energies and reactions of given states."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

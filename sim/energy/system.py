@@ -1,7 +1,5 @@
 """Lays out a structure as compiled solvers take it, and their scratch memory."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ displacement, so that solvers follow it, and adjoints differentiate by it, as th
 The solvers see the energy and the admissible states through these functions alone.
 """
 
-from __future__ import annotations
-
 from sim.collision import collision_free_step
 from sim.core import Floats, Ints, compiled
 from sim.energy import ligament_kernels, void_contact_kernels

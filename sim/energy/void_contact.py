@@ -1,7 +1,5 @@
 """Defines the energy of contact on a void angle, which the compiled kernels are tested against."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax.numpy as jnp

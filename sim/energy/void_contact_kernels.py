@@ -6,8 +6,6 @@ the two voids beside a ligament open and close with the rotation of its first un
 second, the "turn".
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled

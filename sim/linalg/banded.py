@@ -1,7 +1,5 @@
 """Factorises and solves banded systems, and orders the dofs for a small bandwidth."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Routines of LAPACK and BLAS for compiled code, on one thread."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import scipy.linalg.cython_blas

@@ -4,8 +4,6 @@ A front's own columns lie in the factor's values, column by column, diagonal blo
 front leaves to its boundary is added to its parent (I. S. Duff, J. K. Reid 1983).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled

@@ -6,8 +6,6 @@ constant stride, so that few run-time alias checks are needed. No fast-math flag
 than 4 % and make the last bits depend on whether callers were compiled just now or long ago.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, compiled

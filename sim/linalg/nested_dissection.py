@@ -5,8 +5,6 @@ come after those of both sides. Each cut, and each part too small to be cut, is 
 are eliminated together as one dense block, coupled to later dofs, the front's boundary.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

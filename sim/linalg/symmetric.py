@@ -3,8 +3,6 @@
 Both are filled entry by entry, factorised in place and solved with through the same functions.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Projects designs on the feasible set by the shortest way."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, SimulationError

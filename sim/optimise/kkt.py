@@ -1,7 +1,5 @@
 """First-order optimality of a design: residual of the Karush-Kuhn-Tucker conditions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Minimises by any of the methods."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -9,8 +9,6 @@ constraints are cheap, so for them this happens before the loss is simulated.
 # of fig2@quick end at a loss of 0.353 in place of 0.247. Within +-3 mm it is as good: 60 designs
 # of figure 2 end at 0.5835 in place of 0.5856, with half the time outside the simulation.
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

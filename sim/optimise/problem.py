@@ -1,7 +1,5 @@
 """Counts and records the evaluations of a minimisation, and holds its result."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field

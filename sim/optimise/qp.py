@@ -1,7 +1,5 @@
 """The two quadratic programs of a feasible SQP step, by piqp (Schwan et al. 2023)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Damped BFGS model of the Lagrangian's Hessian (Powell 1978; Nocedal and Wright, section 18.3)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats

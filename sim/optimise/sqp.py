@@ -5,8 +5,6 @@ set before it is simulated, and the loss alone decides whether it is accepted (W
 2004, SIAM J. Optim. 14, 1074, with a quasi-Newton model of the Lagrangian).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

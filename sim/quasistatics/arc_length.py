@@ -9,8 +9,6 @@ t being the path's tangent at the point before, is regular in a limit point too 
 Solids Struct. 15, 529). Beyond it equilibria are unstable until the path turns forward again.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

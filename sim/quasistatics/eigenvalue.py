@@ -7,8 +7,6 @@ It vanishes where a stable path ends. With K v = lambda S^2 v and v . S^2 v = 1,
 of which the part by the state goes on to the parameters through the equilibrium, by the adjoint.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse.linalg as spla
 

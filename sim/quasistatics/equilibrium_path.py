@@ -7,8 +7,6 @@ followed up to where it ends: a limit point or a branching. From there it goes o
 damped motion comes to, and the critical point is recorded.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

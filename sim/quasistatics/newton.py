@@ -5,8 +5,6 @@ shifted until it is positive definite, so that the descent ends in a minimum or,
 a saddle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined

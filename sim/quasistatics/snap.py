@@ -5,8 +5,6 @@ its viscous damping, C dq/dt = -dE/dq, until it comes to rest. That rest depends
 point alone, not on the loads by which the path came to it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled

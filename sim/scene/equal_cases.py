@@ -1,7 +1,5 @@
 """Finds load cases that a quarter turn of the structure makes equal, so that one is solved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

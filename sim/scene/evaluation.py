@@ -1,7 +1,5 @@
 """Evaluates designs: loss and gradient by the adjoint, and the design that minimises the loss."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Sequence
 from copy import copy

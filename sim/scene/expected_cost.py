@@ -1,7 +1,5 @@
 """Estimates unknowns, memory and time of a scene before anything is computed."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Measures how far a response is from its target, per load case, in JAX."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import jax

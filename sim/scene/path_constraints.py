@@ -1,7 +1,5 @@
 """Constrains designs by what they do under load: no snap on the way, no foil strained too far."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import jax

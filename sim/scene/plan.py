@@ -1,7 +1,5 @@
 """Decides what a scene needs and what it may skip: once, printed, and stored with results."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Finds the equilibrium of a structure whose ligaments are not free of stress, before any load."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Checks that a scene has a meaning: refuses what has none, and warns of what may be meant."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Iterable, Iterator

@@ -6,8 +6,6 @@ order is that of motions which start with a jump of the velocity, well below tha
 Explicit steps, which cannot be longer than stable ones, are compared with the leapfrog's first.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace

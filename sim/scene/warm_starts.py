@@ -5,8 +5,6 @@ from the same ones. Each path is on the disc before its evaluation enters the jo
 there as long as it may be needed: the last accepted one and the newest.
 """
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import os

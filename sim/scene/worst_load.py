@@ -6,8 +6,6 @@ that is much worse than those in the set (a semi-infinite programme, solved by e
 Kortanek 1993, SIAM Rev. 35, 380).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

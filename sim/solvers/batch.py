@@ -1,7 +1,5 @@
 """Solves many independent cases: over all cores, memory flat, failures kept with a reason."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor

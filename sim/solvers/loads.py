@@ -4,8 +4,6 @@ A law computes in the library of the times that it is given: at once in NumPy, a
 is differentiated.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 import numpy as np

@@ -4,8 +4,6 @@ Beyond its barrier a void has no force, and a unit without mass no acceleration:
 on from there without a sign that anything is wrong.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Defines the two laws of contact between units; the stiffness is a constant of the material."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeAlias
 

@@ -1,7 +1,5 @@
 """Maps design vectors to vertices: the free ones, and those that move together by symmetry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal

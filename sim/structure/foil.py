@@ -10,8 +10,6 @@ up. Shear deformation makes it softer by 3.3 (t / l)^2 in shear, 4 % at a ninth.
 it is long cannot curl across: it is up to 1 / (1 - nu^2) stiffer, 17 % of polyester.
 """
 
-from __future__ import annotations
-
 import math
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 

@@ -4,8 +4,6 @@ Independent of the optimiser's constraint functions: this is what decides whethe
 built and whether its units pass through one another while it moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derives the shape of the units from the vertices, in JAX: centroid, inertia, arms, angles."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

@@ -1,7 +1,5 @@
 """Derives the parameters of a structure, by which a solve can be differentiated."""
 
-from __future__ import annotations
-
 from typing import Generic, NamedTuple, TypeAlias, TypeVar
 
 import jax.numpy as jnp

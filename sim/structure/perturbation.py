@@ -4,8 +4,6 @@ A copy whose units overlap cannot be made, so such a place is drawn again until 
 shifts of the units concerned and of nothing else (partial resampling, Moser and Tardos 2010).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

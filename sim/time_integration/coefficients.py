@@ -1,7 +1,5 @@
 """Holds coefficients of the time integrators: splittings and the Runge-Kutta method."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ the rotations of those units take finer steps of the same splitting, as many as 
 that their energy can carry them to. The steps of all else need not follow the barrier.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

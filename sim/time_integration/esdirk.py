@@ -1,7 +1,5 @@
 """Integrates a network's motion by diagonally implicit Runge-Kutta steps, compiled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined

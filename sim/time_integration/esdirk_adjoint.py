@@ -3,8 +3,6 @@
 It factors every stage's tangent anew, so that it does not depend on which factors were kept.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined

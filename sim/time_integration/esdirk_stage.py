@@ -8,8 +8,6 @@ for its displacement u; then v = (u - u*) / k and a = (v - v*) / k. The factor i
 contracts.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from sim.core import Floats, Ints, compiled, inlined

@@ -1,7 +1,5 @@
 """Controls steps for slow drives: finds a grid that meets a tolerance, to be frozen then."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -10,8 +10,6 @@ The reverse sweep needs the states at the kicks; they are kept at checkpoints an
 segment by segment, so memory grows with the square root of the number of steps.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

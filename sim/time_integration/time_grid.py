@@ -1,7 +1,5 @@
 """Builds time grids and dense output."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

@@ -1,7 +1,5 @@
 """Computes waves in the unit cell of a lattice: its equilibrium under a strain, its bands."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise

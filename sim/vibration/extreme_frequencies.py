@@ -1,7 +1,5 @@
 """Computes the highest and lowest eigenfrequency of a structure about a state."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

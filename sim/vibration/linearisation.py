@@ -1,7 +1,5 @@
 """Linearises a structure about a state: small vibrations, resonances, transmission."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 

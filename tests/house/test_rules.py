@@ -62,7 +62,7 @@ HEAVY = {
 }
 OPENINGS = ("What", "How", "Which", "Where", "Whether", "Why", "When")
 ALIASED = {"NDArray[np.bool_]", "NDArray[np.float64]", "NDArray[np.int64]", "NDArray[np.uint8]"}
-SHORTEST = 80
+SHORTEST = 78
 FRAGMENTS = {
     "pipeline.datasets.seal",
     "pipeline.posing.dispersion",

@@ -4,8 +4,6 @@ The lattice is squeezed along x; its rows draw in by as much as the structure's 
 turn in turns by `turn` at full load; the void's units are absent where they are.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, cast
 

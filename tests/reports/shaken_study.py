@@ -4,8 +4,6 @@ The motion is that of an elastic sheet pulled at its centre: displacement falls 
 with the distance, neighbours counter-rotate, everything swings in phase with the drive.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

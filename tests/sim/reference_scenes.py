@@ -1,7 +1,5 @@
 """The paper's own results (tests/data/reference) and the scenes that they belong to."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

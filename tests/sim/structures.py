@@ -1,7 +1,5 @@
 """Small structures, drives and losses that the tests of the physics share."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

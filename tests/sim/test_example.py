@@ -1,7 +1,5 @@
 """The example in docs/ runs as it is printed there."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """The public face of sim: what it loads, what it gives, and what JAX may do with it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

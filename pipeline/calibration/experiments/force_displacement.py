@@ -1,7 +1,5 @@
 """Tests force over displacement of a small lattice: bottom row clamped, top row moved."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Measures the free decay of two units on one ligament: an angle over time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple

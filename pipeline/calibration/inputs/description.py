@@ -1,7 +1,5 @@
 """Describes a calibration: the wanted constants and the measurements."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator

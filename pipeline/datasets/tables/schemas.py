@@ -1,7 +1,5 @@
 """Reads the schema of every kind of dataset: variables with their dims and units (schemas.yaml)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Draws the specimen for its assembly, at true scale over as few pages as hold it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Lays out the assembly sheet: order of work, shim list, plan at 1:1, which shim goes where."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Writes and reads the bill of materials, a CSV: units, shims, sheets, plates, their masses."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

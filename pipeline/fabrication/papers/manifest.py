@@ -1,7 +1,5 @@
 """Writes and reads the manifest of a package: its sources, its parameters, its files."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

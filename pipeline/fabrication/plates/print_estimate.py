@@ -6,8 +6,6 @@ is run from rest to rest at the speed of its kind and one acceleration. Beside t
 times it is off by less than 15 % (tests/clients/test_fabrication.py).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise

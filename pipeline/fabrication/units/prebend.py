@@ -10,8 +10,6 @@ so that its curvature is linear along the chord's length l:
 Least of all b is bent by a slot that is turned by a if the other is turned by -a: to an arc.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ chosen together: the cheapest set of turns and depths that leaves the walls, whe
 bent before any load is dear. Only if there is none, the unit may grow a little beside its slots.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

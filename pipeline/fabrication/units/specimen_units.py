@@ -1,7 +1,5 @@
 """Builds the specimen of a design: units with slots, ids and dots, and shims."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ shims; where a slot had to turn for its walls, the other one follows, so that th
 arc and not to an S. A second round makes good what the first did not know; a third changes nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Reads one structure of a design: the units and ligaments that are present."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Defines field types: strings with units outside, floats in mm, N, s, tonne, rad inside."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import BeforeValidator, Field, ValidationInfo, WithJsonSchema

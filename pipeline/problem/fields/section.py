@@ -1,7 +1,5 @@
 """Defines the base of all sections of a problem: frozen, strict about keys, with remedies."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 A formula is one of a curve's parameter t, such as "16 * sin(t)^3".
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

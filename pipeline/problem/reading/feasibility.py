@@ -1,7 +1,5 @@
 """Checks sections against one another: geometry, regions, supports, loads, the start."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

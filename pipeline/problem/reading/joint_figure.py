@@ -1,7 +1,5 @@
 """Reads figures of several studies side by side: `figure.yaml` in a folder of experiments."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

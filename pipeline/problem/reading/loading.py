@@ -1,7 +1,5 @@
 """Reads a YAML file and one of its presets to a checked problem, or one clear message."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from difflib import get_close_matches

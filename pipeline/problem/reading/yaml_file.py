@@ -1,7 +1,5 @@
 """Reads a YAML file safely: plain data only, bounded, with the line of every key."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Each is named by its number, from one, after the preset if there is one: `2`, `quick.2`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any
 

@@ -5,8 +5,6 @@ one direction per load case, the rotation is held (a time series prescribes all 
 some of them free. Where the drive is a force, they give way along it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Self

@@ -1,7 +1,5 @@
 """Defines the section `fabrication` of a problem, whose defaults are the paper's."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """Describes a specimen's constants: units, ligaments, damping, contact."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, model_validator

@@ -1,7 +1,5 @@
 """Describes the target of a design, and the loads and copies that it holds against."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

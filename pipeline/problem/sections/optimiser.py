@@ -1,7 +1,5 @@
 """Describes the search for a design."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Describes tolerances of specimens and constants: the section `prediction`."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any
 

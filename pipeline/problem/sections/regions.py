@@ -3,8 +3,6 @@
 A region is a set of points of the specimen frame (mm); a unit belongs to it if its site does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import ClassVar, Literal, Self

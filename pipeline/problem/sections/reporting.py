@@ -1,7 +1,5 @@
 """Describes sections that no design depends on: robustness and report."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

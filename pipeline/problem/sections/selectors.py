@@ -1,7 +1,5 @@
 """Selects units by name, list or region, by arithmetic on the lattice sites."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Describes the analysis of small vibrations: the section `spectrum`."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

@@ -4,8 +4,6 @@ A parameter is named by its keys, joined by dots: `drive.frequency`, `material.b
 Its values are written as they would be at that key, with their unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Self
 

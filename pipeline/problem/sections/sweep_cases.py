@@ -1,7 +1,5 @@
 """Lists the cases of a sweep with their settings."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """The section `virtual` of a recording: what is filmed in the virtual lab, and with what."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """The key `virtual.specimen` of a recording: in what the specimen differs from its design."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

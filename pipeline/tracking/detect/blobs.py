@@ -1,7 +1,5 @@
 """Detects a specimen in a frame: blobs, their ids by one-to-one matching, camera, markings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import cv2

@@ -7,8 +7,6 @@ grows over the joints, then over gaps between parts of a design, where the affin
 matches says: lenses bend lattices, and loads deform them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

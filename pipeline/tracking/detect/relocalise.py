@@ -1,7 +1,5 @@
 """Relocalises units that prediction has lost, by finding the lattice again."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Blurs templates as the units' own motion does while a frame is exposed."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from scipy.ndimage import distance_transform_edt

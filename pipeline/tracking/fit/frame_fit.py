@@ -1,7 +1,5 @@
 """Fits the templates of all units to a frame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.runtime import Picture

@@ -4,8 +4,6 @@ A block is what a codec quantises at once, so errors are alike within; and what 
 holds, so pixels are sampled first and summed after, many at a time.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Redraws templates of thick units for their side walls, which do not turn with the faces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.tracking.fit.patch_correlation import Templates

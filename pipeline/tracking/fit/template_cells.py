@@ -3,8 +3,6 @@
 Where the template is flat, a pixel tells of the brightness alone: one of four is enough.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Converts YAML descriptions of test videos to a recording and a design dataset."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """Samples forces that were logged beside a video at the times of its frames."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

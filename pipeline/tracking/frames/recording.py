@@ -1,7 +1,5 @@
 """Defines the YAML file of a recording: a video, the design that it shows, how to read it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 

@@ -1,7 +1,5 @@
 """Reads frames of a video, or of a folder of numbered pictures (PNG, TIFF), with their times."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

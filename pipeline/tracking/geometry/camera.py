@@ -6,8 +6,6 @@ the radius (Kannala and Brandt, IEEE TPAMI 28 (2006) 1335, as OpenCV has it). Pi
 centre of the top left one.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

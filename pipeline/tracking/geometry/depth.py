@@ -5,8 +5,6 @@ So a silhouette is the face with what is swept on the way to the back: it does n
 unit, and that would be taken for a motion of the face.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

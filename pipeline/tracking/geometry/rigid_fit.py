@@ -1,7 +1,5 @@
 """Fits rigid motions in the plane between two sets of points (Kabsch), and applies rotations."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core import Floats, Reals

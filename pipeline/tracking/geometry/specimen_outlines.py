@@ -1,7 +1,5 @@
 """Reads a specimen from its design: outlines of the units at rest and joined pairs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

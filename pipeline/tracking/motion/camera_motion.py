@@ -1,7 +1,5 @@
 """Takes out of motions what camera and shutter add: drifts, knocks, rows that are read later."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import CubicSpline
 

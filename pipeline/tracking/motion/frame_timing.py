@@ -1,7 +1,5 @@
 """Finds dropped and duplicated frames by the motion itself."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.tracking.frames import has_uneven_intervals

@@ -4,8 +4,6 @@ Neighbours share most of them. Those of a structure with rough motions they do n
 these stand far above what noise alone makes up.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

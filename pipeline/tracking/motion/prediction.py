@@ -1,7 +1,5 @@
 """Predicts units from their own past, and from how their neighbours moved."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

@@ -4,8 +4,6 @@ Lengths are pixels, x to the right and y down, pixel centres at whole numbers; r
 to y.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import cv2

@@ -1,7 +1,5 @@
 """Tracks units from frame to frame: predicted, fitted, judged, and relocalised."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

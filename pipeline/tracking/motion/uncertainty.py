@@ -8,8 +8,6 @@ go on smoothly, tell this. What the reference frame's own error adds to all fram
 may take up; that frame stands alone in the file, so the image tells it.
 """
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

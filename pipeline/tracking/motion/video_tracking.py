@@ -1,7 +1,5 @@
 """Tracks a video: camera and templates from its first frame, then all frames in sequence."""
 
-from __future__ import annotations
-
 import logging
 import warnings
 from collections.abc import Callable, Iterator

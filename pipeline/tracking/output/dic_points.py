@@ -1,7 +1,5 @@
 """Converts points with displacements, as DIC systems export them, to motions of the units."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 

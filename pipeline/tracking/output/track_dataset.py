@@ -1,7 +1,5 @@
 """Writes a track as a dataset with the names and shapes of a response, and as a plain table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Calibrates the camera and its blur by one frame that shows the specimen at rest."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

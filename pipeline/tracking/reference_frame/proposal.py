@@ -1,7 +1,5 @@
 """Proposes a recording by a first look at a video: units, markings, and what it does not tell."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Recognises the specimen in a first frame, or refuses it with what is there instead."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Averages the frames in which a specimen rests before it moves, and measures their noise."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from typing import NamedTuple

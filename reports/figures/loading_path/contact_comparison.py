@@ -1,7 +1,5 @@
 """Compares both laws of contact: every structure under either, and a second design."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draws curves along the path: the measure, contraction, reaction, imperfect copies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -3,8 +3,6 @@
 A publication's words for them stand in the problem, under `report.paper.values`, by their key.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

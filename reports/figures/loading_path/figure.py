@@ -1,7 +1,5 @@
 """Composes the report along a path: panels with tables, text of the page, animation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Describes data tables of the path: what its curves show, as plain CSV."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Composes several studies side by side: structures at the start and at full load, and curves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from string import ascii_lowercase
 

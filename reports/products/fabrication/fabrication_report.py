@@ -4,8 +4,6 @@ It reads the packages and nothing else of the study's results, so a picture show
 what the file was meant to be. The same packages give the same bytes.
 """
 
-from __future__ import annotations
-
 import argparse
 import base64
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Draws written files: sheets from DXF, plates from 3MF, the specimen from STL."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Collection, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Makes the index page: figures, the paper's claims, files, provenance, how to cite."""
 
-from __future__ import annotations
-
 import argparse
 import base64
 import json

@@ -3,8 +3,6 @@
 Only what is there counts; nothing of the problems is read, so the index is of these very files.
 """
 
-from __future__ import annotations
-
 import html
 import os
 import re

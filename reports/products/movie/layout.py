@@ -1,7 +1,5 @@
 """Tells where everything stands in the frames of a movie, and what does not move in them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Draws on a video what was found: units coloured by their motion, ids, lost ones hatched."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A package of the six squares, written by the exporters in a second."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Writes small drawings and meshes by hand, right or wrong, for the checks to read."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

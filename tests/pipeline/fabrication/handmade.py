@@ -1,7 +1,5 @@
 """A specimen of six squares, cut by hand: what the exporters and their checks start from."""
 
-from __future__ import annotations
-
 import numpy as np
 import shapely
 from shapely import Polygon

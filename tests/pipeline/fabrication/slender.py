@@ -1,7 +1,5 @@
 """Slender units of optimised designs, each of which once stopped an export."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

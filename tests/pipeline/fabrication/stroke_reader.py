@@ -4,8 +4,6 @@ Strokes of known length and direction vote for one height and one turn of the te
 letter is looked for. Slots may cut through letters, so not all of a letter has to be there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The assembly sheet, the bill of materials and the manifest."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Mistakes in a problem or a design: one message with what to change, nothing half written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

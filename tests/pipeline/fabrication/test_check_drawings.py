@@ -1,7 +1,5 @@
 """Every way in which a drawing can be wrong is made in a file, and found there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Continuous strips run along rows and columns, and end where a void begins."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A fault stops an export in words that say what to do, with a picture of where it is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

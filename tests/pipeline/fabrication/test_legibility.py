@@ -1,7 +1,5 @@
 """Ids are read back from their strokes, from the top and from below, also where slots cut them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """Packages with other parameters than the defaults pass the same checks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal, TypeAlias
 

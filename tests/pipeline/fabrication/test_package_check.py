@@ -1,7 +1,5 @@
 """A whole package passes its checks as written, and fails them once any file of it is damaged."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Shims in slots that are not in line: how they are bent, and that slots are chosen against it."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

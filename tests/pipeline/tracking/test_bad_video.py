@@ -1,7 +1,5 @@
 """Videos as they should not be: what can be tracked of them is."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Loops whose sums may be reordered come in one piece: from the cache as just compiled."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 from collections.abc import Iterator

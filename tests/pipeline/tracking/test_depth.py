@@ -1,7 +1,5 @@
 """Thick units, filmed in the virtual lab from 1 m: their side walls show off axis."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

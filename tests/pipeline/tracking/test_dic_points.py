@@ -1,7 +1,5 @@
 """A commercial DIC system's points become a track."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

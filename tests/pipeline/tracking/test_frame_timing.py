@@ -1,7 +1,5 @@
 """Faults of timing and stated uncertainties, on motions that are made up."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The first look at a video, by the stage `track init`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

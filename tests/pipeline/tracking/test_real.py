@@ -1,7 +1,5 @@
 """Pictures of a real specimen: bare units of 24 x 16 on a bright board, with their overlays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

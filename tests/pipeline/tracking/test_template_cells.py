@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import numpy as np
 
 from pipeline.tracking.fit import template_cells

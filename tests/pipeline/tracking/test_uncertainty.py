@@ -1,7 +1,5 @@
 """Stated uncertainties on motions that are made up, with noise that is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Clips as labs film them: nothing is wrong and called good, and sigma holds."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

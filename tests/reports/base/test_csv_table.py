@@ -1,7 +1,5 @@
 """Tables as CSV: numbers as they are, and no cell that a spreadsheet would compute."""
 
-from __future__ import annotations
-
 import csv
 from io import StringIO
 

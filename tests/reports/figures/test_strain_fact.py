@@ -1,7 +1,5 @@
 """The kind of strain that a drive puts on a lattice is named by its direction and its side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page of what is built, and the pictures on it."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """The page over everything that was built."""
 
-from __future__ import annotations
-
 import base64
 import shutil
 from collections.abc import Callable

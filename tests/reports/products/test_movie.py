@@ -1,7 +1,5 @@
 """Movies: what stands where, in which colour, and the same bytes again."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

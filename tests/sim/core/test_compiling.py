@@ -1,7 +1,5 @@
 """Loops are compiled once, by whichever process wants them first."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Libraries and generated code keep to the level, on a processor that has more."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Compiled loops are found by what they are made of: in any checkout, and in no edited one."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Contact on the distance of units: the law, and the compiled kernels against its derivatives."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

@@ -1,7 +1,5 @@
 """The compiled kernels against the automatic derivatives of the law's definition."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

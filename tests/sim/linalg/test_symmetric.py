@@ -1,7 +1,5 @@
 """Both ways to store the tangent solve the same systems and notice what is not positive."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Constrained problems with known optima, for the tests of the optimisers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

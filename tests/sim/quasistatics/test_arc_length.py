@@ -1,7 +1,5 @@
 """Paths beyond their limit points."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq

@@ -1,7 +1,5 @@
 """Paths that end: where, and in which state the structure comes to rest after it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax.numpy as jnp

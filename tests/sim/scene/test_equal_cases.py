@@ -1,7 +1,5 @@
 """Load cases that are turned copies of one another, and what makes them none."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Losses over a family of loads, their derivatives, and the design whose worst is lowest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Designs that keep away from snaps, and spare their foil."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -1,7 +1,5 @@
 """What a plan decides, and that what it skips changes nothing."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The force of the drive as part of what is mimicked."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

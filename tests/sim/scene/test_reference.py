@@ -1,7 +1,5 @@
 """Agreement with the paper's own code on its scenes, at the accuracy that is promised."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax

@@ -1,7 +1,5 @@
 """Ligaments under stress at rest: their energy, their equilibrium, its derivatives."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import jax.numpy as jnp

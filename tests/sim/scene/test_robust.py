@@ -1,7 +1,5 @@
 """Losses that are combined over loads and averaged over imperfect copies."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np

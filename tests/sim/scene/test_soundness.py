@@ -1,7 +1,5 @@
 """Scenes without a meaning are refused in one sentence; what may be meant is warned of."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Steps are as short as the accuracy asks for, whatever the drive does and whatever rings."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """A killed optimisation with paths to start from resumes to the same bytes."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Waves by the explicit method at the steps that a plan chooses: agreement, energy, memory."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

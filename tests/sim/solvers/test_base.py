@@ -1,7 +1,5 @@
 """The common interface of the solvers: cases, threads, types, held units."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

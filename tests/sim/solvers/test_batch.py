@@ -1,7 +1,5 @@
 """Many cases in one call: in order, failures with their reason, memory flat."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

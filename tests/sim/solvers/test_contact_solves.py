@@ -1,7 +1,5 @@
 """Solves with contact on the distance of units: nothing overlaps, and gradients stay exact."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

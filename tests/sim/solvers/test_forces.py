@@ -1,7 +1,5 @@
 """Forces on units: what they do to a structure is what a displacement does that needs them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import jax

@@ -6,8 +6,6 @@ so small that no void of the compared states crosses the contact's cutoff (asser
 energy's third derivative jumps. Newton's iterations stop far below the compared differences.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial

@@ -1,7 +1,5 @@
 """What a solve must not start from: each of these once went on without a sign."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

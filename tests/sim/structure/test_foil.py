@@ -1,7 +1,5 @@
 """Strips of foil between rigid ends, against the elastica and against cubic beams."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp

@@ -1,7 +1,5 @@
 """Drives of the tests of integrators: a smooth one with its solution, and one that closes voids."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple

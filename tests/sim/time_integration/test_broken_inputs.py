@@ -1,7 +1,5 @@
 """Numbers that are none end in an error, by every integrator."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
