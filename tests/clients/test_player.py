@@ -102,7 +102,7 @@ def test_angle_and_colour_change_the_picture(desktop: Chrome) -> None:
     seen = {picture(desktop, 0)}
     choose(desktop, "case", "α = 90°")
     seen.add(picture(desktop, 0))
-    for colour, unit in (("u_y", "mm"), ("θ", "°")):
+    for colour, unit in (("uy", "mm"), ("θ", "°")):
         choose(desktop, "field", colour)
         seen.add(picture(desktop, 0))
         bar = desktop.find_element(By.CSS_SELECTOR, "#player .bar").text
