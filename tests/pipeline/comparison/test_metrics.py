@@ -111,7 +111,7 @@ def test_blocks_are_as_long_as_residuals_remember(kept: float, longest: int) -> 
 
 
 def test_an_interval_is_as_wide_as_residuals_that_remember_make_it() -> None:
-    """The mean of n values, each keeping a share k of the last, scatters by (1 + k) / (1 - k) / n."""
+    """The mean of n values that keep a share k of the last scatters by (1 + k) / (1 - k) / n."""
     frames, kept, widths = 400, 0.8, []
     for seed in range(8):
         random = np.random.default_rng(seed)
