@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple, Self
 
+import jax
 import numpy as np
 import xarray as xr
 
@@ -11,13 +12,14 @@ from pipeline.calibration.inputs import Constants, CycleRecord, LoadCycles
 from pipeline.problem.fields import csv_columns, units
 from pipeline.runtime import UserError
 from sim.core import Floats
-from sim.energy import Observables, observe, topology
+from sim.energy import Observables, Topology, ligament_strain, observe, topology
 from sim.quasistatics import StaticSolver, trace_first_snap
 from sim.solvers import PrescribedMotion, TimeSeries, held_dofs, solve_case
 from sim.structure import ConcreteParameters, Material, Parameters, parameters, shape
 
-LONGEST = 0.5
-"""Arc length of a step of it at most, mm: with 1 mm it comes back to where it began."""
+KNOWN = {"approach": units.LENGTH, "equilibrium": units.FORCE, "motion": units.FORCE}
+"""Columns of what others found."""
+CHECKED = (*KNOWN, "difference", "force")
 
 
 class CyclePath(NamedTuple):
@@ -29,6 +31,8 @@ class CyclePath(NamedTuple):
         energy: (n,) stored, N mm.
         turn: number of the farthest equilibrium.
         jumps: number of times that the structure jumped.
+        reversals: number of jumps at no limit point, but where a ligament has turned by half a turn
+            against its units and its law's shear force changes sign: no path leads on there.
         traced: (m, 2) approach, mm, and tension, N, along the path that the first jump leaves, not
             stable from where the approach turns back to where it rises again; empty without a jump.
     """
@@ -38,7 +42,22 @@ class CyclePath(NamedTuple):
     energy: Floats
     turn: int
     jumps: int
+    reversals: int
     traced: Floats
+
+    def compare(self, known: Floats) -> Floats:
+        """Sets the slope of the energy beside that which others found.
+
+        Args:
+            known: (n, 2) approach, mm, and slope, N, there.
+
+        Returns:
+            (n, 2) the difference of the energy over two steps, as theirs, and the force, N.
+        """
+        way, at = slice(self.turn + 1), known[:, 0]
+        approach, energy = (np.r_[0.0, each[way]] for each in (self.approach, self.energy))
+        slope = np.interp(at, approach, np.gradient(energy, approach))
+        return np.column_stack([slope, -np.interp(at, approach[1:], self.tension[way])])
 
     def with_play(self, play: float) -> Self:
         """Shifts the clamps by half their play, against the force that they transmit."""
@@ -92,13 +111,28 @@ def follow_cycle(asked: LoadCycles, record: CycleRecord, folder: Path) -> CycleP
         return seen, -(seen.force_on(units_held[1]) * slope).sum(axis=1)
 
     seen, tension = seen_at(steps[1:], state)
-    past = trace_first_snap(solver, values, drive, found, LONGEST)
+    past = trace_first_snap(
+        solver,
+        values,
+        drive,
+        found,
+    )
     loads, states = (found.snaps, found.states[:0]) if past is None else past[:2]
     traced = np.interp(loads, steps, whole[:, 2]), seen_at(loads, states)[1]
     return CyclePath(
         whole[1:, 2], tension, seen.strain_energy + seen.contact_energy, len(path) - 2,
-        int(found.jumped.sum()), np.column_stack(traced),
+        len(found.snaps), _reversals(fixed, values, state), np.column_stack(traced),
     )  # fmt: skip
+
+
+def _reversals(fixed: Topology, values: ConcreteParameters, states: Floats) -> int:
+    """Counts the steps in which a ligament turns through half a turn against its units."""
+    ends = states.reshape(len(states), fixed.n_units, 3)[:, fixed.ligament_units]
+    one = jax.vmap(ligament_strain)
+    of_all = jax.jit(jax.vmap(one, in_axes=(0, 0, None, None, None)))
+    arms = values.arm[:, 0], values.arm[:, 1]
+    shear = np.asarray(of_all(ends[:, :, 0], ends[:, :, 1], *arms, values.vector).shear)
+    return int((np.abs(np.diff(shear, axis=0)) > np.pi).any(axis=1).sum())
 
 
 class MeasuredCycle(NamedTuple):
@@ -147,7 +181,8 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
     curves: list[tuple[int, int, Floats, Floats, Floats]] = []
     snaps: list[tuple[int, int, Snap]] = []
     loops: list[tuple[int, float]] = []
-    misfit, jumps = np.full((2, len(asked.records)), np.nan)
+    checks: list[Floats] = [np.empty((0, 1 + len(CHECKED)))]
+    misfit, jumps, reversals = np.full((3, len(asked.records)), np.nan)
     for k, record in enumerate(asked.records):
         seen = measure_cycle(record, folder)
         for role, branch in enumerate((seen.closing, seen.opening)):
@@ -157,7 +192,11 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
         if record.material is None:
             continue
         cycle = follow_cycle(asked, record, folder)
-        shown, jumps[k] = cycle.with_play(record.play), cycle.jumps
+        shown, jumps[k], reversals[k] = cycle.with_play(record.play), cycle.jumps, cycle.reversals
+        if record.known is not None:
+            known = csv_columns.read_quantities(folder / record.known, KNOWN)
+            number = np.full(len(known), k)
+            checks.append(np.column_stack([number, known, cycle.compare(known[:, :2])]))
         misfit[k] = _misfit(shown, seen)
         for role, part in ((2, slice(cycle.turn + 1)), (3, slice(cycle.turn, None))):
             none = np.full(len(shown.tension[part]), np.nan)
@@ -172,6 +211,7 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
         "scatter": np.concatenate([each[4] for each in curves]),
     }
     ends = np.array([each[2] for each in snaps]).reshape(-1, 4)
+    record_of_check, *check = np.concatenate(checks).T
     variables = {
         **{name: ("point", values) for name, values in points.items()},
         "record_of_snap": ("snap", np.array([each[0] for each in snaps], int)),
@@ -184,6 +224,9 @@ def study_cycles(asked: LoadCycles, folder: Path) -> xr.Dataset:
         "loop_area": ("loop", np.array([each[1] for each in loops])),
         "misfit": ("record", misfit),
         "jumps": ("record", jumps),
+        "reversals": ("record", reversals),
+        "record_of_check": ("check", record_of_check.astype(int)),
+        **{f"check_{name}": ("check", one) for name, one in zip(CHECKED, check, strict=True)},
         "play": ("record", np.array([record.play for record in asked.records])),
     }
     labels = {

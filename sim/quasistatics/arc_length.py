@@ -23,12 +23,12 @@ from sim.quasistatics.equilibrium_path import BRANCHING
 from sim.quasistatics.static_solver import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
 from sim.structure import ConcreteParameters
-from sim.vibration import linearised
+from sim.vibration import WholeTangent
 
 FIRST_LENGTH, LONGEST, SHORTEST = 0.05, 2.0, 1e-6
 """Arc length of a step, in mm of the root of the summed squares of all dofs."""
-BEND = 0.3
-"""Angle between the tangents at both ends of a step at most, rad."""
+CROOKED = 0.05
+"""Departure of a step from the trapezoidal rule at most, over its length."""
 CORRECTIONS, FAST = 8, 4
 """Newton steps of a point at most, and those up to which the next step is longer."""
 BALANCED = 1e-9
@@ -82,7 +82,7 @@ def trace(
         start: load parameter and equilibrium (n_dofs,).
         end: load parameter.
         points: at most.
-        longest: arc length of a step at most, mm; a longer one may come to another branch.
+        longest: arc length of a step at most, mm.
     """
     try:
         return _trace(topology, values, drive, start, end, points, longest)
@@ -95,18 +95,17 @@ def trace_first_snap(
     values: ConcreteParameters,
     drive: PrescribedMotion,
     record: StaticRecord,
-    longest: float = LONGEST,
 ) -> EquilibriumTrace | None:
     """Traces the path that the first snap of a solution leaves, from the last load before it.
 
-    It ends where it comes by the snap's load again; where it branches, at the full load.
+    It ends where it comes by that snap's load again, or by that of the last one before the next
+    load; where it branches, at the full load.
 
     Args:
         solver: of the solution.
         values: parameters of the structure.
         drive: what moves the held dofs.
         record: of the solution.
-        longest: arc length of a step at most, mm.
 
     Returns:
         the path; None without a snap, or with one at rest.
@@ -118,8 +117,9 @@ def trace_first_snap(
     rest = 0.0, np.zeros(top.n_dofs)
     before = (float(loads[number - 1]), record.states[number - 1]) if number else rest
     limit_point = record.jumped[number] != BRANCHING
-    end = float(record.snaps[0] * (1.0 + PAST) if limit_point else loads[-1])
-    found = trace(top, values, drive, before, end, longest=longest)
+    near = record.snaps[record.snaps <= loads[number]]
+    end = float(near[-1] * (1.0 + PAST) if limit_point else loads[-1])
+    found = trace(top, values, drive, before, end)
     kept = found.loads <= end
     return EquilibriumTrace(
         found.loads[kept], found.states[kept], found.eigenvalue[kept], found.falling[kept]
@@ -139,7 +139,7 @@ def _trace(
     ):
         after, fast = path.correct(point, ahead, length)
         turned = None if after is None else path.tangent(after, ahead)
-        if after is None or turned is None or ahead @ turned < np.cos(BEND):
+        if after is None or turned is None or path.crooked(point, after, ahead + turned) > CROOKED:
             length *= 0.5
             continue
         if ahead[-1] * turned[-1] < 0.0:
@@ -170,7 +170,8 @@ class _Path:
     ) -> None:
         self.system: System = system_of(topology, values)
         self._drive, self._work = drive, workspace(self.system)
-        self._topology, self._values, self._scale = topology, values, topology.scale
+        self._tangent, self._scale = WholeTangent(topology, values), topology.scale
+        self._n_moving = 3 * topology.n_units
         self._held, self._free = topology.held, np.sort(topology.free_dofs)
 
     def point(self, load: float, state: Floats) -> _Point:
@@ -203,6 +204,14 @@ class _Path:
         right = np.append(np.zeros(len(self._free)), 1.0)
         found = self._solved(point, before, right, self._pace(point.load))
         return None if found is None else found / np.linalg.norm(found)
+
+    def crooked(self, begin: _Point, after: _Point, mean: Floats) -> float:
+        """Compares a step with the trapezoidal rule along twice the mean of its ends' tangents."""
+        moved = (after.state - begin.state)[self._free] * self._scale[self._free]
+        step = np.append(moved, (after.load - begin.load) * self._pace(begin.load))
+        # x1 - x0 = ds (t0 + t1) / 2
+        along = mean / np.linalg.norm(mean)
+        return float(np.linalg.norm(step - (along @ step) * along) / np.linalg.norm(step))
 
     def turn(self, begin: _Point, ahead: Floats, length: float) -> _Point:
         """Finds the point within an arc length at which the load does not change."""
@@ -242,8 +251,8 @@ class _Path:
 
     def _stiffness(self, point: _Point) -> sp.csc_array:
         weights = sp.diags_array(1.0 / self._scale[self._free])
-        motion = point.state[: 3 * self._topology.n_units]
-        stiffness = linearised(self._topology, self._values, motion).stiffness
+        motion = point.state[: self._n_moving]
+        stiffness = self._tangent.among(self._free, self._free, motion)
         return sp.csc_array(weights @ stiffness @ weights)
 
     def _solved(self, point: _Point, ahead: Floats, right: Floats, pace: float) -> Floats | None:

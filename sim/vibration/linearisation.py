@@ -59,29 +59,39 @@ class Modes(NamedTuple):
         return np.asarray(np.sign(self.square) * np.sqrt(np.abs(self.square)) / (2 * np.pi))
 
 
+class WholeTangent:
+    """Evaluates a structure's tangent among all dofs, held ones included, state by state."""
+
+    def __init__(self, topology: Topology, values: ConcreteParameters) -> None:
+        whole = replace(topology.unloaded, held=np.zeros(0, dtype=np.int64))
+        self._place, pattern = number_free_dofs(
+            whole.site, whole.coupled_units, whole.held, by_fronts=False
+        )
+        self._system = system_of(whole, values)._replace(free=self._place, pattern=pattern)
+        self._matrix, self._turn = matrix(pattern), np.empty((whole.n_units, 4))
+
+    def among(self, rows: Ints, columns: Ints, state: Floats) -> sp.csc_array:
+        """Assembles the part (n_rows, n_columns) of some dofs at a state (n_dofs,)."""
+        made, (n, width) = self._matrix, self._system.pattern.size
+        clear(made)
+        tangent(state, self._system, self._turn, made)
+        bands = made.values.reshape(n, width + 1).T
+        lower = sp.dia_array((bands, -np.arange(width + 1)), shape=(n, n))
+        full = sp.csr_array(lower + sp.tril(lower, -1).T)
+        full.eliminate_zeros()
+        return sp.csc_array(full[self._place[rows]][:, self._place[columns]])
+
+
 def linearised(
     topology: Topology, values: ConcreteParameters, motion: Floats | None = None
 ) -> Linear:
     """Linearises a structure about a state ``motion`` (n_units, 3); by default about rest."""
-    topology = topology.unloaded
-    whole = replace(topology, held=np.zeros(0, dtype=np.int64))
-    place, pattern = number_free_dofs(
-        topology.site, topology.coupled_units, whole.held, by_fronts=False
-    )
-    system = system_of(whole, values)._replace(free=place, pattern=pattern)
-    made = matrix(pattern)
-    clear(made)
+    topology, whole = topology.unloaded, WholeTangent(topology, values)
     state = np.zeros(topology.n_dofs) if motion is None else np.array(motion, dtype=float).ravel()
-    tangent(state, system, np.empty((topology.n_units, 4)), made)
-    n, width = pattern.size
-    lower = sp.dia_array((made.values.reshape(n, width + 1).T, -np.arange(width + 1)), shape=(n, n))
-    full = sp.csr_array(lower + sp.tril(lower, -1).T)
-    full.eliminate_zeros()
     free = np.setdiff1d(np.arange(topology.n_dofs), topology.held)
-    rows = full[place[free]]
     return Linear(
-        stiffness=sp.csc_array(rows[:, place[free]]),
-        coupling=sp.csc_array(rows[:, place[topology.held]]),
+        stiffness=whole.among(free, free, state),
+        coupling=whole.among(free, topology.held, state),
         mass=np.asarray(values.mass).ravel()[free],
         damping=np.asarray(values.damping).ravel()[free],
         free=free,

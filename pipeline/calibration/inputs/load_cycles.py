@@ -39,6 +39,8 @@ class CycleRecord(Section):
         material: of the simulation by the drive; without it there is none.
         contact: likewise.
         play: of the clamps: by so much they move while they transmit no force.
+        known: a CSV of what others computed, with columns approach (mm), and the slope of the
+            energy over it (N): equilibrium (differences over two steps), and motion (in time).
     """
 
     name: Label
@@ -49,6 +51,7 @@ class CycleRecord(Section):
     material: MaterialConstants | None = None
     contact: Contact | None = None
     play: Gap = 0.0
+    known: File | None = None
 
 
 class LoadCycles(Section):

@@ -39,7 +39,9 @@ def report(args: argparse.Namespace) -> None:
         raise UserError("nothing to show", remedy="give --samples, --cycles or --pictures")
     asked = {kind: json.loads(each.attrs[kind]) for kind, each in made.items()}
     figures: dict[str, Callable[[], Figure]] = {}
-    values: dict[str, Any] = dict.fromkeys(("shown", "cycles", "pictures")) | {"headline": []}
+    values: dict[str, Any] = dict.fromkeys(
+        ("shown", "cycles", "pictures", "checks", "reversals")
+    ) | {"headline": []}
     tables: list[Table] = []
     if (samples := made.get("population")) is not None:
         figures["prediction"] = lambda: draw_samples(samples)
@@ -49,6 +51,7 @@ def report(args: argparse.Namespace) -> None:
         figures["cycles"] = lambda: draw_cycles(cycles)
         simulated = bool(np.isfinite(cycles["misfit"]).any())
         values |= {"cycles": _cycles(cycles), "simulated_cycles": simulated}
+        values |= {"checks": _checks(cycles), "reversals": np.nansum(cycles["reversals"]) > 0}
         values["cycles_doc"] = asked["load_cycles"]["doc"]
     values["sources"] = [each["source"] for each in asked.values() if "source" in each]
     if (seen := made.get("pictures")) is not None:
@@ -275,13 +278,38 @@ def _cycles(made: xr.Dataset) -> PageTable:
             )
             if record == k
         ]
-        misfit, jumps = made["misfit"].values[k], made["jumps"].values[k]
-        told = "not simulated" if np.isnan(misfit) else f"{misfit:.2f} N, {jumps:.0f} jumps"
+        misfit, *jumps = (made[name].values[k] for name in ("misfit", "jumps", "reversals"))
+        told = "not simulated"
+        if not np.isnan(misfit):
+            told = f"{misfit:.2f} N; {jumps[0]:.0f} jumps, {jumps[1]:.0f} of them reversals"
         loops = f"{areas[0]:.1f} first, {areas[1:].mean():.1f} later"
         rows.append([title, "; ".join(snaps) or "none", loops, told])
     return PageTable(
         ["Test", "Snaps", "Loop areas, N mm", "Misfit of equilibria, rms; their jumps"], rows
     )
+
+
+def _checks(made: xr.Dataset) -> PageTable | None:
+    """Tabulates the slope of the energy beside that which others computed; None without any."""
+    numbers = made["record_of_check"].values
+    known, found, force, motion = (
+        made[f"check_{name}"].values for name in ("equilibrium", "difference", "force", "motion")
+    )
+    off = 100.0 * (found - known) / np.abs(known)
+    rows = [
+        [
+            str(made["title"].values[numbers[k]]),
+            f"{made['check_approach'].values[k]:g}",
+            f"{known[k]:.2f}",
+            f"{found[k]:.3f}",
+            f"{off[k]:+.2f} %",
+            f"{force[k]:.3f}",
+            f"{motion[k]:.2f}",
+        ]
+        for k in range(len(numbers))
+    ]
+    heads = ["Test", "Approach, mm", "Known, N", "Here, N", "Apart", "Force here, N", "Authors, N"]
+    return PageTable(heads, rows) if rows else None
 
 
 def _tables(made: xr.Dataset) -> list[Table]:
