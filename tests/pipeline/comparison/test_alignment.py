@@ -120,3 +120,11 @@ def test_a_drive_that_does_not_move_along_is_refused() -> None:
 def test_the_direction_of_a_drive_is_told() -> None:
     line = np.linspace(0, 5, 9)[:, None]
     assert drive_turn(line * [np.cos(0.1), np.sin(0.1)], line * [1.0, 0.0]) == pytest.approx(0.1)
+
+
+def test_branches_follow_a_load_that_grows_again() -> None:
+    up, rest = np.linspace(0.0, 1.0, 100), np.ones(40)
+    found = find_branches(np.concatenate([up, rest, up[::-1], up]))
+    assert (found[10:130] == LOADING).all()
+    assert (found[150:230] == UNLOADING).all()
+    assert (found[250:330] == LOADING).all()

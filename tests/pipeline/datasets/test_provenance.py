@@ -79,3 +79,7 @@ def test_instructions_are_those_that_were_loaded(first: str) -> None:
     late = first == "numpy" and "avx512f" in Path("/proc/cpuinfo").read_text()
     assert (told.stdout.strip() == LEVEL) is not late
     assert ("NumPy X86_V4" in told.stdout) is late
+
+
+def test_words_do_not_depend_on_the_order_of_keys() -> None:
+    assert provenance._json({"b": 1, "a": [2]}) == provenance._json({"a": [2], "b": 1})

@@ -17,6 +17,7 @@ from sim.energy import (
     void_contact_kernels,
 )
 from sim.energy.network_arrays import NetworkArrays
+from sim.energy.observables import observe
 from sim.scene import concrete_parameters
 from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, parameters, shape
 from tests.sim.reference_scenes import compressed, reference
@@ -133,3 +134,29 @@ def test_energies_along_the_reference_path() -> None:
     region = some_ligaments(net, np.flatnonzero(stored["roi_bond_mask"]))
     in_region = energy(stored["static_path_u"][-1].ravel(), region)[0]
     assert in_region == pytest.approx(stored["static_path_roi_energy_Nmm"][-1], rel=1e-12)
+
+
+def test_observables_are_those_of_each_state() -> None:
+    """Energies of the kernels, reactions at held dofs alone, and one void below the cutoff."""
+    lattice = rotating_squares()
+    net, centroid = network(lattice)
+    law = VoidAngleContact(BARRIER, CUTOFF)
+    top = topology(lattice, np.arange(3), law)
+    made = shape(lattice, lattice.vertices)
+    values = ConcreteParameters(*map(np.asarray, parameters(lattice, made, MATERIAL)))
+    motion = np.zeros((3, *centroid.shape[:1], 3))
+    motion[1, :, :2] = 1e-2 * centroid
+    a, b = net.unit[0]
+    turn = (CUTOFF - 1e-3 - net.void[0, 0]) / 2
+    motion[2, a, 2], motion[2, b, 2] = turn, -turn
+    seen = observe(top, values, motion)
+    found = np.stack([seen.strain_energy, seen.contact_energy], axis=1)
+    np.testing.assert_allclose(found, [energy(state.ravel(), net) for state in motion])
+    assert found[1, 0] > 0.0 == found[1, 1]
+    closed = np.stack([net.void[:, 0], net.void[:, 1]]) + [[1], [-1]] * np.subtract(
+        *motion[2, net.unit.T, 2]
+    )
+    assert seen.contact_pairs.tolist() == [0, 0, int((closed < CUTOFF).any(axis=0).sum())]
+    assert seen.contact_pairs[2] > 0
+    assert np.isfinite(seen.reaction[:, 0]).all()
+    assert np.isnan(seen.reaction[:, 1:]).all()

@@ -76,3 +76,10 @@ def test_rectangular_lattice() -> None:
     assert np.linalg.norm(lattice.ligament_vectors, axis=1) == pytest.approx(1.5)
     one = quads(1, 1, 10.0, 1.5, 0.3)
     assert (one.n_ligaments, one.n_groups) == (0, 4)
+
+
+def test_listed_polygons_may_be_drawn_either_way_round() -> None:
+    square = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)]
+    for drawn in (square, square[::-1]):
+        x, y = listed([drawn], [], 2.0).vertices.T
+        assert np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) / 2 == 4.0
