@@ -1,4 +1,5 @@
 from . import constraints as constraints
+from . import load_family as load_family
 from . import optimise as optimise
 from . import scene as scene
 from . import solvers as solvers

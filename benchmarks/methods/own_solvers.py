@@ -12,7 +12,7 @@ from sim.core import Floats
 from sim.energy import Topology
 from sim.linalg import number_free_dofs
 from sim.quasistatics import StaticSolver
-from sim.scene import STIFFENING, GradientChain, make_plan
+from sim.scene import STIFFENING, GradientChain, ParameterMap, make_plan
 from sim.solvers import Solver, solve_cases
 from sim.time_integration import (
     BLANES_MOAN,
@@ -109,7 +109,7 @@ def loss_run(posed: LoadCase, solver: Solver) -> Run:
 def gradient_run(posed: LoadCase, solver: Solver, work: Mapping[str, int]) -> Run:
     """Makes the run of a load case's loss and gradient by a solver."""
     evaluate = partial(
-        GradientChain(posed.of_design, posed.measure, designed=True),
+        GradientChain(ParameterMap(posed.of_design), posed.measure, designed=True),
         solver=solver,
         cases=posed.scene.loads.cases,
     )

@@ -9,11 +9,16 @@ import xarray as xr
 from pipeline.datasets.tables import SCHEMA_VERSION, SCHEMAS, TABLES, Kind, Variable
 
 _KINDS = {"float64": "f", "float32": "f", "int64": "iu", "int8": "biu", "str": "OUST"}
-MIGRATED = (1, 2, 3)
+MIGRATED = (1, 2, 3, 4)
 """Versions that are read besides the present one."""
 _TRACED = ("snap_load", "traced_load", "traced_force", "traced_eigenvalue")
-_ADDED = ("snap", "eigenvalue", "loss_other_branch", "snaps_by_contact", *_TRACED)
-"""Variables of responses that version 2 did not have, the last four neither version 3; NaN."""
+_TURNED = ("end_angles",)
+_ADDED: dict[Kind, tuple[str, ...]] = {
+    "response": ("snap", "eigenvalue", "loss_other_branch", "snaps_by_contact", *_TRACED),
+    "design": _TURNED,
+    "design_method": _TURNED,
+}
+"""Variables that older versions did not have; NaN."""
 
 _SPELT = {"deg": "degree", "px": "1"}
 _WORDS = ("px, mm", "as in constraint_units")
@@ -93,14 +98,14 @@ def migrate(dataset: xr.Dataset, kind: Kind) -> xr.Dataset:
     """Gives a dataset the attributes of the present version.
 
     Version 1 had the same variables in the same units, which it spelled for people only, and no
-    title. Version 2 said less of stability, version 3 traced no paths.
+    title. Version 2 said less of stability, version 3 traced no paths, version 4 turned no slots.
     """
     if dataset.attrs["schema_version"] == SCHEMA_VERSION:
         return dataset
     for name, table in TABLES[kind].items():
         if name in dataset.variables:
             _respell(dataset[name].attrs, table)
-        elif kind == "response" and name in _ADDED:
+        elif name in _ADDED.get(kind, ()):
             unknown = np.full([dataset.sizes.get(dim, 1) for dim in table.dims], np.nan)
             dataset[name] = (table.dims, unknown, {table.unit_attribute: table.units})
     return dataset.assign_attrs(schema_version=SCHEMA_VERSION, title=SCHEMAS[kind].title)

@@ -26,11 +26,13 @@ from .structure_variables import CLAMPED as CLAMPED
 from .structure_variables import DRIVEN as DRIVEN
 from .structure_variables import Variables as Variables
 from .structure_variables import design_hash as design_hash
+from .structure_variables import designed_angles as designed_angles
 from .structure_variables import flat_vertices as flat_vertices
 from .structure_variables import network_variables as network_variables
 from .structure_variables import read_design as read_design
 from .structure_variables import spread as spread
 from .structure_variables import unit_coordinates as unit_coordinates
+from .to_scene import BENT as BENT
 from .to_scene import altered_lattice_of as altered_lattice_of
 from .to_scene import lattice_of as lattice_of
 from .to_scene import limits_of as limits_of

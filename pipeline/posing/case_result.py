@@ -17,14 +17,16 @@ if TYPE_CHECKING:
     from sim.scene import Scene
     from sim.solvers import Case, Measure, Solved
 
-from pipeline.posing.structure_variables import flat_vertices
-from sim.core import Floats, Ints
+from pipeline.posing.structure_variables import designed_angles, flat_vertices
+from pipeline.runtime import UserError
+from sim.core import Floats, Ints, SimulationError
 from sim.energy import observe
 from sim.quasistatics import BRANCHING, StaticRecord, StaticSolver, trace_first_snap
 from sim.scene import (
     drive_force,
     estimated_errors,
     mimicking,
+    relaxed,
     sample_times,
     scales,
     strain_energies,
@@ -180,10 +182,11 @@ def _target(
 
 
 def _roi_energy(scene: Scene, case: Case, motion: Floats) -> Floats:
-
+    """Sums the strain energy (n_times,) of the region's ligaments, strains counted from rest."""
     chosen = scene.region_ligaments
     units = scene.lattice.ligament_units[chosen]
-    return np.asarray(strain_energies(motion, case.values, chosen, units).sum(axis=-1))
+    from_rest = case.values._replace(natural=np.zeros_like(case.values.natural))
+    return np.asarray(strain_energies(motion, from_rest, chosen, units).sum(axis=-1))
 
 
 def _at_stride(values: NDArray[np.generic], stride: int, size: int) -> Floats:
@@ -235,16 +238,38 @@ def _traced(solved: Solved, scene: Scene) -> TracedPath:
     )
 
 
-def structures_of(scene: Scene, design: xr.Dataset) -> dict[str, PosedStructure]:
-    """Names the structures to compare; an intact one only where something is to be mimicked."""
+def structures_of(
+    scene: Scene, design: xr.Dataset, *, straight: bool = False
+) -> dict[str, PosedStructure]:
+    """Names the structures to compare; an intact one only where something is to be mimicked.
+
+    A cloak whose slots were designed is posed as it rests, unless its shims are to be ``straight``.
+
+    Raises:
+        UserError: it does not come to rest.
+    """
     found = {
         "altered": PosedStructure(scene, scene.lattice.vertices),
         "cloaked": PosedStructure(scene, flat_vertices(scene.lattice, design["vertices"])),
     }
+    if not straight and (angles := designed_angles(design)) is not None:
+        found["cloaked"] = _at_rest(*found["cloaked"], angles)
     if scene.objective.reference is None:
         return found
     intact = scene.objective.reference.updated(reference=scene.objective.reference)
     return {"intact": PosedStructure(intact, intact.lattice.vertices), **found}
+
+
+def _at_rest(scene: Scene, vertices: Floats, angles: Floats) -> PosedStructure:
+    """Bends the shims of a structure by angles (n_ligaments, 2), rad, and lets it come to rest."""
+    try:
+        rest = relaxed(scene.bent(angles), vertices)
+    except SimulationError as error:
+        raise UserError(
+            f"the cloaked structure does not come to rest with its slots as designed: {error}",
+            remedy="design it again, or without optimiser.as_built",
+        ) from error
+    return PosedStructure(rest.scene, rest.vertices)
 
 
 def times_of(asked: Problem, scene: Scene) -> Times:

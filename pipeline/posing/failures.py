@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _KEYS = {
     "convexity": "constraints.convex",
     "snap": "objective.snap",
-    **dict.fromkeys(("slot_angle", "slot_wall", "slot_gap"), "constraints.straight_shims"),
+    **dict.fromkeys(("slot_angle", "slot_wall", "slot_gap", "slot_turn"), "fabrication.slots"),
 }
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from pipeline.posing.to_scene import motions_of, scene_of
 from pipeline.problem import Problem
 from pipeline.problem.sections import HarmonicDrive, Load, RampHarmonicDrive, Robust
-from sim.scene import DIRECTED, LoadFamily, Scene
+from sim.load_family import LoadFamily
+from sim.scene import DIRECTED, Scene
 from sim.solvers import MotionLaw
 
 

@@ -59,9 +59,12 @@ def network_variables(problem: Problem, scene: Scene) -> Variables:
 
 
 def design_hash(design: xr.Dataset) -> str:
-    """Hashes the vertices of a design to their last bit: the first 16 hex digits of SHA-256."""
+    """Hashes the vertices of a design, and angles of slots, to their last bit: 16 hex digits."""
     values = np.ascontiguousarray(design["vertices"].transpose("unit", "vertex", "xy"), "<f8")
-    return hashlib.sha256(values.tobytes()).hexdigest()[:16]
+    found, angles = hashlib.sha256(values.tobytes()), designed_angles(design)
+    if angles is not None:
+        found.update(np.ascontiguousarray(angles, "<f8").tobytes())
+    return found.hexdigest()[:16]
 
 
 def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArray[np.bool_]:
@@ -74,6 +77,12 @@ def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArra
     gone = (network["region"].values == VOID) & (structure != "intact")
     place = np.searchsorted(network["unit"].values, network["ligament_unit"].values)
     return ~gone[place].any(axis=1)
+
+
+def designed_angles(design: xr.Dataset) -> Floats | None:
+    """Reads the angles (n_ligaments, 2) of a cloak's slots, rad; None if they are free."""
+    angles = design["end_angles"].transpose("ligament", "end").values[present_ligaments(design)]
+    return None if np.isnan(angles).all() else np.asarray(angles)
 
 
 def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:

@@ -58,6 +58,9 @@ from sim.structure import (
 DirectedDrive = (
     HarmonicDrive | RampHarmonicDrive | PulseDrive | TanhRampDrive | LinearRampDrive | ForceDrive
 )
+BENT = float(np.radians(30.0))
+"""Angle between the ends of a shim and its ligament beyond which the law of ligaments, that of a
+beam of small slopes, is an indication only: its tangent is 10 % longer."""
 TIME_SERIES = {"time": units.TIME, "ux": units.LENGTH, "uy": units.LENGTH, "theta": units.ANGLE}
 """Columns of a measured drive, whose heading names each with its unit in brackets."""
 
@@ -118,6 +121,7 @@ def scene_of(
             cloak=altered.positions(_units(problems.cloak_units(problem))),
             frozen=altered.positions(_units(problems.source_units(problem))),
             symmetry=problem.optimiser.symmetry,
+            turning_slots=problem.optimiser.as_built,
         ),
     )
     try:
@@ -169,14 +173,15 @@ def contact_laws(problem: Problem) -> dict[str, ContactModel]:
 
 def limits_of(problem: Problem) -> Limits:
     """Reads the limits that a design must keep to so that it can be made."""
-    asked = problem.constraints
+    asked, turning = problem.constraints, problem.optimiser.as_built
     return Limits(
         edge_length=asked.edge_length,
         block_angle=asked.block_angle,
         convex=asked.convex,
         void_angle=asked.void_angle,
         gap=asked.gap,
-        slots=problem.fabrication.slot_room if asked.straight_shims else None,
+        slots=problem.fabrication.slot_room if asked.straight_shims or turning else None,
+        slot_turn=BENT if turning else None,
     )
 
 

@@ -27,6 +27,8 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
     limits = data.get("constraints")
     if isinstance(limits, dict) and not limits["straight_shims"]:
         limits.pop("straight_shims")  # as before there was the key
+    if "optimiser" in data and not problem.optimiser.as_built:
+        data["optimiser"].pop("as_built")  # likewise
     if "fabrication" not in data and (needed := _fabrication_of_design(problem, limits or {})):
         data["fabrication"] = needed
     if stage not in ("redesign", REPORT):
@@ -38,11 +40,12 @@ def canonical_json(problem: Problem, stage: str = REPORT, method: str | None = N
 
 
 def _fabrication_of_design(problem: Problem, limits: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists what a design with bounded strains, or with straight shims, depends on besides."""
+    """Lists what a design with bounded strains, or with room for slots, depends on besides."""
     needed: dict[str, Any] = {}
-    if "shim_strain" in limits or "straight_shims" in limits:
+    slotted = "straight_shims" in limits or problem.optimiser.as_built
+    if "shim_strain" in limits or slotted:
         needed["shims"] = {"thickness": problem.shim_thickness}
-    if "straight_shims" in limits:
+    if slotted:
         made = problem.fabrication
         sizes = made.slots.model_dump(include={"depth_min", "depth_max", "clearance", "tip"})
         needed |= {"slots": sizes, "minimum_wall": made.minimum_wall}

@@ -4,23 +4,18 @@ import argparse
 import logging
 
 import numpy as np
-import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
 from pipeline.fabrication.parts import STRAIGHT, UnbuildableUnitError
 from pipeline.fabrication.units import end_angles, network
-from pipeline.posing import PosedStructure, failures, read_design, scene_of, structures_of
-from pipeline.problem import Problem
+from pipeline.posing import BENT, PosedStructure, failures, read_design, scene_of, structures_of
 from pipeline.runtime import UserError
 from pipeline.stages.simulate import StoppedError, response_dataset
 from sim.core import Floats, SimulationError
 from sim.scene import relaxed
 
 LOG = logging.getLogger(__name__)
-BENT = np.radians(30.0)
-"""Angle between the ends of a shim and its ligament beyond which the law of ligaments, that of a
-beam of small slopes, is an indication only: its tangent is 10 % longer."""
 _KEY, _REMEDY = "report.as_built", "or leave report.as_built out"
 
 
@@ -32,7 +27,7 @@ def work(args: argparse.Namespace) -> None:
     """
     asked = problem.load(args.problem, args.preset)
     design = read_design(asked, args.design)
-    posed = structures_of(scene_of(asked, args.problem.parent), design)
+    posed = structures_of(scene_of(asked, args.problem.parent), design, straight=True)
     name = "altered"
     try:
         built, angles = {}, {}
@@ -50,7 +45,7 @@ def work(args: argparse.Namespace) -> None:
     for name, each in angles.items():
         plans[name]["warnings"] += bent_warning(name, each)
     origin = provenance.of_study(asked, "as_built", parents={"design": args.design}, plan=plans)
-    datasets.write(counted_from_rest(made, asked), args.out, "response", origin)
+    datasets.write(made, args.out, "response", origin)
 
 
 def _failure(
@@ -74,7 +69,7 @@ def bent_warning(name: str, angles: Floats) -> list[str]:
     return [
         f"as built: {count} of {len(most)} shims of the {name} structure are bent by more than"
         f" {np.degrees(BENT):.0f}° before any load, at most by {np.degrees(most.max()):.0f}°, where"
-        " the law of ligaments is an indication only; ask for constraints.straight_shims"
+        " the law of ligaments is an indication only; ask for optimiser.as_built"
     ]
 
 
@@ -87,20 +82,7 @@ def _built(name: str, structure: PosedStructure, angles: Floats) -> PosedStructu
     scene, vertices = structure
     if np.abs(angles).max(initial=0.0) < STRAIGHT:
         return structure
-    rest = relaxed(
-        scene.updated(material=scene.structure.material._replace(end_angles=angles)), vertices
-    )
+    rest = relaxed(scene.bent(angles), vertices)
     turns = np.degrees(np.abs(rest.motion[:, 2]))
     LOG.info("%s: units turn by %.2f deg, at most %.2f, to rest", name, turns.mean(), turns.max())
     return PosedStructure(rest.scene, rest.vertices)
-
-
-def counted_from_rest(made: xr.Dataset, asked: Problem) -> xr.Dataset:
-    """Takes the energy at rest out of losses that are a strain energy."""
-    if asked.objective.kind != "strain_energy" or asked.objective.target != "rest":
-        return made
-    rest = made["roi_energy"].isel(time=0, drop=True)
-    losses = ("roi_energy", "loss", "loss_other_branch", "loss_samples", "loss_by_contact")
-    return made.assign(
-        {name: (made[name] - rest).assign_attrs(made[name].attrs) for name in losses}
-    )

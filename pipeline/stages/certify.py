@@ -15,15 +15,9 @@ from pipeline.posing import flat_vertices, load_family, loss_units, read_design,
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
 from sim.core import Floats, SimulationError
+from sim.load_family import LoadFamily, LoadLosses, ascend
 from sim.optimise import Journal
-from sim.scene import (
-    DIRECTED,
-    LoadFamily,
-    LoadLosses,
-    Scene,
-    ascend,
-    concrete_parameters,
-)
+from sim.scene import DIRECTED, Scene, concrete_parameters
 
 LOADS, SEARCHES = 1000, 50
 """Random loads, and searches of the worst one from random starts."""

@@ -30,6 +30,7 @@ from pipeline.problem.sections import Methods
 from pipeline.runtime import UserError, cli, source_hash
 from sim.constraints import margins
 from sim.core import Floats, SimulationError
+from sim.load_family import FamilyOptions, minimise_worst
 from sim.optimise import (
     Evaluation,
     InfeasibleStartError,
@@ -40,14 +41,12 @@ from sim.optimise import (
     SqpOptions,
 )
 from sim.scene import (
-    FamilyOptions,
     Paths,
     Plan,
     Scene,
     constraints_of,
     make_plan,
     minimise,
-    minimise_worst,
 )
 from sim.structure import overlapping_pairs, shape, smallest_gap
 
@@ -231,7 +230,11 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
     lattice, history = scene.lattice, result.evaluations
     intact = lattice_of(asked)
     vertices = np.asarray(scene.space.vertices(result.x))
-    found = margins(lattice, vertices, limits_of(asked))
+    angles = np.asarray(scene.space.end_angles(result.x)) if scene.space.turning else None
+    found = margins(lattice, vertices, limits_of(asked), angles)
+    slots = np.full((intact.n_ligaments, 2), np.nan)
+    if angles is not None:
+        slots[np.isin(intact.id[intact.ligament_units], lattice.id).all(axis=1)] = angles
     cases = len(case_directions(asked))
     nothing = np.full(cases, np.nan)
 
@@ -242,6 +245,7 @@ def design_dataset(asked: Problem, scene: Scene, result: Result) -> xr.Dataset:
         **network_variables(asked, scene),
         "vertices": (("unit", "vertex", "xy"), whole(lattice.padded(vertices))),
         "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+        "end_angles": (("ligament", "end"), slots),
         "centroid": (("unit", "xy"), whole(np.asarray(shape(lattice, vertices).centroid))),
         "constraint_margin": (
             ("constraint",),

@@ -16,11 +16,11 @@ from pipeline.fabrication.papers import write_assembly_sheet, write_bill, write_
 from pipeline.fabrication.parts import THIN_WALL, BuiltSpecimen, UnbuildableUnitError
 from pipeline.fabrication.readback import draw
 from pipeline.fabrication.units import build_specimen, network, summary
-from pipeline.posing import read_design, scene_of, structures_of
+from pipeline.posing import designed_angles, read_design, scene_of, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import cli, write_folder_atomically
 from sim.core import SimulationError
-from sim.scene import as_built
+from sim.scene import as_built, simulate
 
 LOG = logging.getLogger(__name__)
 
@@ -66,12 +66,17 @@ def _as_built(
     A motion that cannot be followed is told in the place of its numbers: the files are right.
     """
     scene = scene_of(posed, args.problem.parent)
-    structure = structures_of(scene, read_design(posed, args.design)).get(args.structure)
+    design = read_design(posed, args.design)
+    structure = structures_of(scene, design, straight=True).get(args.structure)
     if structure is None:
         return None
     angles = np.array([ligament.angles for ligament in specimen.ligaments]).reshape(-1, 2)
     try:
         found = as_built(*structure, angles)
+        designed = found.loss_as_designed
+        if designed_angles(design) is not None and args.structure == "cloaked":
+            posed_at_rest, vertices = structures_of(scene, design)["cloaked"]
+            designed = float(simulate(posed_at_rest, vertices=vertices).loss)
     except SimulationError as error:
         LOG.warning("%s: the structure as built cannot be simulated: %s", args.out_dir, error)
         return {"failure": str(error)}
@@ -79,7 +84,7 @@ def _as_built(
     return {
         "turn_mean_deg": round(float(turn.mean()), 3),
         "turn_max_deg": round(float(turn.max()), 3),
-        "loss_as_designed": float(f"{found.loss_as_designed:.5g}"),
+        "loss_as_designed": float(f"{designed:.5g}"),
         "loss_as_built": float(f"{found.loss_as_built:.5g}"),
     }
 

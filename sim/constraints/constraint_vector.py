@@ -22,6 +22,7 @@ from sim.constraints.manufacturability import (
     vertices_of,
     worst,
 )
+from sim.constraints.slot_walls import points
 from sim.core import Floats, Ints
 from sim.structure import DesignSpace
 
@@ -36,7 +37,9 @@ class ConstraintVector:
     @cached_property
     def kinds(self) -> tuple[ConstraintKind, ...]:
         """Lists the requirements at the places that the design variables can change."""
-        return kinds(self.space.lattice, self.limits, self.space.free_vertices)
+        space = self.space
+        ends = np.unique(space.turns.tocoo().row) + space.lattice.n_vertices
+        return kinds(space.lattice, self.limits, np.append(space.free_vertices, ends))
 
     @property
     def n_constraints(self) -> int:
@@ -48,7 +51,7 @@ class ConstraintVector:
 
         The pattern of the Jacobian (n_constraints, n_variables) never changes.
         """
-        values, slopes = self._local(jnp.asarray(self.vertices(design)))
+        values, slopes = self._local(jnp.asarray(self._points(design)))
         pattern, scatter = self._scatter
         data = scatter @ np.asarray(slopes)
         shape = (self.n_constraints, self.space.n_variables)
@@ -56,16 +59,21 @@ class ConstraintVector:
 
     def values(self, design: Floats) -> Floats:
         """Evaluates c (n_constraints,) alone."""
-        return np.array(self._local(jnp.asarray(self.vertices(design)))[0])
+        return np.array(self._local(jnp.asarray(self._points(design)))[0])
 
     def vertices(self, design: Floats) -> Floats:
         """Returns the vertices (n_vertices, 2) of a design vector."""
+        return self._points(design)[: self.space.lattice.n_vertices]
+
+    def _points(self, design: Floats) -> Floats:
+        """Returns vertices and angles of slots (n_points, 2), as of `points`."""
+        lattice = self.space.lattice
         shifts = (self._expansion @ design).reshape(-1, 2)
-        return self.space.lattice.vertices + shifts
+        return points(lattice, lattice.vertices) + shifts
 
     def margins(self, design: Floats) -> dict[str, Margin]:
         """Finds the smallest margin of each kind at the places that the design can change."""
-        return worst(self.space.lattice, self.kinds, self.vertices(design))
+        return worst(self.space.lattice, self.kinds, self._points(design))
 
     def named(self, number: int) -> tuple[str, str]:
         """Names the kind of one of the values, and the vertices and units that it is about."""
@@ -80,8 +88,8 @@ class ConstraintVector:
         requirements = self.kinds
 
         @jax.jit
-        def local(vertices: Array) -> tuple[Array, Array]:
-            parts = [kind.values_and_slopes(vertices) for kind in requirements]
+        def local(at: Array) -> tuple[Array, Array]:
+            parts = [kind.values_and_slopes(at) for kind in requirements]
             empty = jnp.zeros(0)
             return (
                 jnp.concatenate([empty, *(values for values, _ in parts)]),
@@ -92,7 +100,7 @@ class ConstraintVector:
 
     @cached_property
     def _expansion(self) -> sp.csr_array:
-        """Maps the design vector linearly to the vertex shifts (2 n_vertices, n_variables)."""
+        """Maps the design vector linearly to the shifts (2 n_points, n_variables) of points."""
         space = self.space
         position = np.full(space.lattice.n_groups, -1)
         position[space.groups] = np.arange(len(space.groups))
@@ -102,7 +110,10 @@ class ConstraintVector:
         entries = (2 * free[:, None] + [0, 1]).ravel(), (2 * row[free, None] + [0, 1]).ravel()
         ones = np.ones(2 * len(free))
         gather = sp.csr_array((ones, entries), shape=(2 * space.lattice.n_vertices, count))
-        return sp.csr_array(gather @ space.basis)
+        turned = space.turns.tocoo()
+        angles = (turned.data, (2 * turned.row, turned.col))  # the first coordinates
+        turns = sp.csr_array(angles, shape=(2 * turned.shape[0], turned.shape[1]))
+        return sp.csr_array(sp.block_diag([gather @ space.basis, turns]))
 
     @cached_property
     def _scatter(self) -> tuple[tuple[Ints, Ints], sp.csr_array]:
@@ -119,7 +130,7 @@ class ConstraintVector:
 
 
 def _slope_targets(requirements: tuple[ConstraintKind, ...]) -> tuple[Ints, Ints]:
-    """Lists constraint row and vertex coordinate of every local slope, as they are evaluated."""
+    """Lists constraint row and point coordinate of every local slope, as they are evaluated."""
     rows, coordinates, start = [np.zeros(0, int)], [np.zeros(0, int)], 0
     for kind in requirements:
         flat = kind.places.reshape(len(kind.places), -1)

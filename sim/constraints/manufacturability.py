@@ -13,18 +13,27 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from sim.constraints.straight_slots import (
+from sim.constraints.slot_walls import (
     SlotGap,
     SlotWall,
-    slot_angles,
+    angle_ahead,
+    angle_behind,
+    points,
     slot_pairs,
+    slot_turn,
     slot_walls,
+    slots,
 )
 from sim.core import Floats, Ints, Numbers
-from sim.structure import VOID_BRANCH, Lattice, SlotRoom, angle_between, close_pairs, unwrap
-
-ANGLE_LENGTH = 5.0
-"""Length (mm) that turns a margin in radians into one comparable to the margins in mm."""
+from sim.structure import (
+    ANGLE_LENGTH,
+    VOID_BRANCH,
+    Lattice,
+    SlotRoom,
+    angle_between,
+    close_pairs,
+    unwrap,
+)
 
 
 @dataclass(frozen=True)
@@ -38,7 +47,9 @@ class Limits:
         void_angle: smallest signed angle on either side of a ligament, rad.
         gap: smallest distance between neighbouring units, bonded or across a void, mm. Exact for
             convex units; for others that of their convex hulls, which is smaller.
-        slots: room for slots along the ligaments, that leave the shims straight; for convex units.
+        slots: room for slots along the ligaments, that leave the shims straight, or turned as the
+            design turns them; for convex units.
+        slot_turn: largest angle between a slot and its ligament, rad.
     """
 
     edge_length: float | None = None
@@ -47,6 +58,7 @@ class Limits:
     void_angle: float | None = None
     gap: float | None = None
     slots: SlotRoom | None = None
+    slot_turn: float | None = None
 
 
 def edge_length(ends: Array) -> Array:
@@ -91,8 +103,8 @@ class ConstraintKind:
     Attributes:
         name: as in the reports.
         unit: of the measure and its margin.
-        measure: function of the place's vertices.
-        places: (n_places, ...) ids of those vertices.
+        measure: function of the place's points.
+        places: (n_places, ...) ids of those points, vertices and angles of slots.
         limit: bound of the measure.
         sign: 1 if the bound is a smallest, -1 if it is a largest value.
     """
@@ -113,9 +125,9 @@ class ConstraintKind:
         """Returns the margins (n_places,) of measured values, in the unit of the kind."""
         return self.sign * (measured - self.limit)
 
-    def values_and_slopes(self, vertices: Array) -> tuple[Array, Array]:
-        """Evaluates c (n_places,) and its slopes to the vertices, flattened."""
-        values, slopes = jax.vmap(jax.value_and_grad(self.measure))(vertices[self.places])
+    def values_and_slopes(self, points: Array) -> tuple[Array, Array]:
+        """Evaluates c (n_places,) and its slopes to the points, flattened."""
+        values, slopes = jax.vmap(jax.value_and_grad(self.measure))(points[self.places])
         factor = self.sign * self.scale
         return factor * (values - self.limit), factor * slopes.ravel()
 
@@ -125,8 +137,8 @@ class Margin:
     """Smallest margin of one kind of requirement.
 
     Attributes:
-        kind: edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall or
-            slot_gap.
+        kind: edge_length, block_angle, convexity, void_angle, gap, slot_angle, slot_wall,
+            slot_gap or slot_turn.
         value: distance to the limit, negative if violated.
         unit: "mm" or "rad".
         units: ids of the units at the worst place.
@@ -150,7 +162,7 @@ def kinds(
         limits: the requirements.
         moving: ids of those vertices, by default all.
     """
-    free = np.ones(lattice.n_vertices, dtype=bool)
+    free = np.ones(lattice.n_vertices + 2 * lattice.n_ligaments, dtype=bool)
     if moving is not None:
         free[:] = False
         free[moving] = True
@@ -168,11 +180,18 @@ def kinds(
     if limits.gap is not None:
         found.append(ConstraintKind("gap", "mm", separation, _pairs(lattice, free), limits.gap))
     if (room := limits.slots) is not None:
-        listed = (slot_angles, slot_walls, slot_pairs)
-        angles, walls, pairs = (_touched(each(lattice), free) for each in listed)
-        found.append(ConstraintKind("slot_angle", "rad", void_angle, angles, room.angle))
+        every, walls, pairs = (
+            _touched(each(lattice), free) for each in (slots, slot_walls, slot_pairs)
+        )
+        found += [
+            ConstraintKind("slot_angle", "rad", measure, every, room.angle)
+            for measure in (angle_ahead, angle_behind)
+        ]
         found.append(ConstraintKind("slot_wall", "mm", SlotWall(room), walls, room.wall))
         found.append(ConstraintKind("slot_gap", "mm", SlotGap(room), pairs, room.wall))
+    if limits.slot_turn is not None:
+        turned = _touched(slots(lattice)[:, 4:], free)
+        found.append(ConstraintKind("slot_turn", "rad", slot_turn, turned, limits.slot_turn, -1))
     return tuple(found)
 
 
@@ -207,22 +226,40 @@ def _touched(places: Ints, free: np.ndarray) -> Ints:
     return places[free[places].any(axis=tuple(range(1, places.ndim)))]
 
 
-def margins(lattice: Lattice, vertices: Floats, limits: Limits) -> dict[str, Margin]:
-    """Finds the smallest margin of each kind over the whole structure, free or not."""
-    return worst(lattice, kinds(lattice, limits), vertices)
+def margins(
+    lattice: Lattice, vertices: Floats, limits: Limits, end_angles: Floats | None = None
+) -> dict[str, Margin]:
+    """Finds the smallest margin of each kind over the whole structure, free or not.
+
+    Args:
+        lattice: the network.
+        vertices: (n_vertices, 2) mm.
+        limits: the requirements.
+        end_angles: (n_ligaments, 2) of slots against their ligaments, rad; by default zero.
+    """
+    return worst(lattice, kinds(lattice, limits), points(lattice, vertices, end_angles))
 
 
 def worst(
-    lattice: Lattice, requirements: tuple[ConstraintKind, ...], vertices: Floats
+    lattice: Lattice, requirements: tuple[ConstraintKind, ...], at: Floats
 ) -> dict[str, Margin]:
-    """Finds the smallest margin of each kind among some requirements, and the units concerned."""
+    """Finds the smallest margin of each kind among some requirements, and the units concerned.
+
+    Args:
+        lattice: the network.
+        requirements: of `kinds`.
+        at: (n_points, 2) of `points`, mm.
+    """
     found: dict[str, Margin] = {}
     present = [kind for kind in requirements if len(kind.places)]
     measures, places = tuple(k.measure for k in present), tuple(k.places for k in present)
-    for kind, measured in zip(present, _measured(measures, places, vertices), strict=True):
+    for kind, measured in zip(present, _measured(measures, places, at), strict=True):
         values = np.asarray(kind.margins(measured))
         place = int(np.argmin(values))
-        units = tuple(int(unit) for unit in np.unique(lattice.unit[kind.places[place]]))
+        if kind.name in found and found[kind.name].value <= values[place]:
+            continue
+        concerned = np.unique(lattice.unit[_vertices(lattice, kind.places[place])])
+        units = tuple(int(unit) for unit in concerned)
         where = " and ".join(f"unit ({i}, {j})" for i, j in lattice.index[list(units)])
         found[kind.name] = Margin(kind.name, float(values[place]), kind.unit, units, where)
     return found
@@ -230,18 +267,24 @@ def worst(
 
 @partial(jax.jit, static_argnums=0)
 def _measured(
-    measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], vertices: Floats
+    measures: tuple[Callable[[Array], Array], ...], places: tuple[Ints, ...], points: Floats
 ) -> list[Array]:
     """Measures at all places, compiled as one."""
-    corners = jnp.asarray(vertices)
+    corners = jnp.asarray(points)
     return [jax.vmap(of)(corners[at]) for of, at in zip(measures, places, strict=True)]
+
+
+def _vertices(lattice: Lattice, place: Ints) -> Ints:
+    """Lists the vertices of a place; that of an angle is the vertex of its slot."""
+    every = np.concatenate([np.arange(lattice.n_vertices), lattice.ligaments.ravel()])
+    return np.unique(every[place])
 
 
 def vertices_of(lattice: Lattice, place: Ints) -> str:
     """Names the vertices of a place by their numbers within their units."""
-    words = []
-    for unit in np.unique(lattice.unit[place]):
-        own = np.unique(place[lattice.unit[place] == unit]) - lattice.first_vertex[unit]
+    words, vertices = [], _vertices(lattice, place)
+    for unit in np.unique(lattice.unit[vertices]):
+        own = vertices[lattice.unit[vertices] == unit] - lattice.first_vertex[unit]
         i, j = lattice.index[unit]
         words.append(f"vertex {', '.join(map(str, own))} of unit [{i}, {j}]")
     return " and ".join(words)

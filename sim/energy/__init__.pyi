@@ -10,6 +10,9 @@ from .ligament import ligament_strain as ligament_strain
 from .network_arrays import Sensitivity as Sensitivity
 from .observables import Observables as Observables
 from .observables import observe as observe
+from .resting import RestState as RestState
+from .resting import counted_from_rest as counted_from_rest
+from .resting import rest_state as rest_state
 from .system import Bars as Bars
 from .system import System as System
 from .system import Workspace as Workspace

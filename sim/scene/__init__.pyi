@@ -5,14 +5,14 @@ from .evaluation import evaluate as evaluate
 from .evaluation import minimise as minimise
 from .expected_cost import Cost as Cost
 from .expected_cost import estimate_cost as estimate_cost
-from .load_family import LoadFamily as LoadFamily
-from .load_family import LoadLosses as LoadLosses
 from .objectives import DisplacementMimicking as DisplacementMimicking
 from .objectives import StrainEnergyMimicking as StrainEnergyMimicking
 from .objectives import combined as combined
 from .objectives import estimated_errors as estimated_errors
 from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
+from .parameter_map import ParameterMap as ParameterMap
+from .parameter_map import parameters_of_design as parameters_of_design
 from .path_constraints import PathConstraints as PathConstraints
 from .path_constraints import foil_strains as foil_strains
 from .plan import Plan as Plan
@@ -38,7 +38,6 @@ from .simulation import Response as Response
 from .simulation import cases_of as cases_of
 from .simulation import drive_force as drive_force
 from .simulation import mimicking as mimicking
-from .simulation import parameters_of_design as parameters_of_design
 from .simulation import simulate as simulate
 from .simulation import target_motion as target_motion
 from .soundness import SceneError as SceneError
@@ -47,9 +46,3 @@ from .time_solver import NEWTON as NEWTON
 from .time_solver import STIFFENING as STIFFENING
 from .time_solver import TURN_ALLOWANCE as TURN_ALLOWANCE
 from .warm_starts import Paths as Paths
-from .worst_load import FamilyOptions as FamilyOptions
-from .worst_load import FoundLoad as FoundLoad
-from .worst_load import SearchOptions as SearchOptions
-from .worst_load import ascend as ascend
-from .worst_load import minimise_worst as minimise_worst
-from .worst_load import spread_places as spread_places

@@ -18,10 +18,11 @@ from sim.optimise import Evaluation, Journal, MmaOptions, Result, SqpOptions
 from sim.optimise import minimise as minimise_loss
 from sim.quasistatics import StaticRecord, StaticSolver
 from sim.scene.objectives import combined
+from sim.scene.parameter_map import ParameterMap, parameters_of_design
 from sim.scene.path_constraints import PathConstraints, check_unsnapped
 from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
-from sim.scene.simulation import mimicking, parameters_of_design
+from sim.scene.simulation import mimicking
 from sim.scene.time_solver import RULES, twice_as_fine
 from sim.scene.warm_starts import Paths
 from sim.solvers import PrescribedMotion, Solver, adjoint_cases, concrete, everywhere, solve_cases
@@ -51,7 +52,7 @@ class GradientChain:
     The same as ``jax.value_and_grad`` through ``differentiable_motion``, but compiled once.
 
     Args:
-        of_design: differentiable map of a design vector to parameters.
+        of_design: map of a design vector to parameters.
         measure: value and further numbers of displacements (n_cases, n_times, n_units, 3),
             parameters, and what a call passes besides.
         designed: whether ``of_design`` is that of a scene: what its adjoint need not compute is
@@ -60,15 +61,14 @@ class GradientChain:
 
     def __init__(
         self,
-        of_design: Callable[[Array], Parameters[Array]],
+        of_design: ParameterMap,
         measure: Callable[..., tuple[Array, Any]],
         *,
         designed: bool = False,
     ) -> None:
         self._designed = designed
-        self._parameters = jax.jit(of_design)
+        self._of_design = of_design
         self._measured = jax.jit(jax.value_and_grad(measure, argnums=(0, 1), has_aux=True))
-        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
 
     def __call__(
         self,
@@ -90,7 +90,7 @@ class GradientChain:
         Raises:
             SimulationError: a step failed, or an equilibrium is not stable.
         """
-        made = self._parameters(design)
+        made = self._of_design(design)
         solver = solver if self._designed else everywhere(solver)
         motion, velocity, records = solve_cases(
             solver, concrete(made), cases, _started(solver, memory)
@@ -101,7 +101,7 @@ class GradientChain:
         still = np.zeros_like(velocity)
         through = adjoint_cases(solver, records, np.asarray(bar_motion), still).parameters
         bar = Parameters(*(one + two for one, two in zip(direct, through, strict=True)))
-        return float(value), np.asarray(self._pull_back(design, bar)), np.asarray(more)
+        return float(value), self._of_design.pull_back(design, bar), np.asarray(more)
 
 
 def _started(solver: Solver, memory: Memory | None) -> list[Solver] | None:

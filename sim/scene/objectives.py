@@ -162,6 +162,8 @@ def _relative(change: float | np.floating, size: float | np.floating) -> float:
 class StrainEnergyMimicking(NamedTuple):
     """Sums weighted over samples the region's strain energy, without contact, N mm (Eq. 2).
 
+    Strains are counted from the start of the motion: a stress at rest is none of the load's.
+
     Attributes:
         ligaments: (n,) ligaments that touch the region.
         ligament_units: (n, 2) units that they join.
@@ -174,7 +176,8 @@ class StrainEnergyMimicking(NamedTuple):
 
     def __call__(self, displacement: Numbers, parameters: Parameters[Any]) -> Array:
         """Losses (n_cases,) of displacements (n_cases, n_times, n_units, 3)."""
-        energies = strain_energies(displacement, parameters, self.ligaments, self.ligament_units)
+        from_rest = parameters._replace(natural=jnp.zeros_like(parameters.natural))
+        energies = strain_energies(displacement, from_rest, self.ligaments, self.ligament_units)
         return jnp.einsum("ctl,t->c", energies, self.weights)
 
 

@@ -12,9 +12,9 @@ from sim.constraints import ConstraintVector
 from sim.core import Floats, SimulationError
 from sim.energy import ligament_strain, system_of
 from sim.quasistatics import StaticRecord, StaticSolver, eigenvalue_and_slopes, lowest_eigenpair
+from sim.scene.parameter_map import parameters_of_design
 from sim.scene.plan import Plan
 from sim.scene.scene import Scene
-from sim.scene.simulation import parameters_of_design
 from sim.solvers import Records, adjoint_cases, concrete, solve_cases
 from sim.structure import ConcreteParameters, FoilLimit, Parameters, face_strains
 
@@ -72,14 +72,12 @@ class PathConstraints:
         self.geometry, self._solver, self._foil = geometry, solver, scene.objective.foil
         self._cases = [scene.loads.cases[case] for case in plan.simulated]
         self._numbers = plan.simulated
-        of_design = parameters_of_design(scene)
-        self._parameters = of_design
-        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
+        self._of_design = parameters_of_design(scene)
         self.bound: float | None = None
         if share is not None:
             if not isinstance(solver, StaticSolver):
                 raise ValueError("a snap margin belongs to a static scene")
-            initial = concrete(of_design(jnp.zeros(scene.space.n_variables)))
+            initial = concrete(self._of_design(jnp.zeros(scene.space.n_variables)))
             system = system_of(scene.topology, initial)
             self.bound = share * lowest_eigenpair(system, np.zeros(scene.topology.n_dofs))[0]
         if self._foil is not None:
@@ -129,10 +127,10 @@ class PathConstraints:
 
     def _under_load(self, design: Floats) -> tuple[Floats, Floats]:
         """Values (n,) of all loads in mm, and their derivatives (n, n_variables)."""
-        values = concrete(self._parameters(jnp.asarray(design)))
+        values = concrete(self._of_design(design))
         motion, _, records = solve_cases(self._solver, values, self._cases)
         every = [*self._snaps(values, records), *self._strains(values, motion, records)]
-        rows = [np.asarray(self._pull_back(design, Parameters(*bar))) for _, bar in every]
+        rows = [self._of_design.pull_back(design, Parameters(*bar)) for _, bar in every]
         return np.array([value for value, _ in every]), np.stack(rows)
 
     def _snaps(self, values: ConcreteParameters, records: Records) -> Iterator[Slope]:

@@ -195,6 +195,8 @@ class Design:
         cloak: (n,) ids of the units to redesign.
         frozen: (n,) ids of units whose vertices stay, whoever shares them; None for the driven.
         symmetry: imposed on the design.
+        turning_slots: whether the slots that hold the ligaments turn as well: shims are then bent
+            before any load, and all motion is counted from where the structure rests.
         copies: (n_copies, n_groups, 2) shifts of imperfect copies over which the loss is averaged,
             mm; None for the structure alone.
     """
@@ -202,6 +204,7 @@ class Design:
     cloak: Ints = field(default_factory=_none)
     frozen: Ints | None = None
     symmetry: Symmetry = "none"
+    turning_slots: bool = False
     copies: Floats | None = None
 
 
@@ -258,6 +261,11 @@ class Scene:
             raise TypeError(f"no record of a scene has the fields {', '.join(changes)}")
         return Scene(**records)
 
+    def bent(self, end_angles: Floats) -> Scene:
+        """Bends the ligaments by angles (n_ligaments, 2) at their ends, rad; see `Material`."""
+        material = self.structure.material._replace(end_angles=end_angles)
+        return self.updated(material=material, turning_slots=False)
+
     def driven_by(self, *motions: MotionLaw, **changes: Any) -> Scene:  # noqa: ANN401
         """Replaces the motions of the driven units, weighted equally; changes as of `updated`."""
         cases = tuple(self.loads.following(motion) for motion in motions)
@@ -296,7 +304,9 @@ class Scene:
         """Shifts of the cloak's vertices; those of frozen units stay."""
         design = self.design
         frozen = self.loads.driven if design.frozen is None else design.frozen
-        return design_space(self.lattice, design.cloak, frozen, design.symmetry)
+        return design_space(
+            self.lattice, design.cloak, frozen, design.symmetry, design.turning_slots
+        )
 
     @cached_property
     def topology(self) -> Topology:

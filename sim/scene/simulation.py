@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import jax
@@ -22,11 +22,12 @@ from sim.scene.objectives import (
     combined,
     extent,
 )
+from sim.scene.parameter_map import parameters_of_design
 from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_cases, check_units
 from sim.solvers import Case, PrescribedMotion, Solver, concrete, differentiable_motion, solve_cases
-from sim.structure import Parameters, parameters, shape
+from sim.structure import Parameters
 from sim.time_integration import simpson_weights
 
 Mimicking = DisplacementMimicking | RelativeMimicking | ReactionMimicking | StrainEnergyMimicking
@@ -253,25 +254,3 @@ def target_motion(scene: Scene, threads: int = 1) -> Floats:
         raise ValueError("the scene has no reference: it is compared with rest")
     response = simulate(reference, vertices=reference.lattice.vertices, threads=threads)
     return np.asarray(response.displacement[:, :, reference.objective.region])
-
-
-@lru_cache(maxsize=16)
-def parameters_of_design(
-    scene: Scene, copy: int | None = None
-) -> Callable[[Array], Parameters[Array]]:
-    """Compiles the map from a design vector to the parameters of its structure.
-
-    With a ``copy``, to those of that one of the design's imperfect copies.
-    """
-    copies = scene.design.copies
-    of_group = (
-        np.zeros((scene.lattice.n_groups, 2)) if copies is None or copy is None else copies[copy]
-    )
-    off = jnp.asarray(of_group)[scene.lattice.group]
-
-    @jax.jit
-    def of_design(design: Array) -> Parameters[Array]:
-        made = shape(scene.lattice, scene.space.vertices(design) + off)
-        return parameters(scene.lattice, made, scene.structure.material)
-
-    return of_design

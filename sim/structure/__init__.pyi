@@ -1,6 +1,7 @@
 from .contact_laws import ContactModel as ContactModel
 from .contact_laws import DistanceContact as DistanceContact
 from .contact_laws import VoidAngleContact as VoidAngleContact
+from .design_variables import ANGLE_LENGTH as ANGLE_LENGTH
 from .design_variables import DesignSpace as DesignSpace
 from .design_variables import Symmetry as Symmetry
 from .design_variables import design_space as design_space

@@ -1,5 +1,6 @@
-"""Maps design vectors to vertices: the free ones, and those that move together by symmetry."""
+"""Maps design vectors to vertices and angles of slots: the free ones, alike by symmetry."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -16,6 +17,9 @@ from sim.structure.lattice import Lattice
 
 Symmetry = Literal["none", "C4", "mirror_x", "mirror_y"]
 
+ANGLE_LENGTH = 5.0
+"""Length (mm) that turns an angle in radians into a length comparable to those of units, in mm."""
+
 _OPERATIONS: dict[str, list[Floats]] = {
     "none": [],
     "C4": [np.array([[0.0, -1.0], [1.0, 0.0]])],
@@ -29,22 +33,31 @@ class DesignSpace:
     """Linear map from a design vector (mm) to the shifts of the lattice's vertices.
 
     Without symmetry the variables are the x and y shifts of the free groups, in the order of their
-    numbers. With a symmetry each variable moves one orbit of them, by at most its own value.
+    numbers. With a symmetry each variable moves one orbit of them, by at most its own value. Where
+    the slots that hold ligaments turn as well, their angles come after, times ``ANGLE_LENGTH``.
 
     Attributes:
         lattice: the initial network; a zero design vector leaves it as it is.
         groups: (n_free,) free design groups.
-        basis: (2 n_free, n_variables) orthogonal columns of shifts, one per variable.
+        basis: (2 n_free, n_shifts) orthogonal columns of shifts, one per variable.
+        turns: (2 n_ligaments, n_turns) orthogonal columns of the angles at the first and second
+            end of each ligament, one per variable; none where slots do not turn.
     """
 
     lattice: Lattice
     groups: Ints
     basis: sp.csr_array
+    turns: sp.csr_array
 
     @property
     def n_variables(self) -> int:
         """Counts the design variables."""
-        return self.basis.shape[1]
+        return self.basis.shape[1] + self.turns.shape[1]
+
+    @property
+    def turning(self) -> bool:
+        """Tests that the slots that hold ligaments turn with the design."""
+        return self.turns.shape[1] > 0
 
     @cached_property
     def free_vertices(self) -> Ints:
@@ -53,20 +66,40 @@ class DesignSpace:
 
     def vertices(self, design: Numbers) -> Array:
         """Returns the vertices (n_vertices, 2) of a design vector (n_variables,), mm."""
-        basis = self.basis.tocoo()
-        moved = jnp.asarray(basis.data) * jnp.asarray(design)[basis.col]
-        free_shifts = jnp.zeros(basis.shape[0]).at[basis.row].add(moved).reshape(-1, 2)
+        shifting = jnp.asarray(design)[: self.basis.shape[1]]
+        free_shifts = _product(self.basis, shifting).reshape(-1, 2)
         shifts = jnp.zeros((self.lattice.n_groups, 2)).at[self.groups].set(free_shifts)
         return jnp.asarray(self.lattice.vertices) + shifts[self.lattice.group]
 
-    def project(self, shifts: Floats) -> Floats:
-        """Finds the design vector closest to the given group shifts (n_groups, 2), mm."""
-        square = self.basis.power(2).sum(axis=0)  # of orthogonal columns
-        return np.asarray(self.basis.T @ shifts[self.groups].ravel() / square)
+    def end_angles(self, design: Numbers) -> Array:
+        """Returns the angles (n_ligaments, 2) of slots against their ligaments, rad."""
+        turning = jnp.asarray(design)[self.basis.shape[1] :] / ANGLE_LENGTH
+        return _product(self.turns, turning).reshape(-1, 2)
+
+    def project(self, shifts: Floats, end_angles: Floats | None = None) -> Floats:
+        """Finds the design vector closest to the given group shifts (n_groups, 2), mm.
+
+        Likewise to the angles (n_ligaments, 2) of slots, rad; by default they are zero.
+        """
+        angles = np.zeros(self.turns.shape[0]) if end_angles is None else end_angles.ravel()
+        parts = (self.basis, shifts[self.groups].ravel()), (self.turns, ANGLE_LENGTH * angles)
+        # of orthogonal columns
+        return np.concatenate([basis.T @ of / basis.power(2).sum(axis=0) for basis, of in parts])
+
+
+def _product(matrix: sp.csr_array, vector: Array) -> Array:
+    """Multiplies a sparse matrix (n, m) by a vector (m,); differentiable by the vector."""
+    entries = matrix.tocoo()
+    terms = jnp.asarray(entries.data) * vector[entries.col]
+    return jnp.zeros(matrix.shape[0]).at[entries.row].add(terms)
 
 
 def design_space(
-    lattice: Lattice, cloak: Ints, frozen: Ints | None = None, symmetry: Symmetry = "none"
+    lattice: Lattice,
+    cloak: Ints,
+    frozen: Ints | None = None,
+    symmetry: Symmetry = "none",
+    turning: bool = False,
 ) -> DesignSpace:
     """Frees every vertex of the cloak's units except those of the ``frozen`` units.
 
@@ -75,6 +108,7 @@ def design_space(
         cloak: ids of the units to redesign.
         frozen: ids of units whose vertices must stay (the driven source).
         symmetry: imposed on the shifts, about the middle of the lattice.
+        turning: whether the slots of all units with a free vertex turn as well.
 
     Raises:
         ValueError: the initial lattice or the choice of units does not have the symmetry.
@@ -84,20 +118,42 @@ def design_space(
     if frozen is not None:
         free[lattice.group[np.isin(lattice.unit, frozen)]] = False
     groups = np.flatnonzero(free)
-    return DesignSpace(lattice, groups, _symmetric_basis(lattice, groups, symmetry))
+    steps = [
+        sp.kron(_permutation(_group_image(lattice, groups, operation)), operation)
+        for operation in _OPERATIONS[symmetry]
+    ]
+    turned = np.isin(lattice.unit, np.unique(lattice.unit[free[lattice.group]]))
+    ends = np.flatnonzero(turned[lattice.ligaments.ravel()]) if turning else groups[:0]
+    turns = sp.csr_array((2 * lattice.n_ligaments, 0))
+    if len(ends):
+        of_ends = [
+            np.linalg.det(operation) * _permutation(_end_image(lattice, ends, operation))
+            for operation in _OPERATIONS[symmetry]
+        ]
+        placed = (np.ones(len(ends)), (ends, np.arange(len(ends))))
+        shape = (2 * lattice.n_ligaments, len(ends))
+        turns = sp.csr_array(placed, shape=shape) @ _symmetric_basis(len(ends), of_ends)
+    return DesignSpace(lattice, groups, _symmetric_basis(2 * len(groups), steps), turns)
 
 
-def _symmetric_basis(lattice: Lattice, groups: Ints, symmetry: Symmetry) -> sp.csr_array:
-    """Builds an orthogonal basis of the shifts of ``groups`` that the symmetry allows."""
-    identity = sp.csr_array(sp.eye_array(2 * len(groups)))
+def _permutation(image: Ints) -> sp.csr_array:
+    """Builds the matrix that moves each value to its image."""
+    ones, order = np.ones(len(image)), np.arange(len(image))
+    return sp.csr_array((ones, (image, order)), shape=(len(image),) * 2)
+
+
+def _symmetric_basis(count: int, steps: Sequence[sp.sparray]) -> sp.csr_array:
+    """Builds an orthogonal basis of the vectors (count,) that do not change by operations.
+
+    Args:
+        count: of the vectors' entries.
+        steps: (count, count) signed permutations, each some power of which is the identity.
+    """
+    identity = sp.csr_array(sp.eye_array(count))
     projector = identity
-    for operation in _OPERATIONS[symmetry]:
-        image = _group_image(lattice, groups, operation)
-        ones, order = np.ones(len(groups)), np.arange(len(groups))
-        permutation = sp.csr_array((ones, (image, order)), shape=(len(groups),) * 2)
-        step = sp.csr_array(sp.kron(permutation, operation))
+    for step in steps:
         powers = [identity]
-        while abs((following := step @ powers[-1]) - identity).max() > 0.0:
+        while abs((following := sp.csr_array(step) @ powers[-1]) - identity).max() > 0.0:
             powers.append(following)
         projector = sum(powers[1:], powers[0]) @ projector / len(powers)
     return _orbits(projector)
@@ -120,12 +176,28 @@ def _orbits(projector: sp.csr_array) -> sp.csr_array:
 
 def _group_image(lattice: Lattice, groups: Ints, operation: Floats) -> Ints:
     """Finds the image of each group under an operation about the middle, by place in ``groups``."""
-    middle = (lattice.site.min(axis=0) + lattice.site.max(axis=0)) / 2
     centre = np.zeros((lattice.n_groups, 2))
     count = np.bincount(lattice.group, minlength=lattice.n_groups)
-    np.add.at(centre, lattice.group, lattice.vertices - middle)
-    centre = (centre / count[:, None])[groups]
-    distance, image = KDTree(centre).query(centre @ operation.T)
-    if len(groups) and distance.max() > 1e-6 * lattice.spacing:
+    np.add.at(centre, lattice.group, lattice.vertices)
+    return _image(lattice, (centre / count[:, None])[groups], operation)
+
+
+def _end_image(lattice: Lattice, ends: Ints, operation: Floats) -> Ints:
+    """Finds the image of each end of a ligament, by place in ``ends``: its unit goes with it."""
+    middle = lattice.vertices[lattice.ligaments].mean(axis=1)
+    # a point of the ligament nearer to this end
+    near = (lattice.vertices[lattice.ligaments] + middle[:, None]).reshape(-1, 2) / 2
+    return _image(lattice, near[ends], operation)
+
+
+def _image(lattice: Lattice, points: Floats, operation: Floats) -> Ints:
+    """Finds the image (n,) of points (n, 2) among them under an operation about the middle.
+
+    Raises:
+        ValueError: some have none.
+    """
+    about = points - (lattice.site.min(axis=0) + lattice.site.max(axis=0)) / 2
+    distance, image = KDTree(about).query(about @ operation.T)
+    if len(points) and distance.max() > 1e-6 * lattice.spacing:
         raise ValueError("the initial lattice or its cloak does not have this symmetry")
     return np.asarray(image)

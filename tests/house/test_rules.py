@@ -22,6 +22,7 @@ FLOORS = {
         {"solvers", "vibration"},
         {"quasistatics", "time_integration"},
         {"scene"},
+        {"load_family"},
     ),
     "pipeline": (
         {"runtime"},

@@ -42,6 +42,7 @@ def write(path: Path) -> Path:
         | {
             "vertices": (("unit", "vertex", "xy"), vertices),
             "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+            "end_angles": (("ligament", "end"), np.full((intact.n_ligaments, 2), np.nan)),
             "centroid": (("unit", "xy"), vertices.mean(axis=1)),
         },
         unit_coordinates(intact)

@@ -87,6 +87,7 @@ def design(chosen: Problem, path: Path) -> xr.Dataset:
         | {
             "vertices": (("unit", "vertex", "xy"), vertices),
             "vertices_initial": (("unit", "vertex", "xy"), intact.padded(intact.vertices)),
+            "end_angles": (("ligament", "end"), np.full((intact.n_ligaments, 2), np.nan)),
             "centroid": (("unit", "xy"), vertices.mean(axis=1)),
             "constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9])),
             "smallest_gap": ((), 0.11),

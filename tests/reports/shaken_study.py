@@ -139,6 +139,7 @@ def design(chosen: Problem, lattice: Lattice) -> xr.Dataset:
         | {
             "vertices": (("unit", "vertex", "xy"), vertices),
             "vertices_initial": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
+            "end_angles": (("ligament", "end"), np.full((lattice.n_ligaments, 2), np.nan)),
             "centroid": (("unit", "xy"), np.nanmean(vertices, axis=1)),
             "constraint_margin": ("constraint", np.array([0.0, 0.01, 2e-9, 0.3, 0.11])),
             "smallest_gap": ((), 0.11),

@@ -14,7 +14,7 @@ from jax import Array
 from pipeline.calibration.inputs import Constants
 from sim.core import Floats, Numbers
 from sim.quasistatics import StaticSolver
-from sim.scene import GradientChain
+from sim.scene import GradientChain, ParameterMap
 from sim.solvers import (
     MotionLaw,
     PrescribedMotion,
@@ -135,7 +135,7 @@ class SpecimenSimulation:
         def weighted(motion: Array, made: Parameters[Array], bar: Array) -> tuple[Array, None]:
             return jnp.vdot(bar, self.seen(motion[0], made)), None
 
-        return GradientChain(self.parameters, weighted)
+        return GradientChain(ParameterMap(self.parameters), weighted)
 
     def _solver(self, constants: Constants) -> AnySolver:
         if constants.cutoff is None:

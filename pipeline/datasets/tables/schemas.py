@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 import yaml
 
-SCHEMA_VERSION = 4
+SCHEMA_VERSION = 5
 
 Kind = (
     Literal["design", "design_method", "response", "sweep", "scatter", "verification", "spectrum"]

@@ -34,6 +34,7 @@ class Corner:
         ligament: id of the ligament there.
         along: (2,) unit vector of the ligament, pointing into the unit.
         length: of the ligament, mm.
+        turn: of the slot against the ligament, rad, where it was designed; None if it is free.
         other: the slot at the ligament's other end; None as long as there is none.
     """
 
@@ -41,6 +42,7 @@ class Corner:
     ligament: int
     along: Floats
     length: float
+    turn: float | None = None
     other: Slot | None = None
 
     @property
@@ -88,8 +90,8 @@ def preferred_slot(
     polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication
 ) -> Candidates:
     """Offers the slot in the preferred direction and depth, if its walls are thick enough."""
-    depth = np.array([settings.slots.depth])
-    return _candidates(polygon, room, corner, settings, np.zeros(1), depth)
+    turn, depth = np.full(1, corner.turn or 0.0), np.array([settings.slots.depth])
+    return _candidates(polygon, room, corner, settings, turn, depth)
 
 
 def all_slots(polygon: Polygon, room: Polygon, corner: Corner, settings: Fabrication) -> Candidates:
@@ -114,7 +116,8 @@ def _turns_and_depths(
     depths = np.unique([*_depths(settings), _straight_depth(polygon, corner, settings)])
     _, ways = _ways(polygon, corner)
     exact = [signed_angle(ways[slots.direction], way) for way in ways.values()]
-    turns, depths = np.meshgrid(np.unique(np.round([*_TURNS, *exact], 6)), depths)
+    offered = np.unique(np.round([*_TURNS, *exact], 6)) if corner.turn is None else corner.turn
+    turns, depths = np.meshgrid(offered, depths)
     return turns.ravel(), depths.ravel()
 
 
@@ -185,7 +188,8 @@ def _directions(
 ) -> tuple[Floats, Floats]:
     """Finds the vertex, and unit vectors (n, 2) turned from the preferred direction."""
     mouth, ways = _ways(polygon, corner)
-    x, y = ways[settings.slots.direction] / np.linalg.norm(ways[settings.slots.direction])
+    way = ways["ligament" if corner.turn is not None else settings.slots.direction]
+    x, y = way / np.linalg.norm(way)
     cosine, sine = np.cos(turns), np.sin(turns)
     return mouth, np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 

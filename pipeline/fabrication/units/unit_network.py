@@ -27,6 +27,8 @@ class UnitNetwork:
         labels: by id.
         index: (i, j) by id.
         ligaments: (id, (unit, vertex), (unit, vertex), unit vector from the first to the second).
+        turns: angles of the slots at both ends of ligaments against these, rad, by id; of those
+            that were designed.
         clamped, driven: ids.
     """
 
@@ -35,6 +37,7 @@ class UnitNetwork:
     labels: dict[int, str]
     index: dict[int, tuple[int, int]]
     ligaments: tuple[tuple[int, tuple[int, int], tuple[int, int], Floats], ...]
+    turns: dict[int, tuple[float, float]]
     clamped: tuple[int, ...]
     driven: tuple[int, ...]
 
@@ -60,6 +63,8 @@ def network(design: xr.Dataset, structure: str) -> UnitNetwork:
             vector = shapes[row[int(b)], q] - shapes[row[int(a)], p]
             along = vector / np.linalg.norm(vector)
             joints.append((number, (int(a), int(p)), (int(b), int(q)), along))
+    angles = design["end_angles"].transpose("ligament", "end").values
+    turned = np.isfinite(angles).all(axis=1) & (structure == "cloaked")
     clamped, driven = (_flagged(design["support"], held) for held in ("clamped", "driven"))
     there = np.flatnonzero(present)
     return UnitNetwork(
@@ -68,6 +73,10 @@ def network(design: xr.Dataset, structure: str) -> UnitNetwork:
         {ids[at]: names[at] for at in there},
         {ids[at]: index[at] for at in there},
         tuple(joints),
+        {
+            number: (angles[number, 0], angles[number, 1])
+            for number in np.flatnonzero(turned).tolist()
+        },
         tuple(ids[at] for at in there if clamped[at]),
         tuple(ids[at] for at in there if driven[at]),
     )
@@ -87,8 +96,9 @@ def corners(net: UnitNetwork) -> dict[int, list[Corner]]:
     slotted: dict[int, list[Corner]] = defaultdict(list)
     for number, (a, p), (b, q), along in net.ligaments:
         length = float(shapely.distance(*(_vertex(net, *end) for end in ((a, p), (b, q)))))
-        slotted[a].append(Corner(p, number, -along, length))
-        slotted[b].append(Corner(q, number, along, length))
+        turns = net.turns.get(number, (None, None))
+        slotted[a].append(Corner(p, number, -along, length, turns[0]))
+        slotted[b].append(Corner(q, number, along, length, turns[1]))
     return slotted
 
 

@@ -46,6 +46,9 @@ class Optimiser(Section):
         angle: the budget with which SQP first optimises a design for contact on distance by the
             angle law, whether it overlaps and snaps or not; none by default.
         symmetry: that the design is to have.
+        as_built: whether the slots that hold the shims turn with the design, by up to 30 degrees
+            against the ligaments: it is then optimised with its shims bent as drawn, and all motion
+            counted from where it comes to rest; for convex units.
         trust_radius: at the start.
         trust_radius_max: at most.
         kick: random shifts with which an optimisation that has ended goes on, as far as its
@@ -60,6 +63,7 @@ class Optimiser(Section):
     geometric: Method = Method(evaluations=60)
     angle: Method | None = None
     symmetry: Literal["none", "C4", "mirror_x", "mirror_y"] = "none"
+    as_built: bool = False
     trust_radius: Length = 0.25
     trust_radius_max: Length = 1.0
     kick: Length = 0.15

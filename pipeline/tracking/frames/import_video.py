@@ -105,6 +105,7 @@ def design(described: dict[str, Any]) -> xr.Dataset:
         "support": (("unit",), zeros),
         "ligament_unit": (("ligament", "end"), joint),
         "ligament_vertex": (("ligament", "end"), corner),
+        "end_angles": (("ligament", "end"), np.full(corner.shape, np.nan)),
         "vertices": (("unit", "vertex", "xy"), vertices),
         "vertices_initial": (("unit", "vertex", "xy"), vertices),
         "centroid": (("unit", "xy"), centre),

@@ -81,7 +81,7 @@ def test_a_file_of_the_first_version_is_read(kind: Kind, tmp_path: Path) -> None
             variable.units = "px" if pixels else OLD.get(table.units, table.units)
     migrated = datasets.read(path, kind)
     xr.testing.assert_identical(migrated, now)
-    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 4
+    assert migrated.attrs["schema_version"] == SCHEMA_VERSION == 5
 
 
 TRACED = ["snap_load", "traced_load", "traced_force", "traced_eigenvalue"]

@@ -31,6 +31,7 @@ def design() -> xr.Dataset:
             "vertices_initial": (("unit", "vertex", "xy"), corners),
             "ligament_unit": (("ligament", "end"), ends[:, :, 0]),
             "ligament_vertex": (("ligament", "end"), ends[:, :, 1]),
+            "end_angles": (("ligament", "end"), np.full(ends.shape[:2], np.nan)),
             "region": _flags(np.zeros(len(indices), dtype=np.int8), "surroundings void"),
             "support": _flags(support, "free clamped driven"),
         },

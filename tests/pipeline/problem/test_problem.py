@@ -28,7 +28,7 @@ from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES, UserError
 
 ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased")
-NAMES = ("edge3", "free", "text", *ROBUST, "straight", "quick")
+NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "quick")
 PRESETS = (None, *NAMES)
 
 
@@ -374,13 +374,16 @@ def test_infill_is_little_where_mass_plays_no_part(fig2: Path) -> None:
     assert load(fig2.parents[1] / "fig4/problem.yaml").infill == 0.15
 
 
-def test_a_design_with_straight_shims_depends_on_slots_and_shims_alone(
-    fig2: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("plain", "key"), [("constraints:", "straight_shims"), ("optimiser:", "as_built")]
+)
+def test_a_design_with_room_for_slots_depends_on_slots_and_shims_alone(
+    fig2: Path, tmp_path: Path, plain: str, key: str
 ) -> None:
-    plain, straight = "constraints:", "constraints:\n  straight_shims: true"
+    straight = f"{plain}\n  {key}: true"
 
     def hashed(new: str, made: str) -> str:
-        text = edited(fig2, tmp_path, plain, f"fabrication: {{ {made} }}\n{new}")
+        text = edited(fig2, tmp_path, f"\n{plain}", f"\nfabrication: {{ {made} }}\n{new}")
         return section_hash(text, "design", "sqp")
 
     thin, deep = "shims: { thickness: 0.1 mm }", "slots: { depth_max: 6 mm }"

@@ -13,7 +13,7 @@ from pipeline.problem.reading import load, overlay_keys
 from pipeline.runtime import UserError
 from pipeline.stages import certify
 from reports.__main__ import main
-from sim.scene import LoadLosses
+from sim.load_family import LoadLosses
 
 FAMILY = {
     "objective": {"loads": {"directions": ["0 deg", "180 deg"], "frequency": ["1 Hz", "8 Hz"]}},

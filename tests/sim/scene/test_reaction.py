@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.scene import Evaluator, Scene, make_plan, mimicking, simulate
-from tests.sim.scene.test_load_family import mimicked
+from tests.sim.load_family.test_load_family import mimicked
 from tests.sim.scene.test_plan import design_of
 
 

@@ -16,6 +16,8 @@ from sim.scene import (
     Structure,
     as_built,
     concrete_parameters,
+    evaluate,
+    make_plan,
     relaxed,
     simulate,
 )
@@ -151,3 +153,58 @@ def test_a_symmetric_design_is_built_with_shims_that_are_not() -> None:
     assert posed.space.n_variables < 8
     angles = np.random.default_rng(4).normal(size=(lattice.n_ligaments, 2)) * 0.1
     assert as_built(posed, lattice.vertices, angles).loss_as_built > 0.0
+
+
+def turning(kind: Literal["displacement", "strain_energy"], **changes: object) -> Scene:
+    """The squares, whose middle is redesigned with the slots that hold its ligaments."""
+    return pulled(kind).updated(cloak=np.array([5, 6]), turning_slots=True, **changes)
+
+
+@pytest.mark.parametrize("kind", ["displacement", "strain_energy"])
+@pytest.mark.parametrize("static", [True, False], ids=["static", "in time"])
+def test_designs_with_turned_slots_are_those_built_and_pass_the_taylor_test(
+    kind: Literal["displacement", "strain_energy"], static: bool
+) -> None:
+    posed = turning(kind)
+    if not static:
+        shaken = PrescribedMotion(posed.loads.driven, Harmonic(1.0, 5.0, 0.0))
+        posed = posed.updated(cases=(shaken,), static=False, steps=None, samples=21, duration=0.2)
+    rng = np.random.default_rng(4)
+    design, way = rng.normal(size=(2, posed.space.n_variables))
+    plan = make_plan(posed)
+    loss, gradient = evaluate(posed, design, plan)
+    plain = posed.updated(turning_slots=False)
+    angles = np.asarray(posed.space.end_angles(design))
+    assert np.abs(angles).max() > 0.2
+    built = as_built(plain, np.asarray(posed.space.vertices(design)), angles)
+    assert loss == pytest.approx(built.loss_as_built, rel=1e-8 if static else 1e-3)
+    steps = np.array([1e-2, 5e-3, 2.5e-3])
+    left = [
+        abs(evaluate(posed, design + step * way, plan)[0] - loss - step * gradient @ way)
+        for step in steps
+    ]
+    np.testing.assert_allclose(np.log2(np.array(left[:-1]) / left[1:]), 2.0, atol=0.15)
+
+
+@pytest.mark.parametrize("symmetry", ["C4", "mirror_x", "mirror_y"])
+def test_slots_turn_as_the_symmetry_asks_for(symmetry: Literal["C4", "mirror_x"]) -> None:
+    """A structure with them comes to rest in a state of that symmetry."""
+    lattice = quads(5, 5, 15.0, 2.25, np.deg2rad(20.0 if symmetry == "C4" else 0.0))
+    middle, corners = np.array([12]), np.array([0, 4, 20, 24])
+    still = PrescribedMotion(middle, LinearRamp(0.0, 1.0, 0.0))
+    loads = Loads((still,), (Clamp(corners),), static=True, duration=1.0)
+    posed = Scene(Structure(lattice, PLAIN), loads).updated(
+        region=np.array([2]), cloak=np.arange(25), symmetry=symmetry, turning_slots=True
+    )
+    design = np.random.default_rng(5).normal(size=posed.space.n_variables)
+    material = PLAIN._replace(end_angles=np.asarray(posed.space.end_angles(design)))
+    vertices = np.asarray(posed.space.vertices(design))
+    motion = relaxed(posed.updated(material=material, turning_slots=False), vertices).motion
+    field = motion.reshape(5, 5, 3)
+    image = {
+        "C4": np.stack([field[..., 1], -field[..., 0], field[..., 2]], -1)[:, ::-1].swapaxes(0, 1),
+        "mirror_x": field[:, ::-1] * [-1.0, 1.0, -1.0],
+        "mirror_y": field[::-1] * [1.0, -1.0, -1.0],
+    }[symmetry]
+    assert np.abs(motion[:, 2]).max() > 0.01
+    np.testing.assert_allclose(image, field, atol=1e-7)

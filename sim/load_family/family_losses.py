@@ -17,9 +17,7 @@ import numpy as np
 from jax import Array
 
 from sim.core import Floats, Numbers
-from sim.scene.plan import concrete_parameters, make_plan
-from sim.scene.scene import DIRECTED, Scene
-from sim.scene.simulation import mimicking
+from sim.scene import DIRECTED, Scene, concrete_parameters, make_plan, mimicking
 from sim.solvers import Harmonic, PrescribedMotion, Solver, differentiable_motion
 from sim.structure import Parameters
 

@@ -8,21 +8,20 @@ import pytest
 
 from sim.constraints import Limits
 from sim.core import Floats, SimulationError
-from sim.optimise import Evaluation, Journal, Result, SqpOptions
-from sim.scene import (
+from sim.load_family import (
     FamilyOptions,
     FoundLoad,
     LoadFamily,
     LoadLosses,
-    Scene,
     SearchOptions,
     ascend,
     minimise_worst,
-    parameters_of_design,
-    simulate,
     spread_places,
 )
-from sim.scene.worst_load import IDLE, LoadSet, search_worst, without_copies
+from sim.load_family.exchange import IDLE, LoadSet, without_copies
+from sim.load_family.worst_load import search_worst
+from sim.optimise import Evaluation, Journal, Result, SqpOptions
+from sim.scene import Scene, parameters_of_design, simulate
 from sim.solvers import Harmonic, LinearRamp
 from tests.sim.scene.test_plan import design_of, scene
 

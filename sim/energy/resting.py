@@ -1,0 +1,82 @@
+"""Counts motion and strain from where units rest whose ligaments are not free of stress."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from sim.core import Numbers
+from sim.energy.ligament import ligament_strain
+from sim.structure import Lattice, Parameters
+
+
+class RestState(NamedTuple):
+    """Describes a structure as it rests.
+
+    Attributes:
+        vertices: (n_vertices, 2) there, mm.
+        vector: (n_ligaments, 2) ligaments there, mm.
+        shear_stiffness: (n_ligaments,) for their length there, N/mm.
+        natural: (n_ligaments, 3) stretch, mm, shear angle and relative rotation, rad, from there,
+            at which ligaments are free of stress.
+    """
+
+    vertices: Array
+    vector: Array
+    shear_stiffness: Array
+    natural: Array
+
+
+def rest_state(lattice: Lattice, values: Parameters[Any], motion: Numbers) -> RestState:
+    """Moves units as rigid bodies, and tells ligaments' natural states from their new vectors.
+
+    So energies and forces of a motion from there are those of the motion before and from there.
+
+    Args:
+        lattice: how ligaments join the units.
+        values: parameters of the structure as designed.
+        motion: (n_units, 3) from there to rest, mm, mm, rad.
+    """
+    values, motion = jax.tree.map(jnp.asarray, values), jnp.asarray(motion)
+    turn = motion[lattice.unit, 2]
+    arm, cosine, sine = values.corner, jnp.cos(turn), jnp.sin(turn)
+    turned = jnp.stack(
+        [cosine * arm[:, 0] - sine * arm[:, 1], sine * arm[:, 0] + cosine * arm[:, 1]], axis=1
+    )
+    vertices = values.centroid[lattice.unit] + motion[lattice.unit, :2] + turned
+    first, second = lattice.ligaments.T
+    vector = vertices[second] - vertices[first]
+    ends: Array = motion[lattice.ligament_units]
+    strain = jax.vmap(ligament_strain)(
+        ends[:, 0], ends[:, 1], values.arm[:, 0], values.arm[:, 1], values.vector
+    )
+    before, after = (jnp.linalg.norm(each, axis=1) for each in (values.vector, vector))
+    # k_s (l0 gamma)^2 knows the length as designed
+    shear = values.law[:, 1] * (before / after) ** 2
+    return RestState(vertices, vector, shear, values.natural - jnp.stack(strain, axis=1))
+
+
+def counted_from_rest(
+    lattice: Lattice, values: Parameters[Array], motion: Array
+) -> Parameters[Array]:
+    """Derives the parameters of a structure as it rests; arguments of `rest_state`."""
+    rest, unit = rest_state(lattice, values, motion), lattice.unit
+    centroid = values.centroid + motion[:, :2]
+    corner = rest.vertices - centroid[unit]
+    return values._replace(
+        arm=corner[lattice.ligaments],
+        vector=rest.vector,
+        void=values.void + _opened(lattice, motion),
+        law=values.law.at[:, 1].set(rest.shear_stiffness),
+        natural=rest.natural,
+        corner=corner,
+        centroid=centroid,
+    )
+
+
+def _opened(lattice: Lattice, motion: Array) -> Array:
+    """Computes by how much void angles (n_ligaments, 2) grow, rad; see `void_angles`."""
+    a, b = lattice.ligament_units.T
+    more = motion[a, 2] - motion[b, 2]
+    return jnp.stack([more, -more], axis=1)

@@ -1,0 +1,100 @@
+"""Maps designs to the parameters of their structures, and derivatives back."""
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from sim.core import Floats, Numbers
+from sim.energy import counted_from_rest
+from sim.quasistatics import StaticSolver
+from sim.scene.scene import Scene
+from sim.solvers import LinearRamp, differentiable_motion
+from sim.structure import Parameters, parameters, shape
+
+
+class ParameterMap:
+    """Compiles a differentiable map from design vectors to parameters, and its pull-back.
+
+    Args:
+        of_design: the map, in JAX.
+    """
+
+    def __init__(self, of_design: Callable[[Array], Parameters[Array]]) -> None:
+        self._of_design = jax.jit(of_design)
+        self._pull_back = jax.jit(lambda design, bar: jax.vjp(of_design, design)[1](bar)[0])
+
+    def __call__(self, design: Numbers) -> Parameters[Array]:
+        """Parameters of a design vector (n_variables,); differentiable by it."""
+        return self._of_design(design)
+
+    def pull_back(self, design: Floats, bar: Parameters[Any]) -> Floats:
+        """Pulls derivatives by the parameters back to those (n_variables,) by the design vector."""
+        return np.asarray(self._pull_back(design, bar))
+
+
+def rest_motion(scene: Scene, values: Parameters[Any]) -> Array:
+    """Computes the motion (n_units, 3) to rest, the held units where they are; mm, mm, rad.
+
+    It is differentiable by the parameters that a design of the scene changes.
+
+    Raises:
+        SimulationError: there is no equilibrium.
+    """
+    still = scene.loads.following(LinearRamp(0.0, 1.0, 0.0))
+    solver = StaticSolver(scene.topology, np.ones(1))
+    return differentiable_motion(solver, values, (still,), designed=True).displacement[0, 0]
+
+
+class RestingMap(ParameterMap):
+    """Maps designs whose shims are bent to their parameters as they rest.
+
+    Args:
+        scene: the scene, whose slots turn with the design.
+        of_design: the map to the parameters before the shims turn the units.
+    """
+
+    def __init__(self, scene: Scene, of_design: Callable[[Array], Parameters[Array]]) -> None:
+        super().__init__(of_design)
+        self._scene = scene
+        self._from_rest = jax.jit(partial(counted_from_rest, scene.lattice))
+
+    def __call__(self, design: Numbers) -> Parameters[Array]:
+        """Parameters at rest of a design vector (n_variables,); differentiable by it.
+
+        Raises:
+            SimulationError: the structure does not come to rest.
+        """
+        values = super().__call__(design)
+        return self._from_rest(values, rest_motion(self._scene, values))
+
+    def pull_back(self, design: Floats, bar: Parameters[Any]) -> Floats:
+        """See ``ParameterMap``."""
+        return np.asarray(jax.vjp(self, jnp.asarray(design))[1](bar)[0])
+
+
+@lru_cache(maxsize=16)
+def parameters_of_design(scene: Scene, copy: int | None = None) -> ParameterMap:
+    """Compiles the map from a design vector to the parameters of its structure.
+
+    With a ``copy``, to those of that one of the design's imperfect copies.
+    """
+    copies, space = scene.design.copies, scene.space
+    of_group = (
+        np.zeros((scene.lattice.n_groups, 2)) if copies is None or copy is None else copies[copy]
+    )
+    off = jnp.asarray(of_group)[scene.lattice.group]
+    material = scene.structure.material
+
+    def of_design(design: Array) -> Parameters[Array]:
+        made, built = shape(scene.lattice, space.vertices(design) + off), material
+        if space.turning:
+            angles = material.end_angles + space.end_angles(design)
+            built = material._replace(end_angles=angles)
+        return parameters(scene.lattice, made, built)
+
+    return RestingMap(scene, of_design) if space.turning else ParameterMap(of_design)
