@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 
-from tests.e2e.checkout import STUDY, Checkout, assert_one_message
+from pipeline.__main__ import run_stage
+from reports.__main__ import main
+from tests.e2e.checkout import STUDY, Checkout, Ended, assert_one_message
 
-DESIGN = ("--method", "mma", "--out")
 # Root may write where modes forbid it, by its capability CAP_DAC_OVERRIDE (1): this drops it.
 ORDINARY_RIGHTS = """
 import ctypes, os
@@ -22,50 +24,39 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (16 << 10, 16 << 10))
 """
 
 
-def test_a_bad_problem(fresh: Checkout) -> None:
-    fresh.edit("spacing: 15 mm", "spacng: 15 mm")
-    place = f"experiments/{STUDY}/problem.yaml, line"
-    for ended in (fresh.make(), fresh.stage("pipeline design", *DESIGN, "x.nc")):
-        assert_one_message(ended, place, "lattice.spacng", "value:")
-    assert not (fresh.root / "x.nc").exists()
-    assert not fresh.results.exists()
-
-
 def test_a_bad_problem_leaves_results_alone(undisturbed: Checkout) -> None:
     before, text = undisturbed.built(), undisturbed.problem.read_text()
     undisturbed.edit("columns: 5", "columns: five")
     ended = undisturbed.make()
     undisturbed.problem.write_text(text)
-    assert_one_message(ended, "lattice.columns")
+    place = f"experiments/{STUDY}/problem.yaml, line"
+    assert_one_message(ended, place, "lattice.columns", "value:")
     assert undisturbed.built() == before
 
 
-def test_a_truncated_or_foreign_design(undisturbed: Checkout, tmp_path: Path) -> None:
+def test_a_truncated_or_foreign_design(
+    undisturbed: Checkout, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     truncated, foreign = tmp_path / "truncated.nc", tmp_path / "foreign.nc"
     whole = (undisturbed.results / "design.nc").read_bytes()
     truncated.write_bytes(whole[: len(whole) // 2])
     xr.Dataset({"temperature": ("x", np.zeros(3))}).to_netcdf(foreign)
+    built, out = undisturbed.results, tmp_path / "response.nc"
+    others = ("--response", str(built / "response.nc"), "--sweep", str(built / "sweep.nc"))
     for path in (truncated, foreign, tmp_path / "missing.nc"):
-        out = tmp_path / "response.nc"
-        for module, more in (
-            ("pipeline simulate", ("--out", str(out))),
-            ("reports study", ("--out-dir", str(tmp_path / "report"))),
+        given = ("--problem", str(undisturbed.problem), "--design", str(path))
+        for run, words in (
+            (run_stage, ("simulate", [*given, "--out", str(out)])),
+            (main, (["study", *given, *others, "--out-dir", str(tmp_path / "report")],)),
         ):
-            results = undisturbed.results
-            others = ("--response", str(results / "response.nc"), "--sweep")
-            given = (*others, str(results / "sweep.nc")) if module == "reports study" else ()
-            ended = undisturbed.stage(module, "--design", str(path), *given, *more)
-            assert_one_message(ended, f"file:   {path}")
+            code = run(*words)
+            assert_one_message(Ended("", code, *capsys.readouterr()), f"file:   {path}")
         assert not out.exists()
 
 
 def test_a_folder_that_is_read_only(fresh: Checkout) -> None:
     (fresh.root / "results").mkdir(mode=0o555)
-    for ended in (
-        fresh.make(first=ORDINARY_RIGHTS),
-        fresh.stage("pipeline design", *DESIGN, "results/x/x.nc", first=ORDINARY_RIGHTS),
-    ):
-        assert_one_message(ended, "results")
+    assert_one_message(fresh.make(first=ORDINARY_RIGHTS), "results")
 
 
 def test_a_disk_with_too_little_room(undisturbed: Checkout, tmp_path: Path) -> None:

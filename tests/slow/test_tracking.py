@@ -1,6 +1,7 @@
 """Heavy clips of the tracker: dots and speckle against truth, and long recordings."""
 
 import tracemalloc
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ from pipeline.tracking.frames import Frame, import_video, read_frames
 from pipeline.tracking.geometry import outlines_of_design
 from pipeline.tracking.motion import track_video
 from pipeline.tracking.motion.tracker import TrackedFrame, Tracker
+from tests.pipeline.tracking import test_wild_clips
 from tests.pipeline.tracking.conftest import CLIPS, check_accuracy, tracked
 
 _KEPT = 4 * 225 * 6  # bytes of poses and uncertainties, single precision
@@ -47,6 +49,12 @@ def test_speckled_units_agree_with_an_independent_correlation() -> None:
         middle = camera.project(rest) - (column - half, row - half)
         apart.append(warp[:, :2] @ middle + warp[:, 2] - camera.project(moved))
     assert np.sqrt(np.mean(np.square(apart))) < 0.05
+
+
+def test_a_specimen_that_leaves_the_picture_is_found_when_it_returns(tmp_path: Path) -> None:
+    test_wild_clips.test_no_unit_is_wrong_and_called_good(
+        "leaves_and_returns", 44, rms=0.012, lost=0.02, tmp_path=tmp_path
+    )
 
 
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:

@@ -2,7 +2,8 @@
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,12 @@ import pytest
 import trimesh
 
 from pipeline.datasets import file_hash
-from pipeline.fabrication.checks import check_package
+from pipeline.fabrication.checks import check_package, laser_folder, package_record
 from pipeline.fabrication.checks.assembled_specimen import unit_sections
 from pipeline.fabrication.checks.bill_checks import check_bill
 from pipeline.fabrication.checks.package_record import PackageRecord, expected_parts
 from pipeline.fabrication.papers import MANIFEST
-from pipeline.fabrication.readback import read_stl
+from pipeline.fabrication.readback import Drawing, read_drawing, read_stl
 from pipeline.problem import Problem
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
@@ -34,6 +35,23 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Problem]:
 @pytest.fixture
 def package(whole: tuple[Path, Problem], tmp_path: Path) -> Path:
     return Path(shutil.copytree(whole[0], tmp_path / "cloaked"))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def each_drawing_is_read_once() -> Iterator[None]:
+    """Keeps drawings by their bytes: a damage leaves most files of a package as they were."""
+    known: dict[tuple[str, bytes], Drawing] = {}
+
+    def read(path: Path) -> Drawing:
+        key = (path.suffix, path.read_bytes() if path.exists() else b"")
+        if key not in known:
+            known[key] = read_drawing(path)
+        return replace(known[key], file=path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (laser_folder, package_record):
+            patch.setattr(module, "read_drawing", read)
+        yield
 
 
 def refused(package: Path, asked: Problem) -> str:

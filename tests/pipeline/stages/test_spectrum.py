@@ -20,7 +20,7 @@ spectrum:
 """
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def design(hole: list[str]) -> Path:
     return Path(hole[1]).with_name("design.nc")
 
@@ -32,15 +32,17 @@ def options(folder: Path, modes: int = 4, compression: float = 0.02) -> list[str
     return ["--problem", str(path), "--quiet"]
 
 
-def analysed(design: Path, folder: Path) -> Path:
+@pytest.fixture(scope="module")
+def analysed(design: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("spectrum")
     out = folder / "spectrum.nc"
     words = [*options(folder), "--design", str(design), "--out", str(out)]
     assert run_stage("spectrum", words) == 0
     return out
 
 
-def test_every_structure_about_every_equilibrium(design: Path, tmp_path: Path) -> None:
-    found: xr.Dataset = datasets.read(analysed(design, tmp_path), "spectrum")
+def test_every_structure_about_every_equilibrium(analysed: Path) -> None:
+    found: xr.Dataset = datasets.read(analysed, "spectrum")
     assert found["structure"].values.tolist() == ["intact", "altered", "cloaked"]
     assert found["state"].values.tolist() == ["at rest", "loaded"]
     assert (found["frequency"] > 0).all()
@@ -78,12 +80,11 @@ def test_what_cannot_be_analysed_is_one_message(
     assert not Path(out).exists()
 
 
-def test_the_page_holds_the_figure_and_its_curves(design: Path, tmp_path: Path) -> None:
-    made = analysed(design, tmp_path)
+def test_the_page_holds_the_figure_and_its_curves(analysed: Path, tmp_path: Path) -> None:
     pages = []
     for name in ("one", "two"):
         out = tmp_path / name
-        words = [*options(tmp_path), "--spectrum", str(made), "--out-dir", str(out)]
+        words = [*options(tmp_path), "--spectrum", str(analysed), "--out-dir", str(out)]
         assert main(["spectrum", *words]) == 0
         pages.append({path.name: path.read_bytes() for path in out.iterdir()})
     assert pages[0] == pages[1]
@@ -93,9 +94,8 @@ def test_the_page_holds_the_figure_and_its_curves(design: Path, tmp_path: Path) 
 
 
 def test_a_spectrum_of_another_problem_is_refused(
-    design: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    analysed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    made = analysed(design, tmp_path)
-    words = [*options(tmp_path, modes=3), "--spectrum", str(made), "--out-dir", str(tmp_path)]
+    words = [*options(tmp_path, modes=3), "--spectrum", str(analysed), "--out-dir", str(tmp_path)]
     assert main(["spectrum", *words]) == 2
     assert "another problem" in capsys.readouterr().err

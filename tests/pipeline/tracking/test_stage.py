@@ -68,7 +68,6 @@ def test_a_video_is_tracked_by_two_commands(recording: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("grid:\n- 15\n", "grid:\n- 8\n", "of 120 in their places"),
         ("grid:\n- 15\n", "grid:\n- 14\n", "of 210 in their places, from ("),
         ("bias_angle_deg: 20", "bias_angle_deg: 8", "225 units are hidden or not as the design"),
     ],

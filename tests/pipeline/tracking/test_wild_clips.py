@@ -20,7 +20,6 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
 @pytest.mark.parametrize(
     ("name", "frames", "rms", "lost"),
     [
-        ("leaves_and_returns", 44, 0.012, 0.02),
         ("hand", 12, 0.012, 0.02),
         ("low_light", 8, 0.06, 0.0),
         ("motion_blur", 10, 0.05, 0.0),
