@@ -1,16 +1,20 @@
 """Hashes the source files that decide what a stage does, found through its import statements.
 
 Snakemake does not see an edit in an imported module; a hash of these files among a rule's params
-makes it see.
+makes it see. They are kept in .cache/ beside a hash of the whole source tree, as following imports
+takes half as long as all else that Snakemake does before it finds nothing to be done.
 """
 
 import hashlib
+import json
+import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from pipeline.runtime.locations import ROOT
-from sim.core import import_closure, locate
+from sim.core import PACKAGES, import_closure, locate
 
 RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".yaml"}
 
@@ -18,7 +22,38 @@ RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg"
 @cache
 def source_hash(module: str, root: Path = ROOT) -> str:
     """Hashes the source of a module and of everything of this project that it imports."""
-    return _digest(source_files(module, root), root)
+    store = root / ".cache/source_hashes.json"
+    known = _kept_hashes(store, _tree_hash(root))
+    if module not in known:
+        known[module] = _digest(source_files(module, root), root)
+        _keep(store, {"tree": _tree_hash(root), "hashes": known})
+    return known[module]
+
+
+@cache
+def _tree_hash(root: Path) -> str:
+    """Hashes all that a closure can hold: every source file and resource of the packages."""
+    kinds = RESOURCES | {".py", ".pyi"}
+    walks = (os.walk(root / package) for package in PACKAGES)
+    files = (Path(folder, name) for walk in walks for folder, _, names in walk for name in names)
+    return _digest(sorted(file for file in files if file.suffix in kinds), root)
+
+
+def _kept_hashes(store: Path, tree: str) -> dict[str, str]:
+    """Reads the hashes of modules that were kept for this very tree."""
+    try:
+        kept = json.loads(store.read_bytes())
+        return dict(kept["hashes"]) if kept["tree"] == tree else {}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def _keep(store: Path, hashes: dict[str, object]) -> None:
+    aside = store.with_name(f".part_{os.getpid()}_{store.name}")
+    with suppress(OSError):  # a folder that is read-only: they are computed each time
+        store.parent.mkdir(exist_ok=True)
+        aside.write_text(json.dumps(hashes), encoding="utf-8")
+        aside.replace(store)
 
 
 @cache

@@ -12,5 +12,6 @@ from .compiling import compiled as compiled
 from .compiling import inlined as inlined
 from .errors import NewContactPairs as NewContactPairs
 from .errors import SimulationError as SimulationError
+from .import_graph import PACKAGES as PACKAGES
 from .import_graph import import_closure as import_closure
 from .import_graph import locate as locate

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.runtime import source_closure
 from pipeline.runtime.locations import ROOT
 from pipeline.runtime.source_closure import source_files, source_hash
 
@@ -107,9 +108,26 @@ def test_unknown_module_is_refused(tree: Path) -> None:
 def test_hash_follows_the_content_of_the_closure(tree: Path, edited: str, changes: bool) -> None:
     before = source_hash("pipeline.stage", tree)
     (tree / edited).write_text("value = 2\n")
-    source_hash.cache_clear()
-    source_files.cache_clear()
+    forget()
     assert (source_hash("pipeline.stage", tree) != before) is changes
+
+
+def forget() -> None:
+    """As a process that begins."""
+    for known in (source_hash, source_files, source_closure._tree_hash):
+        known.cache_clear()
+
+
+def test_imports_are_followed_once_for_a_tree(tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, store = source_hash("pipeline.stage", tree), tree / ".cache/source_hashes.json"
+    forget()
+    with monkeypatch.context() as patch:
+        patch.setattr(source_closure, "source_files", None)
+        assert source_hash("pipeline.stage", tree) == before
+    for damaged in ("", "[]", '{"tree": 1}'):
+        store.write_text(damaged)
+        forget()
+        assert source_hash("pipeline.stage", tree) == before
 
 
 def test_hash_ignores_dates_and_places(
