@@ -39,7 +39,11 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-    asked = load_section(path, Calibration)
+    asked, fragment = load_section(path, Calibration), args.out.with_suffix(".yaml")
+    if fragment.resolve() == path.resolve():
+        remedy = "give the result another name or folder"
+        raise UserError("the constants would be written over this file", file=path, key="--out",
+                        value=str(args.out), remedy=remedy)  # fmt: skip
     fit = fit_calibration(asked, path)
     try:
         made, found = calibration_dataset.assemble_calibration(fit)
@@ -55,7 +59,7 @@ def _fit(path: Path, args: argparse.Namespace) -> None:
     words = calibration_dataset.material_fragment(
         fit, found, asked.title, synthetic=asked.synthetic
     )
-    with write_atomically(args.out.with_suffix(".yaml")) as aside:
+    with write_atomically(fragment) as aside:
         aside.write_text(words, encoding="utf-8")
     LOG.info("%s", words.rstrip())
 

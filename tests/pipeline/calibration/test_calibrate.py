@@ -121,3 +121,13 @@ def test_what_the_data_do_not_tell_is_said(
     found = datasets.read(tmp_path / "found.nc", "calibration")
     assert found["status"].values.tolist()[:2] == [0, 2]
     assert "shear_stiffness: 1.19 " not in (tmp_path / "found.yaml").read_text()
+
+
+def test_the_constants_are_not_written_over_their_description(
+    made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = made / "calibration.yaml"
+    before = path.read_bytes()
+    assert run_stage("calibrate", [str(path), "--out", str(path.with_suffix(".nc"))]) != 0
+    assert path.read_bytes() == before
+    assert "written over this file" in capsys.readouterr().err
