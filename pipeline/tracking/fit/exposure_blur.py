@@ -58,6 +58,7 @@ class ExposureBlur:
             made.brightness[unit],
             made.weight[unit],
             made.contrast[unit],
+            made.noise,
             made.cells.kind[unit],
             made.cells.span[unit],
         )

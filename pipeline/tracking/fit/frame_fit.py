@@ -6,9 +6,9 @@ from pipeline.runtime import Picture
 from pipeline.tracking.fit import patch_correlation
 from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, workspace
 from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
-from pipeline.tracking.fit.template import pixel_plane
+from pipeline.tracking.fit.template import block_places
 from pipeline.tracking.geometry import Camera
-from sim.core import Floats, Mask, Singles
+from sim.core import Floats, Mask
 
 FULL_STEPS = 8
 
@@ -22,9 +22,9 @@ class PoseFitter:
         full: (units,) information of each unit seen whole; zero until a first frame is fitted.
     """
 
-    def __init__(self, camera: Camera, templates: Templates, plane: Singles | None = None) -> None:
+    def __init__(self, camera: Camera, templates: Templates, blocks: Floats | None = None) -> None:
         self.camera, self.templates = camera, templates
-        self.plane = pixel_plane(camera) if plane is None else plane
+        self.blocks = block_places(camera) if blocks is None else blocks
         self.full = np.zeros(len(templates.centre))
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
@@ -72,9 +72,7 @@ class PoseFitter:
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
             across = int(2 * start.radius[wanted].max()) // SIZE + 3
-            padded = np.zeros(self.plane.shape[:2], np.float32)  # to whole blocks
-            padded[: image.shape[0], : image.shape[1]] = image
-            scene = FramePixels(padded, self.plane)
+            scene = FramePixels(np.ascontiguousarray(image, np.float32), self.blocks)
             patch_correlation.fit_patches(
                 scene, self.templates, start, wanted, FULL_STEPS, workspace(across**2), out
             )

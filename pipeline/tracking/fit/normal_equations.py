@@ -5,33 +5,41 @@ holds, so pixels are sampled first and summed after, many at a time.
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.runtime import inlined
+from pipeline.tracking.fit.template_cells import STEEP
 from sim.core import Floats, Image, Singles
 
 UNKNOWNS = 7  # ux, uy, theta; gain, offset, slope in x, slope in y
 SIZE = 8
+_MIDDLE = 0.5 * (SIZE - 1)
 _PIXELS = SIZE * SIZE
-_LANES = 16
+_ONE, _TWO, _ROW, _LAST = np.array([1, 2, 3, SIZE - 1], np.uint64)
+"""Indices without a sign, which count from the start alone, cost less."""
+_LANES = 8
 """Numbers that a processor adds at once, or a multiple."""
-_FEW = [4.0 * ((column + 2 * row) % 4 == 0) for row in range(SIZE) for column in range(SIZE)]
-_COUNT = np.array([[0.0] * _PIXELS, _FEW, [1.0] * _PIXELS], np.float32)
-"""How many pixels one stands for, by the kind of its cell and its place in the block."""
+_FEW = [(column + 2 * row) % 4 == 0 for row in range(SIZE) for column in range(SIZE)]
+_COMPARED = np.array([[False] * _PIXELS, _FEW, [True] * _PIXELS], np.uint8)
+"""Whether a pixel is compared, by the kind of its cell and its place in the block."""
+
+
+Indices: TypeAlias = NDArray[np.int32]
 
 
 class FramePixels(NamedTuple):
-    """Holds a frame, and the place in the specimen's plane of each of its pixels.
+    """Holds a frame, and the places in the specimen's plane of its blocks' pixels.
 
     Attributes:
         image: (rows, columns) brightness.
-        plane: (rows, columns, 2) mm.
+        blocks: (rows, columns, 3, 2) place of a block's middle, change by column and by row, mm.
     """
 
     image: Singles
-    plane: Singles
+    blocks: Floats
 
 
 class TemplateArrays(NamedTuple):
@@ -63,6 +71,10 @@ class FitBuffers(NamedTuple):
         weight: (64,) of the template, then with the robust one.
         weighted: (64,) a row with its weights.
         x, y: (64,) places on the unit.
+        chosen: (64,) pixels that are compared.
+        node: (64,) the first of the four about a pixel.
+        across, along: (64,) place among these.
+        mixed: (64, 4) what they tell.
         matrix: (7, 7) normal matrix, lower triangle.
         scores: (blocks, 7) right-hand sides by blocks.
         sums: (5,) information, the same with robust weights and with their loss's curvature;
@@ -75,6 +87,11 @@ class FitBuffers(NamedTuple):
     weighted: Singles
     x: Singles
     y: Singles
+    chosen: Indices
+    node: Indices
+    across: Singles
+    along: Singles
+    mixed: Singles
     matrix: Floats
     scores: Floats
     sums: Floats
@@ -82,13 +99,22 @@ class FitBuffers(NamedTuple):
 
 def workspace(blocks: int) -> FitBuffers:
     """Allocates room for units of at most so many blocks."""
+
+    def line() -> Singles:
+        return np.zeros(_PIXELS, np.float32)
+
     return FitBuffers(
         np.zeros((UNKNOWNS, _PIXELS), np.float32),
-        np.zeros(_PIXELS, np.float32),
-        np.zeros(_PIXELS, np.float32),
-        np.zeros(_PIXELS, np.float32),
-        np.zeros(_PIXELS, np.float32),
-        np.zeros(_PIXELS, np.float32),
+        line(),
+        line(),
+        line(),
+        line(),
+        line(),
+        np.zeros(_PIXELS, np.int32),
+        np.zeros(_PIXELS, np.int32),
+        line(),
+        line(),
+        np.zeros((_PIXELS, 4), np.float32),
         np.zeros((UNKNOWNS, UNKNOWNS)),
         np.zeros((blocks, UNKNOWNS)),
         np.zeros(5),
@@ -100,65 +126,91 @@ def _place(
     scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int, room: FitBuffers
 ) -> None:
     """Fills x, y with where a block's pixels are on the unit, in steps of the template's nodes."""
-    plane, x, y = scene.plane, room.x, room.y
-    per_step = np.float32(1 / look.step)
+    block = scene.blocks[top // SIZE, left // SIZE]
+    late = top + _MIDDLE - look.row
+    turn = state[2] + late * look.drift_turn
+    cos, sin = math.cos(turn) / look.step, math.sin(turn) / look.step
+    vx = block[0, 0] - look.x - state[0] - late * look.drift_x
+    vy = block[0, 1] - look.y - state[1] - late * look.drift_y
+    down_x = block[2, 0] - look.drift_x + look.drift_turn * vy
+    down_y = block[2, 1] - look.drift_y - look.drift_turn * vx
+    ahead_x = np.float32(cos * block[1, 0] + sin * block[1, 1])
+    ahead_y = np.float32(cos * block[1, 1] - sin * block[1, 0])
     for row in range(SIZE):
-        late = top + row - look.row
-        turn = state[2] + late * look.drift_turn
-        cos, sin = np.float32(math.cos(turn)) * per_step, np.float32(math.sin(turn)) * per_step
-        x_at = np.float32(look.x + state[0] + late * look.drift_x)
-        y_at = np.float32(look.y + state[1] + late * look.drift_y)
+        x, y = room.x[SIZE * row : SIZE * (row + 1)], room.y[SIZE * row : SIZE * (row + 1)]
+        below = row - _MIDDLE
+        x_at, y_at = vx + below * down_x, vy + below * down_y
+        start_x = np.float32(cos * x_at + sin * y_at) - np.float32(_MIDDLE) * ahead_x
+        start_y = np.float32(cos * y_at - sin * x_at) - np.float32(_MIDDLE) * ahead_y
         for column in range(SIZE):
-            vx = plane[top + row, left + column, 0] - x_at
-            vy = plane[top + row, left + column, 1] - y_at
-            k = SIZE * row + column
-            x[k] = cos * vx + sin * vy
-            y[k] = cos * vy - sin * vx
+            x[column] = start_x + np.float32(column) * ahead_x
+            y[column] = start_y + np.float32(column) * ahead_y
 
 
 @inlined
-def _sample(scene: FramePixels, look: TemplateArrays, top: int, left: int, room: FitBuffers) -> int:
-    """Reads the template where pixels are to be compared; returns their number.
+def _select(look: TemplateArrays, room: FitBuffers) -> int:
+    """Lists in chosen the pixels of a block that are to be compared; returns their number.
 
-    Fills weight, residual with the frame's brightness, and rows 0, 1, 3 with slopes and value of
-    the template: mixed of those that the four nodes about a pixel extrapolate to halfway, which is
-    exact for parabolas. There are pixels without weight up to the next multiple of `_LANES`.
+    Fills node, across and along of all; cells at the rim of a template are empty.
     """
-    nodes, kind, rows, x, y = look.nodes, look.kind, room.rows, room.x, room.y
-    size = kind.shape[0]
+    node, chosen, kind = room.node, room.chosen, look.kind.reshape(-1)
+    size, zero = look.kind.shape[0], np.float32(0)
     middle, most = np.float32((size - 1) // 2), np.float32(size - 1)
-    one, half, next_ = np.float32(1), np.float32(0.5), np.uint32(1)
+    for k in range(_PIXELS):
+        u = min(max(room.x[k] + middle, zero), most)
+        v = min(max(room.y[k] + middle, zero), most)
+        iu, iv = np.int32(u), np.int32(v)
+        node[k] = iv * np.int32(size) + iu
+        room.across[k], room.along[k] = u - np.float32(iu), v - np.float32(iv)
     n = 0
     for k in range(_PIXELS):
-        u, v = x[k] + middle, y[k] + middle
-        if not (u >= 0 and v >= 0 and u < most and v < most):
-            continue
-        iu, iv = np.uint32(u), np.uint32(v)
-        stands = _COUNT[kind[iv, iu], k]
-        if stands == 0:
-            continue
-        ju, jv = iu + next_, iv + next_
-        fu, fv = u - np.float32(iu), v - np.float32(iv)
+        chosen[n] = k
+        n += _COMPARED[kind[np.uint32(node[k])], k]
+    return n
+
+
+@inlined
+def _sample(
+    scene: FramePixels, look: TemplateArrays, top: int, left: int, count: int, room: FitBuffers
+) -> int:
+    """Reads frame and template at the pixels that are compared; returns their number, filled up.
+
+    Fills x, y, residual with the frame's brightness, weight, and rows 0, 1, 3 with slopes and value
+    of the template: mixed of those that the four nodes about a pixel extrapolate to halfway, which
+    is exact for parabolas. There are pixels without weight up to the next multiple of `_LANES`.
+    """
+    nodes, kind, mixed, rows = look.nodes.reshape(-1), look.kind.reshape(-1), room.mixed, room.rows
+    one, half, four = np.float32(1), np.float32(0.5), np.uint64(4)
+    line = four * np.uint64(look.nodes.shape[1])
+    x, y, chosen = room.x, room.y, room.chosen
+    for n in range(np.uint64(count)):
+        k = np.uint64(chosen[n])
+        room.residual[n] = scene.image[np.uint64(top) + (k >> _ROW), np.uint64(left) + (k & _LAST)]
+        x[n], y[n] = x[k], y[k]  # k is n or beyond
+        node = np.uint64(room.node[k])
+        rows[2, n] = np.float32(kind[node] == STEEP)
+        a = four * node
+        c = a + line
+        fu, fv = room.across[k], room.along[k]
         gu, gv = one - fu, one - fv
         wa, wb, wc, wd = gu * gv, fu * gv, gu * fv, fu * fv
-        au, bu, cu, du = nodes[iv, iu, 1], nodes[iv, ju, 1], nodes[jv, iu, 1], nodes[jv, ju, 1]
-        av, bv, cv, dv = nodes[iv, iu, 2], nodes[iv, ju, 2], nodes[jv, iu, 2], nodes[jv, ju, 2]
-        flat = wa * nodes[iv, iu, 0] + wb * nodes[iv, ju, 0]
-        flat += wc * nodes[jv, iu, 0] + wd * nodes[jv, ju, 0]
-        bow_u = fu * gu * (gv * (au - bu) + fv * (cu - du))
-        bow_v = fv * gv * (gu * (av - cv) + fu * (bv - dv))
-        here = wa * nodes[iv, iu, 3] + wb * nodes[iv, ju, 3]
-        rows[0, n] = wa * au + wb * bu + wc * cu + wd * du
-        rows[1, n] = wa * av + wb * bv + wc * cv + wd * dv
-        rows[3, n] = flat + half * (bow_u + bow_v)
-        here += wc * nodes[jv, iu, 3] + wd * nodes[jv, ju, 3]
-        room.weight[n] = stands * here
-        room.residual[n] = scene.image[top + (k >> 3), left + (k & 7)]
-        x[n], y[n] = x[k], y[k]
-        n += 1
-    whole = -(-n // _LANES) * _LANES
-    for k in range(n, whole):
-        room.weight[k] = room.residual[k] = rows[0, k] = rows[1, k] = rows[3, k] = 0
+        for i in range(four):
+            b, d = a + i + four, c + i + four
+            mixed[n, i] = wa * nodes[a + i] + wb * nodes[b] + wc * nodes[c + i] + wd * nodes[d]
+        u, v = a + _ONE, a + _TWO
+        bow_u = gv * (nodes[u] - nodes[u + four])
+        bow_u += fv * (nodes[u + line] - nodes[u + line + four])
+        bow_v = gu * (nodes[v] - nodes[v + line])
+        bow_v += fu * (nodes[v + four] - nodes[v + line + four])
+        rows[3, n] = half * (fu * gu * bow_u + fv * gv * bow_v)
+    for n in range(count):
+        rows[3, n] += mixed[n, 0]
+        rows[0, n] = rows[2, n] * mixed[n, 1]
+        rows[1, n] = rows[2, n] * mixed[n, 2]
+        room.weight[n] = mixed[n, 3]
+    whole = -(-count // _LANES) * _LANES
+    for n in range(count, whole):
+        room.weight[n] = room.residual[n] = rows[0, n] = rows[1, n] = rows[3, n] = 0
     return whole
 
 
@@ -229,8 +281,9 @@ def _add(room: FitBuffers, scores: Floats, pixels: int) -> None:
 
 @inlined
 def _within(scene: FramePixels, look: TemplateArrays, state: Floats, top: int, left: int) -> bool:
-    middle = scene.plane[top + SIZE // 2, left + SIZE // 2]
-    return math.hypot(middle[0] - look.x - state[0], middle[1] - look.y - state[1]) < look.reach
+    middle = scene.blocks[top // SIZE, left // SIZE, 0]
+    x, y = middle[0] - look.x - state[0], middle[1] - look.y - state[1]
+    return x * x + y * y < look.reach * look.reach
 
 
 @inlined
@@ -264,7 +317,7 @@ def gather_equations(
             if not _within(scene, look, state, top, left):
                 continue
             _place(scene, look, state, top, left, room)
-            pixels = _sample(scene, look, top, left, room)
+            pixels = _sample(scene, look, top, left, _select(look, room), room)
             if pixels > 0:
                 _derive(look, state, pixels, room)
                 _weigh(room, tight, pixels)

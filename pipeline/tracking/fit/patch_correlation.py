@@ -27,11 +27,15 @@ from pipeline.tracking.fit.template_cells import TemplateCells, unfold
 from sim.core import Floats, Mask, Singles
 
 POSE = 3
-WIDTH = UNKNOWNS + 23
+TOLD = np.array([0, 1, 2, 5, 6])
+"""Unknowns whose covariance is told: the pose, and the light's slopes, which look like shifts."""
+_SQUARE = len(TOLD) ** 2
+WIDTH = UNKNOWNS + 2 * _SQUARE + 5
 _STRIDE = 1.4
 _NEAR = 0.3  # px, of a step that leads to where the unit is
 _LONGEST = 3.0  # px in one step
-_STILL = 0.025  # px, of a step after which there is none
+_STILL = 0.03  # px, of a step after which there is none
+_LARGE = 24.0  # px, radius of units of which a quarter tells where they are, roughly
 _FLOOR = 0.04
 """Smallest scale of the robust weights, in contrasts of the unit; or so many times the noise: """
 _SCALE = 4.0
@@ -49,6 +53,7 @@ class Templates(NamedTuple):
         centre: (units, 2) place at rest, mm.
         contrast: (units,) standard deviation of the brightness within the weight.
         reach: (units,) largest radius of the weight, mm.
+        noise: standard deviation of the brightness' noise.
         cells: between the nodes.
     """
 
@@ -59,6 +64,7 @@ class Templates(NamedTuple):
     centre: Floats
     contrast: Floats
     reach: Floats
+    noise: float
     cells: TemplateCells
 
 
@@ -104,8 +110,9 @@ class PoseFits(NamedTuple):
     Attributes:
         pose: (units, 3) displacement in mm and rotation in rad.
         photometry: (units, 4) gain, offset and its slopes over `half`.
-        curvature: (units, 3, 3) covariance of the pose for residuals of standard deviation one.
-        scatter: (units, 3, 3) covariance from the scores of blocks of pixels, which may be
+        curvature: (units, 5, 5) covariance of the pose and of the light's slopes, for residuals of
+            standard deviation one.
+        scatter: (units, 5, 5) the same from the scores of blocks of pixels, which may be
             correlated within.
         noise: (units,) weighted standard deviation of the residuals.
         share: (units,) part of the information that robust weights and the image's edge left.
@@ -136,11 +143,11 @@ class PoseFits(NamedTuple):
 
 @inlined
 def _box(shape: tuple[int, int], middle: Floats, radius: float, box: Floats) -> None:
-    """Rows and columns around a pixel, within the image, on the grid of blocks."""
+    """Rows and columns around a pixel, of whole blocks within the image."""
     box[0] = max(0, math.floor((middle[1] - radius) / SIZE) * SIZE)
-    box[1] = min(shape[0], math.ceil(middle[1] + radius) + 1)
+    box[1] = min(shape[0] // SIZE * SIZE, math.ceil(middle[1] + radius) + 1)
     box[2] = max(0, math.floor((middle[0] - radius) / SIZE) * SIZE)
-    box[3] = min(shape[1], math.ceil(middle[0] + radius) + 1)
+    box[3] = min(shape[1] // SIZE * SIZE, math.ceil(middle[0] + radius) + 1)
 
 
 @inlined
@@ -198,10 +205,10 @@ def _descend(
     """
     step, factor = np.empty(UNKNOWNS), np.zeros((UNKNOWNS, UNKNOWNS))
     blind, new = aim.tight == 0.0, aim.tight == 0.0 and aim.noise == 0.0
-    moved, count = -1.0, 0
+    moved, count, rough = -1.0, 0, 4 if aim.radius > _LARGE else 2
     scale = _UNKNOWN if new else max(aim.contrast * abs(state[3]), aim.tight)
     for turn in range(0 if new else 1, aim.most + 1):
-        every = 4 if turn == 0 else (2 if turn == 1 and blind else 1)
+        every = 4 if turn == 0 else (rough if turn == 1 and blind else 1)
         count = gather_equations(scene, look, state, box, every, 1 / (scale * scale), room)
         if turn == 0:
             _hold_pose(room.matrix)
@@ -231,24 +238,26 @@ def _summarise(
     """Writes a unit's row as `unpack` reads it."""
     out[:] = 0.0
     out[:UNKNOWNS] = state
-    part, sums = np.empty(POSE), room.sums
+    told = len(TOLD)
+    part, sums = np.empty(told), room.sums
+    white, blocks, last = UNKNOWNS, UNKNOWNS + _SQUARE, UNKNOWNS + 2 * _SQUARE
     for block in range(count):
-        for i in range(POSE):
+        for i in range(told):
             part[i] = 0.0
             for j in range(UNKNOWNS):
-                part[i] += inverse[i, j] * room.scores[block, j]
-        for i in range(POSE):
-            for j in range(POSE):
-                out[UNKNOWNS + 9 + 3 * i + j] += part[i] * part[j]
-    for i in range(POSE):
-        for j in range(POSE):
-            out[UNKNOWNS + 3 * i + j] = inverse[i, j]
+                part[i] += inverse[TOLD[i], j] * room.scores[block, j]
+        for i in range(told):
+            for j in range(told):
+                out[blocks + told * i + j] += part[i] * part[j]
+    for i in range(told):
+        for j in range(told):
+            out[white + told * i + j] = inverse[TOLD[i], TOLD[j]]
     gain = state[3] * state[3]
-    out[UNKNOWNS + 18] = math.sqrt(sums[4] / sums[3])
-    out[UNKNOWNS + 19] = sums[1] / max(full * gain, sums[0])
-    out[UNKNOWNS + 20] = count
-    out[UNKNOWNS + 21] = moved
-    out[UNKNOWNS + 22] = sums[0] / gain
+    out[last] = math.sqrt(sums[4] / sums[3])
+    out[last + 1] = sums[1] / max(full * gain, sums[0])
+    out[last + 2] = count
+    out[last + 3] = moved
+    out[last + 4] = sums[0] / gain
 
 
 @compiled
@@ -261,7 +270,7 @@ def fit_patches(
     room: FitBuffers,
     out: Floats,
 ) -> None:
-    """Fits all chosen units; fills out (units, 30) in the order of `unpack`.
+    """Fits all chosen units; fills out (units, 62) in the order of `unpack`.
 
     Args:
         scene: the frame.
@@ -313,14 +322,8 @@ def fit_patches(
 
 def unpack(out: Floats) -> PoseFits:
     """Names the columns of `fit_patches`' output."""
-    return PoseFits(
-        out[:, :POSE],
-        out[:, POSE:UNKNOWNS],
-        out[:, UNKNOWNS : UNKNOWNS + 9].reshape(-1, 3, 3),
-        out[:, UNKNOWNS + 9 : UNKNOWNS + 18].reshape(-1, 3, 3),
-        out[:, UNKNOWNS + 18],
-        out[:, UNKNOWNS + 19],
-        out[:, UNKNOWNS + 20],
-        out[:, UNKNOWNS + 21],
-        out[:, UNKNOWNS + 22],
+    pose, light, white, blocks, rest = np.split(
+        out, np.cumsum([POSE, UNKNOWNS - POSE, _SQUARE, _SQUARE]), axis=1
     )
+    shape = (len(out), len(TOLD), len(TOLD))
+    return PoseFits(pose, light, white.reshape(shape), blocks.reshape(shape), *rest.T)

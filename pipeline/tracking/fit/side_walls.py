@@ -60,6 +60,7 @@ class SideWalls:
                 self._templates.brightness[unit],
                 self._templates.weight[unit],
                 self._templates.contrast[unit],
+                self._templates.noise,
                 self._templates.cells.kind[unit],
                 self._templates.cells.span[unit],
             )

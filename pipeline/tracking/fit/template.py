@@ -24,7 +24,8 @@ _REACH = 2.5
 """The blurred edge is used so many standard deviations of the blur to the outside, and a pixel."""
 
 
-_FAR = 1e6
+_SPREAD = float(np.sqrt((SIZE**2 - 1) / 12))
+"""Standard deviation of the columns, or rows, of a block's pixels."""
 _TAPS = 4
 
 
@@ -98,7 +99,9 @@ def _smooth(value: Singles, low: float, high: float) -> Singles:
     return share * share * (3 - 2 * share)
 
 
-def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Templates:
+def _templates(
+    grid: TemplateGrid, brightness: Singles, weight: Singles, noise: float = 0.0
+) -> Templates:
     """Makes templates with the contrast that each has within its weight."""
     total = weight.sum(axis=(1, 2))
     mean = (brightness * weight).sum(axis=(1, 2)) / total
@@ -106,8 +109,9 @@ def _templates(grid: TemplateGrid, brightness: Singles, weight: Singles) -> Temp
     distance = np.hypot(grid.x, grid.y)
     reach = np.array([distance[mask > 0].max() for mask in weight])
     contrast = np.sqrt(square)
-    cells = classify_templates(brightness, weight, contrast)
-    return Templates(brightness, weight, grid.half, grid.step, grid.centre, contrast, reach, cells)
+    cells = classify_templates(brightness, weight, contrast, noise)
+    nodes = brightness, weight, grid.half, grid.step
+    return Templates(*nodes, grid.centre, contrast, reach, noise, cells)
 
 
 def blurred_silhouette(grid: TemplateGrid, inside: Singles, blur: float) -> Singles:
@@ -153,7 +157,13 @@ def outline_templates(grid: TemplateGrid, blur: float, pixel: float) -> Template
 
 
 def learn_templates(
-    image: Picture, camera: Camera, grid: TemplateGrid, blur: float, pixel: float, kind: str
+    image: Picture,
+    camera: Camera,
+    grid: TemplateGrid,
+    blur: float,
+    pixel: float,
+    kind: str,
+    noise: float = 0.0,
 ) -> Templates:
     """Learns the templates of units at rest from what a frame shows of them.
 
@@ -164,6 +174,7 @@ def learn_templates(
         blur: standard deviation of the camera's blur, mm.
         pixel: size of a pixel, mm.
         kind: auto, dots, speckle or bare.
+        noise: standard deviation of the frame's.
     """
     coefs = spline_coefficients(image.astype(np.float64))
     wanted = grid.inside > -(_REACH * blur + 0.5 * pixel) - 4 * pixel
@@ -181,21 +192,26 @@ def learn_templates(
     face[~seen] = 0.0
     level = (face * weight).sum(axis=(1, 2)) / np.maximum(weight.sum(axis=(1, 2)), 1e-9)
     face = np.where(seen, face, level[:, None, None])
-    return _templates(grid, face.astype(np.float32), weight)
+    return _templates(grid, face.astype(np.float32), weight, noise)
 
 
-def pixel_plane(camera: Camera) -> Singles:
-    """Maps every pixel to its place (rows, columns, 2) in the specimen's plane, mm.
+def block_places(camera: Camera) -> Floats:
+    """Maps whole blocks to their places (rows, columns, 3, 2) in the specimen's plane.
 
-    Rows and columns are filled up to whole blocks, with places far from everything.
+    Returns:
+        Place of a block's middle, change by column and by row of pixels, mm: least squares over the
+        pixels of maps that are parabolas within a block.
     """
     columns, rows = camera.size
-    u, v = np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float))
-    out = np.full((-(-rows // SIZE) * SIZE, -(-columns // SIZE) * SIZE, 2), _FAR, np.float32)
-    for row in range(0, rows, 64):  # a few rows at a time: the inverse needs several copies
-        strip = slice(row, min(row + 64, rows))
-        out[strip, :columns] = camera.unproject(np.stack([u[strip], v[strip]], axis=-1))
-    return out
+    u, v = (SIZE * np.arange(size // SIZE) + 0.5 * (SIZE - 1) for size in (columns, rows))
+    middle = np.stack(np.meshgrid(u, v), axis=-1)
+    ends = np.array([[-1, -1], [1, -1], [-1, 1], [1, 1]])
+    places = [camera.unproject(middle + _SPREAD * end) for end in ends]
+    ahead, down = (
+        sum(sign * place for sign, place in zip(signs, places, strict=True)) / (4 * _SPREAD)
+        for signs in ends.T
+    )
+    return np.stack([np.mean(places, axis=0), ahead, down], axis=-2)
 
 
 def spline_coefficients(values: Floats) -> Singles:

@@ -12,8 +12,9 @@ from pipeline.runtime import compiled, inlined
 from sim.core import Floats, Image, Singles
 
 EMPTY, FLAT, STEEP = np.uint8(0), np.uint8(1), np.uint8(2)
-_STEEP = 0.04
-"""Change from node to node in a cell that tells of the place, in contrasts of the unit."""
+_STEEP, _NOISY, _MEAN_NOISY = 0.04, 3.0, 1.5
+"""Change from node to node in a cell that tells of the place, at least: in contrasts of the unit;
+in standard deviations of the template's noise; and in these, if it is the mean of four changes."""
 
 NodeSpans: TypeAlias = NDArray[np.int32]
 
@@ -31,19 +32,27 @@ class TemplateCells(NamedTuple):
     span: NodeSpans
 
 
-def classify_templates(brightness: Singles, weight: Singles, contrast: Floats) -> TemplateCells:
-    """Classifies the cells of templates (units, rows, columns)."""
+def classify_templates(
+    brightness: Singles, weight: Singles, contrast: Floats, noise: float = 0.0
+) -> TemplateCells:
+    """Classifies the cells of templates (units, rows, columns); see `classify`."""
     made = TemplateCells(
         np.empty(weight.shape, np.uint8), np.empty((*weight.shape[:2], 2), np.int32)
     )
     for unit in range(len(weight)):
-        classify(brightness[unit], weight[unit], contrast[unit], made.kind[unit], made.span[unit])
+        looks = brightness[unit], weight[unit], contrast[unit], noise
+        classify(*looks, made.kind[unit], made.span[unit])
     return made
 
 
 @compiled
 def classify(
-    brightness: Singles, weight: Singles, contrast: float, kind: Image, span: NodeSpans
+    brightness: Singles,
+    weight: Singles,
+    contrast: float,
+    noise: float,
+    kind: Image,
+    span: NodeSpans,
 ) -> None:
     """Fills kind (rows, columns) and span (rows, 2) of one template; cells at the rim are empty.
 
@@ -51,11 +60,13 @@ def classify(
         brightness: (rows, columns) of the nodes.
         weight: (rows, columns) of the nodes.
         contrast: standard deviation of the brightness.
+        noise: of the brightness.
         kind: filled.
         span: filled.
     """
     size = weight.shape[0]
-    least = np.float32(_STEEP * contrast)
+    least = np.float32(max(_STEEP * contrast, _NOISY * noise))
+    least_sum = np.float32(4 * max(_STEEP * contrast, _MEAN_NOISY * noise))
     kind[:] = EMPTY
     span[:] = 0
     for row in range(2, size - 3):
@@ -70,7 +81,13 @@ def classify(
             if upper + lower > 0:
                 across = max(abs(b - a), abs(d - c))
                 along = max(abs(c - a), abs(d - b))
-                kind[row, k] = STEEP if max(across, along) > least else FLAT
+                across_all = along_all = np.float32(0)
+                for j in range(-1, 3):
+                    across_all += brightness[row + j, k + 1] - brightness[row + j, k]
+                    along_all += brightness[row + 1, k + j] - brightness[row, k + j]
+                steep = max(across, along) > least
+                steep |= max(abs(across_all), abs(along_all)) > least_sum
+                kind[row, k] = STEEP if steep else FLAT
                 first, last = min(first, k), k + 2
         if last > 0:
             for line in (row, row + 1):
@@ -87,12 +104,16 @@ def unfold(brightness: Singles, weight: Singles, span: NodeSpans, nodes: Singles
     """
     near, far = np.float32(8 / 12), np.float32(1 / 12)
     for row in range(2, brightness.shape[0] - 2):
-        for k in range(span[row, 0], span[row, 1]):
-            nodes[row, k, 0] = brightness[row, k]
-            nodes[row, k, 1] = near * (brightness[row, k + 1] - brightness[row, k - 1]) - far * (
-                brightness[row, k + 2] - brightness[row, k - 2]
-            )
-            nodes[row, k, 2] = near * (brightness[row + 1, k] - brightness[row - 1, k]) - far * (
-                brightness[row + 2, k] - brightness[row - 2, k]
-            )
-            nodes[row, k, 3] = weight[row, k]
+        start, count = span[row, 0], span[row, 1] - span[row, 0]
+        if count <= 0:
+            continue
+        here, below, above = brightness[row], brightness[row - 1], brightness[row + 1]
+        before, at, after = here[start - 1 :], here[start:], here[start + 1 :]
+        first, last = here[start - 2 :], here[start + 2 :]
+        lowest, highest = brightness[row - 2, start:], brightness[row + 2, start:]
+        low, high, mask, out = below[start:], above[start:], weight[row, start:], nodes[row, start:]
+        for k in range(count):
+            out[k, 0] = at[k]
+            out[k, 1] = near * (after[k] - before[k]) - far * (last[k] - first[k])
+            out[k, 2] = near * (high[k] - low[k]) - far * (highest[k] - lowest[k])
+            out[k, 3] = mask[k]

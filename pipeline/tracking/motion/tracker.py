@@ -9,6 +9,7 @@ from pipeline.runtime import Picture
 from pipeline.tracking.detect import Relocaliser
 from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
+from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import Neighbourhood
 from sim.core import Floats, Ints, Mask
 
@@ -91,6 +92,7 @@ class Tracker:
         walls: of thick units.
         shutter: of the camera.
         blur: by the exposure; without it, none is allowed for.
+        slopes: of the light; without it, each frame tells its own.
 
     Attributes:
         exposure: of a row, s; zero as long as it is not known.
@@ -104,9 +106,10 @@ class Tracker:
         walls: SideWalls | None = None,
         shutter: Shutter = _GLOBAL,
         blur: ExposureBlur | None = None,
+        slopes: LightSlopes | None = None,
     ) -> None:
         self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
-        self._shutter, self._blur = shutter, blur
+        self._shutter, self._blur, self._slopes = shutter, blur, slopes
         self.exposure = shutter.exposure or 0.0
         self._open = shutter.exposure is None and blur is not None
         self._time, self._interval = 0.0, 0.0
@@ -142,6 +145,8 @@ class Tracker:
             fits, good = self._relocalise(image, fits, good)
         good &= ~self._neighbours.collisions(fits.pose, good, _CLOSE)
         quality = self._reasons(fits, good)
+        if self._slopes is not None and not first:
+            self._slopes.apply(fits, good)
         for values in fits:
             values[~good] = np.nan
         self._update(fits, good, first or jumped)

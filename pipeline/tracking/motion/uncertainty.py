@@ -36,15 +36,15 @@ _OWN = 0.3
 
 
 def standard_errors(scatter: Floats, blocks: Floats) -> Floats:
-    """Returns standard errors (..., 3) of the covariance of blocks, corrected for the fit."""
+    """Returns standard errors of poses (..., 3) by the scatter of blocks, corrected for the fit."""
     freedom = blocks / np.maximum(blocks - _PARAMETERS, 1)
-    variance = np.einsum("...ii->...i", scatter) * freedom[..., None]
+    variance = np.einsum("...ii->...i", scatter)[..., :3] * freedom[..., None]
     return np.sqrt(variance)
 
 
 def residual_likeness(fits: PoseFits) -> float:
     """Returns the variance that blocks of residuals tell, over that of white ones: one or more."""
-    white = np.einsum("uii->ui", fits.curvature) * fits.noise[:, None] ** 2
+    white = np.einsum("uii->ui", fits.curvature)[:, :3] * fits.noise[:, None] ** 2
     ratio = standard_errors(fits.scatter, fits.blocks) ** 2 / white
     return float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan
 

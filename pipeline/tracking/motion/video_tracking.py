@@ -28,6 +28,7 @@ from pipeline.tracking.motion.camera_motion import (
     subtract_motion,
 )
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
+from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.tracker import Shutter, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
@@ -242,10 +243,12 @@ def _tracker(
     """Makes a tracker with templates as the frames at rest show the units."""
     camera, grid, depth = calibration.camera, calibration.grid, calibration.depth
     look = calibration.blur, calibration.pixel, setup.kind
-    templates = learn_templates(shown.image, camera, grid, *look)
+    left = shown.noise / float(np.sqrt(shown.averaged))
+    templates = learn_templates(shown.image, camera, grid, *look, left)
     walls = None if depth is None else SideWalls(specimen, depth, grid, templates, *look)
     blur = ExposureBlur(templates, calibration.pixel) if walls is None else None
     noise = shown.noise * float(np.sqrt(1 + 1 / shown.averaged))
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)
-    return Tracker(specimen, PoseFitter(camera, templates), relocaliser, walls, shutter, blur)
+    fitter, slopes = PoseFitter(camera, templates), LightSlopes(specimen.count, shown.averaged)
+    return Tracker(specimen, fitter, relocaliser, walls, shutter, blur, slopes)

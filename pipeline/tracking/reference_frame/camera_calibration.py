@@ -11,8 +11,8 @@ from pipeline.tracking.fit import (
     PoseFitter,
     TemplateGrid,
     Templates,
+    block_places,
     outline_templates,
-    pixel_plane,
 )
 from pipeline.tracking.geometry import (
     Camera,
@@ -97,7 +97,7 @@ def calibrate_camera(
     outlines are those of faces and walls together, if that is what the frame shows.
     """
     camera, gain = with_distortion(specimen, detection).camera, _gain(image, detection)
-    pixel, plane = _pixel(specimen, camera), pixel_plane(camera)
+    pixel, blocks = _pixel(specimen, camera), block_places(camera)
     some = np.arange(0, specimen.count, -(-specimen.count // _SOME))
 
     def fit_blur(depth: Depth | None) -> tuple[float, float, TemplateGrid]:
@@ -109,7 +109,7 @@ def calibrate_camera(
         grid = TemplateGrid(specimen, 1 / pixel, reach, depth)
         few, least, best = grid.of(some), np.inf, BLURS[0]
         for blur in BLURS:
-            fitter = PoseFitter(camera, outline_templates(few, blur * pixel, pixel), plane)
+            fitter = PoseFitter(camera, outline_templates(few, blur * pixel, pixel), blocks)
             misfit = _misfit(fitter.fit(image, *fitter.start(gain)))
             if misfit > least:
                 break
