@@ -94,3 +94,17 @@ def test_a_part_in_which_nothing_is_seen_does_not_disturb_the_others() -> None:
     sigma = uncertainty.calibrate_sigma(motion, image, CENTRE, np.ones(frames, bool))
     assert HONEST[0] < (error / sigma)[:250].std() < HONEST[1]
     assert np.isnan(sigma[250:]).all()
+
+
+def test_scores_of_blocks_tell_the_error_of_what_was_fitted_to_them() -> None:
+    """Residuals are smaller than errors by what the seven parameters of a fit take up."""
+    blocks = 18
+    turn = 2 * np.pi * np.arange(blocks)[:, None] / blocks * np.arange(1, 4)
+    rows = np.concatenate([np.ones((blocks, 1)), np.cos(turn), np.sin(turn)], axis=1)
+    inverse = np.linalg.inv(rows.T @ rows)
+    errors = np.random.default_rng(0).normal(size=(1000, blocks))
+    residual = errors - errors @ rows @ inverse @ rows.T
+    scatter = np.einsum("db,bi,bj->dij", residual**2, rows @ inverse, rows @ inverse)
+    told = uncertainty.standard_errors(scatter[:, :3, :3], np.full(1000, blocks))
+    wanted = np.diagonal(inverse)[:3]
+    np.testing.assert_allclose((told**2).mean(axis=0), wanted, rtol=0.05)
