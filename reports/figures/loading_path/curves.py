@@ -148,10 +148,10 @@ def _bands(
 
 
 def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: xr.Dataset) -> None:
-    """Draws the measure at the end of the path: median and percentiles of every kind of noise."""
-    ends = over_cases(study.problem, measure.of(study.response)).isel(time=-1)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
-    found = monte_carlo.spreads(values, copies)
+    """Draws the measure of path or motion: median and percentiles of every kind of noise."""
+    ends = measures.overall(study.problem, over_cases(study.problem, measure.of(study.response)))
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
+    found = monte_carlo.spreads(measures.overall(study.problem, values), copies)
     for row, spread in enumerate(found):
         axes.plot([spread.low, spread.high], [row, row], color=style.CLOAKED, lw=3.0, alpha=0.45)
         axes.plot(spread.middle, row, "o", ms=3.6, mfc="white", mec=style.CLOAKED, mew=1.0)

@@ -152,33 +152,35 @@ def _drive_facts(problem: Problem) -> Iterator[Fact]:
 
 
 def measure_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
-    """Yields the measure at the end of the path, and its reduction by the cloak."""
+    """Yields the measure of path or motion, and its reduction by the cloak."""
     measure = measures.measure_of(study.problem)
     values = over_cases(study.problem, measure.of(study.response))
-    where = f"at {path.at(-1)}" if path.static else "at the end"
+    where = f"at {path.at(-1)}" if path.static else "root mean square over the time shown"
+    whole = measures.overall(study.problem, values)
     for name in ("altered", "cloaked"):
         label = f"{measure.label}, {display_name(study.problem, name).lower()}"
-        end = float(values.sel(structure=name).isel(time=-1))
-        note = f"{where}{measure.formula}"
-        yield number(f"{measure.key}_{name}", label, end, measure.unit, digits=3, note=note)
+        found, note = float(whole.sel(structure=name)), f"{where}{measure.formula}"
+        yield number(f"{measure.key}_{name}", label, found, measure.unit, digits=3, note=note)
         yield from _each_load(
             study,
             f"{measure.key}_{name}",
             measure.label,
-            measure.of(study.response),
+            measures.overall(study.problem, measure.of(study.response)),
             name,
             measure.unit,
         )
     altered, cloaked = (values.sel(structure=name) for name in ("altered", "cloaked"))
-    gain = 1.0 - cloaked / altered
     label = f"{measure.label} reduced by"
-    yield share(f"{measure.key}_reduction", label, float(gain.isel(time=-1)), note=where)
-    second_half = gain.isel(time=slice(gain.sizes["time"] // 2, None))
-    key, least = f"{measure.key}_reduction_least", float(second_half.min())
-    note = "the least over the second half of the path"
-    yield share(key, f"{label}, at least", least, note=note)
+    gain = 1.0 - float(whole.sel(structure="cloaked") / whole.sel(structure="altered"))
+    yield share(f"{measure.key}_reduction", label, gain, note=where)
+    if path.static:
+        gains = (1.0 - cloaked / altered).isel(time=slice(altered.sizes["time"] // 2, None))
+        key, least = f"{measure.key}_reduction_least", float(gains.min())
+        note = "the least over the second half of the path"
+        yield share(key, f"{label}, at least", least, note=note)
     key, most = f"{measure.key}_cloaked_most", float(cloaked.max())
-    label, note = f"{measure.label}, cloaked, at most", "the largest on the whole path"
+    label = f"{measure.label}, cloaked, at most"
+    note = "the largest on the whole path" if path.static else "the largest at any time"
     yield number(key, label, most, measure.unit, digits=3, note=note)
 
 
@@ -304,13 +306,13 @@ def _displacement_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
 
 
 def _spreads_of_copies(study: StudyResults) -> Sequence[monte_carlo.Spread]:
-    """Spreads the measure at the end over the imperfect copies, if there are any."""
+    """Spreads the measure over the imperfect copies, if there are any."""
     copies = study.scatter
     if copies is None:
         return ()
     measure = measures.measure_of(study.problem)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies).isel(time=-1)
-    return monte_carlo.spreads(values, copies)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, copies)
+    return monte_carlo.spreads(measures.overall(study.problem, values), copies)
 
 
 def robustness_facts(study: StudyResults) -> Iterator[Fact]:
@@ -327,7 +329,7 @@ def robustness_facts(study: StudyResults) -> Iterator[Fact]:
 
 
 def robust_table(study: StudyResults) -> RobustTable | None:
-    """Lists the measure at the end of the path of the cloak as designed, built, and of copies."""
+    """Lists the measure of the cloak as designed, built, and of copies."""
     spreads = _spreads_of_copies(study)
     if not spreads:
         return None
@@ -335,8 +337,9 @@ def robust_table(study: StudyResults) -> RobustTable | None:
     rows = []
     for name, each in (("as designed", study), ("as built", study.as_built)):
         if each is not None:
-            ends = over_cases(each.problem, measure.of(each.response)).isel(time=-1)
-            nominal = worded(float(ends.sel(structure="cloaked")), measure.unit, 3)
+            curves = over_cases(each.problem, measure.of(each.response))
+            whole = measures.overall(each.problem, curves)
+            nominal = worded(float(whole.sel(structure="cloaked")), measure.unit, 3)
             rows.append((name, nominal, ABSENT))
     for spread in spreads:
         failed = f", {spread.failed} failed" if spread.failed else ""

@@ -137,8 +137,9 @@ def _curves(study: StudyResults, path: Abscissa) -> Iterator[Curve]:
     yield _answer(study, path)
     if (copies := study.scatter) is not None:
         words = (
-            "The measure of panel d at the end of the path over imperfect cloaks: median and 5 % "
-            "to 95 %; dashed without, dotted with the perfect cloak."
+            f"The measure of panel d{' at the end of the path' if path.static else ''} over "
+            "imperfect cloaks: median and 5 % to 95 %; dashed without, dotted with the perfect "
+            "cloak."
         )
         table = Table(
             "robustness.csv", "imperfect copies, one a line", tables.copies(study, copies)

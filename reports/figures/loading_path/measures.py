@@ -81,6 +81,17 @@ def size_of_intact(
     return size.isel(time=-1) if static else size.max("time")
 
 
+def overall(problem: Problem, values: xr.DataArray) -> xr.DataArray:
+    """Takes a measure (..., time) at the end of a path; its root mean square of a motion in time.
+
+    A motion in time may end at rest, or where the drive passes through zero.
+    """
+    if problem.static:
+        return values.isel(time=-1)
+    mean: xr.DataArray = (values**2).mean("time")
+    return mean**0.5
+
+
 def scales(problem: Problem) -> tuple[float, float, float]:
     """Returns divisors that make (ux, uy, theta) dimensionless: U = (ux/s, uy/s, theta)."""
     return problem.lattice.spacing, problem.lattice.spacing, 1.0

@@ -63,7 +63,8 @@ def path(study: StudyResults) -> Columns:
 def copies(study: StudyResults, made: xr.Dataset) -> Columns:
     """Returns one row a copy."""
     measure = measures.measure_of(study.problem)
-    values = monte_carlo.copy_curves(study.problem, measure, study.response, made).isel(time=-1)
+    values = monte_carlo.copy_curves(study.problem, measure, study.response, made)
+    values = measures.overall(study.problem, values)
     noise, sample = np.meshgrid(made["noise"].values, made["sample"].values, indexing="ij")
     columns: Columns = {
         "noise": noise.ravel(),
