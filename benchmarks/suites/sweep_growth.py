@@ -52,10 +52,10 @@ def cases(preset: str | None, count: float, task: str = "loss") -> Run:
     """Prepares the first ``count`` cases, after one that compiles."""
     del task
     asked, wanted = load(PROBLEM, preset), Sweep.model_validate(SWEEP)
-    vertices = _unchanged(asked)
+    design = _unchanged(asked)
     every = list(islice(sweep_cases.list_settings(wanted), int(count)))
     of_case = partial(
-        setting_losses.results, asked, folder=PROBLEM.parent, vertices=vertices, threads=1
+        setting_losses.results, asked, folder=PROBLEM.parent, design=design, threads=1
     )
     of_case(every[0])
 
@@ -66,7 +66,13 @@ def cases(preset: str | None, count: float, task: str = "loss") -> Run:
     return run
 
 
-def _unchanged(asked: Problem) -> xr.DataArray:
+def _unchanged(asked: Problem) -> xr.Dataset:
     """Returns the initial structure as a design has it."""
     lattice = lattice_of(asked)
-    return xr.DataArray(lattice.padded(lattice.vertices), dims=("unit", "vertex", "xy"))
+    free = np.full((lattice.n_ligaments, 2), np.nan)
+    return xr.Dataset(
+        {
+            "vertices": (("unit", "vertex", "xy"), lattice.padded(lattice.vertices)),
+            "end_angles": (("ligament", "end"), free),
+        }
+    )

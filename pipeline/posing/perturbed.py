@@ -25,19 +25,12 @@ from sim.solvers import Measure, MotionLaw, Outcome, Solved, run_batch
 from sim.structure import MOST_ROUNDS, Perturbation, PerturbedStructure
 from sim.structure import perturbed as perturbed_structure
 
-GEOMETRY, STIFFNESS = "geometry", "stiffness"
-
 
 class Noise(NamedTuple):
-    """A kind of imperfection and its size, a share of the spacing or of the stiffness."""
+    """Names a kind and size of imperfections as the dataset labels it, with what is drawn."""
 
-    kind: str
-    size: float
-
-    @property
-    def name(self) -> str:
-        """As the dataset labels it."""
-        return f"{self.kind} {100 * self.size:g} %"
+    name: str
+    sizes: Perturbation
 
 
 class PerturbedResponse(NamedTuple):
@@ -50,44 +43,50 @@ class PerturbedResponse(NamedTuple):
     min_void_angle: float
 
 
-def noises(asked: Robustness) -> list[Noise]:
-    """The imperfections that a problem asks for."""
-    return [
-        *(Noise(GEOMETRY, size) for size in asked.geometry),
-        *(Noise(STIFFNESS, size) for size in asked.stiffness),
+def noises(asked: Robustness, spacing: float) -> list[Noise]:
+    """Lists the imperfections that a problem asks for, of a lattice of some spacing in mm."""
+    found = [
+        *(
+            Noise(f"geometry {100 * size:g} %", Perturbation(geometry=size * spacing))
+            for size in asked.geometry
+        ),
+        *(
+            Noise(f"stiffness {100 * size:g} %", Perturbation(ligaments=size))
+            for size in asked.stiffness
+        ),
     ]
+    if (both := asked.together) is not None:
+        name = f"together {both.geometry:g} mm, {100 * both.stiffness:g} %"
+        found.append(Noise(name, Perturbation(geometry=both.geometry, ligaments=both.stiffness)))
+    return found
 
 
 def drawn(
-    scene: Scene, vertices: Floats, asked: Tolerances | Noise, seed: Sequence[int]
+    scene: Scene, vertices: Floats, asked: Tolerances | Perturbation, seed: Sequence[int]
 ) -> tuple[Scene, PerturbedStructure]:
     """Draws one copy of a structure: the scene with its constants, and its vertices.
 
     Args:
         scene: of the structure as designed.
         vertices: (n_vertices, 2) of the design, mm.
-        asked: how far things may be off, or a single kind of imperfection.
+        asked: how far things may be off, as shares or as sizes.
         seed: equal seeds give equal copies, whatever else is drawn.
     """
-    sizes = _sizes(asked, scene.lattice.spacing)
+    sizes = _sizes(asked, scene.lattice.spacing) if isinstance(asked, Tolerances) else asked
     of = scene.structure
     copy = perturbed_structure(scene.lattice, vertices, of.material, sizes, of.contact, seed)
     return scene.updated(material=copy.material), copy
 
 
-def _sizes(asked: Tolerances | Noise, spacing: float) -> Perturbation:
-    if isinstance(asked, Tolerances):
-        return Perturbation(
-            asked.geometry * spacing,
-            asked.ligaments,
-            asked.stiffness,
-            asked.units,
-            asked.damping,
-            (asked.assembly.shift, asked.assembly.turn),
-        )
-    if asked.kind == GEOMETRY:
-        return Perturbation(geometry=asked.size * spacing)
-    return Perturbation(ligaments=asked.size)
+def _sizes(asked: Tolerances, spacing: float) -> Perturbation:
+    return Perturbation(
+        asked.geometry * spacing,
+        asked.ligaments,
+        asked.stiffness,
+        asked.units,
+        asked.damping,
+        (asked.assembly.shift, asked.assembly.turn),
+    )
 
 
 def simulate(
@@ -104,10 +103,11 @@ def simulate(
     """
     target = None if scene.objective.reference is None else target_motion(scene, threads)
     parts = []
-    with cli.progress(len(noises(asked)) * len(samples), "copies") as bar:
-        for number, noise in enumerate(noises(asked)):
+    listed = noises(asked, scene.lattice.spacing)
+    with cli.progress(len(listed) * len(samples), "copies") as bar:
+        for number, noise in enumerate(listed):
             seeds = [(asked.seed, number, sample) for sample in samples]
-            copies = [drawn(scene, vertices, noise, seed) for seed in seeds]
+            copies = [drawn(scene, vertices, noise.sizes, seed) for seed in seeds]
             outcomes = _outcomes(scene, vertices, copies, target, threads)
             rows = []
             for (_, copy), outcome in zip(copies, outcomes, strict=True):
@@ -115,7 +115,7 @@ def simulate(
                 bar.update(failed=sum(row["status"].item() != "ok" for row in rows))
             part = xr.concat(rows, dim=xr.DataArray(list(samples), dims="sample", name="sample"))
             parts.append(part)
-    names = [noise.name for noise in noises(asked)]
+    names = [noise.name for noise in listed]
     return xr.concat(parts, dim=xr.DataArray(names, dims="noise", name="noise"))
 
 

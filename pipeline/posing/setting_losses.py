@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 from pydantic import ValidationError
 
-from pipeline.posing.structure_variables import flat_vertices
+from pipeline.posing.case_result import PosedStructure, structures_of
 from pipeline.posing.to_scene import lattice_of, scene_of
 from pipeline.problem import Problem, canonical_json, from_canonical
 from pipeline.problem.reading import find_faults, first_fault
 from pipeline.problem.sections import Setting, apply_setting
 from pipeline.runtime import SweepResult, UserError
 from sim.core import Floats, SimulationError
-from sim.scene import Scene, cases_of, make_plan, mimicking, target_motion
+from sim.scene import cases_of, make_plan, mimicking, target_motion
 from sim.solvers import Outcome, Solved, run_batch
 
 Result = Outcome[tuple[float, float]]
@@ -26,7 +26,7 @@ class UnposedError(ValueError):
 
 
 def results(
-    asked: Problem, setting: Setting, folder: Path, vertices: xr.DataArray, threads: int
+    asked: Problem, setting: Setting, folder: Path, design: xr.Dataset, threads: int
 ) -> list[SweepResult]:
     """Simulates every load case of a problem with a setting laid over it.
 
@@ -34,7 +34,7 @@ def results(
         asked: the problem, whose files lie in ``folder``.
         setting: what to change.
         folder: see there.
-        vertices: (unit, vertex, xy) the design.
+        design: the design.
         threads: load cases simulated side by side.
 
     Raises:
@@ -43,7 +43,7 @@ def results(
     """
     try:
         problem = _posed(asked, setting)
-        if lattice_of(problem).n_units != vertices.sizes["unit"]:
+        if lattice_of(problem).n_units != design.sizes["unit"]:
             raise UnposedError("the design is of a lattice with another number of units")
         # No design space is asked for: its symmetry costs more than it could save.
         scene = scene_of(problem, folder).updated(symmetry="none")
@@ -52,8 +52,10 @@ def results(
     except UserError as error:
         raise UnposedError(error.what) from error
     target = None if scene.objective.reference is None else target_motion(scene, threads)
-    altered = _simulated(scene, scene.lattice.vertices, target, threads)
-    cloaked = _simulated(scene, flat_vertices(scene.lattice, vertices), target, threads)
+    structures = structures_of(scene, design)
+    altered, cloaked = (
+        _simulated(structures[name], target, threads) for name in ("altered", "cloaked")
+    )
     return [_found(*pair) for pair in zip(altered, cloaked, strict=True)]
 
 
@@ -83,10 +85,9 @@ def _found(altered: Result, cloaked: Result) -> SweepResult:
     return SweepResult(loss, (altered.value or nothing)[0], void, status)
 
 
-def _simulated(
-    scene: Scene, vertices: Floats, target: Floats | None, threads: int
-) -> Iterator[Result]:
+def _simulated(structure: PosedStructure, target: Floats | None, threads: int) -> Iterator[Result]:
     """Simulates loss and smallest void angle of a structure in each load case."""
+    scene, vertices = structure
     try:
         plan = make_plan(scene, vertices, threads=threads)
     except SimulationError as error:

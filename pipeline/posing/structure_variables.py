@@ -81,8 +81,8 @@ def present_ligaments(network: xr.Dataset, structure: str = "cloaked") -> NDArra
 
 def designed_angles(design: xr.Dataset) -> Floats | None:
     """Reads the angles (n_ligaments, 2) of a cloak's slots, rad; None if they are free."""
-    angles = design["end_angles"].transpose("ligament", "end").values[present_ligaments(design)]
-    return None if np.isnan(angles).all() else np.asarray(angles)
+    angles = design["end_angles"].transpose("ligament", "end").values
+    return None if np.isnan(angles).all() else np.asarray(angles[present_ligaments(design)])
 
 
 def flat_vertices(lattice: Lattice, vertices: xr.DataArray) -> Floats:

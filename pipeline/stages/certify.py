@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.posing import flat_vertices, load_family, loss_units, read_design, scene_of
+from pipeline.posing import load_family, loss_units, read_design, scene_of, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli, source_hash
 from sim.core import Floats, SimulationError
@@ -78,8 +78,8 @@ def certificate(
     rows = []
     with cli.progress(len(paths) * (LOADS + SEARCHES), "loads") as bar:
         for path in paths.values():
-            vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
-            tried = _Design(scene, family, vertices, journal, threads, bar.update)
+            structure = structures_of(scene, read_design(asked, path))["cloaked"]
+            tried = _Design(*structure, family, journal, threads, bar.update)
             rows.append((tried.losses(loads), tried.losses(own), tried.searches(starts)))
     losses, nominal, found = (np.array(part) for part in zip(*rows, strict=True))
     made = xr.Dataset(
@@ -117,8 +117,8 @@ class _Design:
     def __init__(
         self,
         scene: Scene,
-        family: LoadFamily,
         vertices: Floats,
+        family: LoadFamily,
         journal: Journal,
         threads: int,
         done: Callable[[int], None],

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline import datasets, problem
 from pipeline.datasets import chunked, provenance
-from pipeline.posing import flat_vertices, perturbed, read_design, scene_of
+from pipeline.posing import perturbed, read_design, scene_of, structures_of
 from pipeline.runtime import UserError
 
 LOG = logging.getLogger(__name__)
@@ -28,8 +28,7 @@ def _run(args: argparse.Namespace) -> None:
             remedy="add robustness.samples",
         )
     design = read_design(asked, args.design)
-    scene = scene_of(asked, args.problem.parent)
-    vertices = flat_vertices(scene.lattice, design["vertices"])
+    scene, vertices = structures_of(scene_of(asked, args.problem.parent), design)["cloaked"]
     samples = np.array_split(np.arange(asked.robustness.samples), args.chunks)[args.chunk]
     made = perturbed.simulate(scene, vertices, asked.robustness, list(samples), args.threads)
     LOG.info("%d of %d copies failed", int((made["status"] != "ok").sum()), made["status"].size)

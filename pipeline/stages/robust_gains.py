@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline import datasets, problem
 from pipeline.datasets import provenance
-from pipeline.posing import design_scene, flat_vertices, loss_units, read_design
+from pipeline.posing import design_scene, loss_units, read_design, structures_of
 from pipeline.problem import Problem
 from pipeline.runtime import UserError, cli
 from sim.scene import Scene, make_plan, simulate
@@ -114,7 +114,7 @@ def _loss(asked: Problem, folder: Path, path: Path | None) -> float:
     scene = design_scene(asked, folder)
     vertices = scene.lattice.vertices
     if path is not None:
-        vertices = flat_vertices(scene.lattice, read_design(asked, path)["vertices"])
+        scene, vertices = structures_of(scene, read_design(asked, path))["cloaked"]
     shifts = [0.0] if scene.design.copies is None else scene.design.copies[:, scene.lattice.group]
     return float(np.mean([_of(scene, vertices + shift) for shift in shifts]))
 

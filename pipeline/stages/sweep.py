@@ -63,7 +63,7 @@ def _compute(args: argparse.Namespace, asked: Problem, chunk: int, chunks: int) 
     path = folder / f"part_{chunk}.csv"
     with case_log.CaseLog(path, asked.sweep.keys) as book:
         LOG.info("results as they come: %s", path)
-        _simulate(args, asked, design["vertices"], here, found, book)
+        _simulate(args, asked, design, here, found, book)
     made = dataset(asked, [case for group in here for case in group.cases], found)
     LOG.info("%d of %d cases failed", int((made["status"] != "ok").sum()), made.sizes["case"])
     origin = provenance.of_study(asked, "sweep", parents=parents)
@@ -73,7 +73,7 @@ def _compute(args: argparse.Namespace, asked: Problem, chunk: int, chunks: int) 
 def _simulate(
     args: argparse.Namespace,
     asked: Problem,
-    vertices: xr.DataArray,
+    design: xr.Dataset,
     groups: Sequence[DirectionGroup],
     found: dict[int, SweepResult],
     book: CaseLog,
@@ -83,7 +83,7 @@ def _simulate(
     with cli.progress(sum(len(group.numbers) for group in groups), "cases") as bar:
         for group in groups:
             if not found.keys() >= set(group.numbers):
-                rows = _results(args, asked, vertices, group)
+                rows = _results(args, asked, design, group)
                 found.update(zip(group.numbers, rows, strict=True))
                 words = [list(each.values()) for each in group.settings]
                 book.add(zip(group.numbers, words, rows, strict=True))
@@ -93,11 +93,11 @@ def _simulate(
 
 
 def _results(
-    args: argparse.Namespace, asked: Problem, vertices: xr.DataArray, group: DirectionGroup
+    args: argparse.Namespace, asked: Problem, design: xr.Dataset, group: DirectionGroup
 ) -> list[SweepResult]:
     setting = group.together
     try:
-        found = setting_losses.results(asked, setting, args.problem.parent, vertices, args.threads)
+        found = setting_losses.results(asked, setting, args.problem.parent, design, args.threads)
     except (setting_losses.UnposedError, SimulationError) as error:
         return [SweepResult.failed(str(error))] * len(group.numbers)
     if sweep_cases.DIRECTIONS in setting:

@@ -7,6 +7,19 @@ from pydantic import Field
 from pipeline.problem.fields import Coordinate, Count, Delay, Gap, Positive, Ratio, Samples, Section
 
 
+class WorkshopTolerance(Section):
+    """Imperfections that copies have all at once: those of a printer and its shims.
+
+    Attributes:
+        geometry: largest shift of a vertex along x and y, either way and evenly spread.
+        stiffness: standard deviation of each of every ligament's stiffnesses, as a share of it. A
+            factor common to all ligaments leaves equilibria as they are.
+    """
+
+    geometry: Gap = 0.1
+    stiffness: Ratio = 0.1
+
+
 class Robustness(Section):
     """Imperfect copies of the shipped design, each simulated.
 
@@ -15,12 +28,14 @@ class Robustness(Section):
         geometry: largest shifts of a vertex along x and y, either way and evenly spread, as shares
             of the spacing.
         stiffness: standard deviations of every ligament's stiffnesses, as shares of them.
+        together: of shifts and stiffnesses in the same copies; none with null.
         seed: of the random numbers.
     """
 
     samples: Count = 200
     geometry: tuple[Ratio, ...] = (0.03, 0.05)
     stiffness: tuple[Ratio, ...] = (0.1,)
+    together: WorkshopTolerance | None = WorkshopTolerance()
     seed: Annotated[int, Field(ge=0, strict=True)] = 0
 
 

@@ -39,9 +39,13 @@ def whole(folder: Path) -> xr.Dataset:
 
 
 def test_every_copy_is_another_one(whole: xr.Dataset) -> None:
-    assert list(whole["noise"].values) == ["geometry 5 %", "stiffness 10 %"]
+    assert list(whole["noise"].values) == [
+        "geometry 5 %",
+        "stiffness 10 %",
+        "together 0.1 mm, 10 %",
+    ]
     assert (whole["status"] == "ok").all()
-    assert len(np.unique(whole["loss"])) == 8
+    assert len(np.unique(whole["loss"])) == 12
     np.testing.assert_allclose(whole["time"], [0.25, 0.5, 0.75, 1.0])
 
 
@@ -58,7 +62,9 @@ def test_parts_join_to_the_whole(folder: Path, tmp_path: Path) -> None:
 def test_without_noise_every_copy_is_the_design(folder: Path) -> None:
     asked = problem.load(folder / "problem.yaml")
     assert asked.robustness is not None
-    none = asked.robustness.model_copy(update={"geometry": (0.0,), "stiffness": (0.0,)})
+    none = asked.robustness.model_copy(
+        update={"geometry": (0.0,), "stiffness": (0.0,), "together": None}
+    )
     scene = scene_of(asked, folder)
     made = simulate(scene, scene.lattice.vertices, none, [0, 1], 1)
     checked = verify.checks(asked, folder, datasets.read(folder / "design.nc", "design"))
@@ -83,7 +89,7 @@ def test_a_copy_that_fails_keeps_its_reason(folder: Path, monkeypatch: pytest.Mo
     assert asked.robustness is not None
     scene = scene_of(asked, folder)
     made = simulate(scene, scene.lattice.vertices, asked.robustness, [0, 1, 2], 1)
-    first = made.sel(noise=noises(asked.robustness)[0].name)
+    first = made.sel(noise=noises(asked.robustness, 15.0)[0].name)
     assert list(first["status"].values) == ["ok", "no equilibrium found beyond load 3 of 4", "ok"]
     assert np.isnan(first["loss"].values).tolist() == [False, True, False]
 

@@ -158,14 +158,14 @@ def test_directions_are_load_cases_of_one_scene() -> None:
 
 def test_a_setting_that_makes_no_problem_is_told(folder: Path) -> None:
     asked = problem.load(folder / "problem.yaml")
-    vertices = datasets.read(folder / "design.nc", "design")["vertices"]
+    design = datasets.read(folder / "design.nc", "design")
     for setting, why in (
         ({"cloak.disc.radius": "500 mm"}, "cloak"),
         ({"lattice.columns": 7}, "another number of units"),
         ({"drive.amplitude": "-1 mm"}, "greater than zero"),
     ):
         with pytest.raises(setting_losses.UnposedError, match=why):
-            setting_losses.results(asked, setting, folder, vertices, 1)
+            setting_losses.results(asked, setting, folder, design, 1)
 
 
 @pytest.mark.parametrize(
