@@ -51,10 +51,18 @@ def test_speckled_units_agree_with_an_independent_correlation() -> None:
     assert np.sqrt(np.mean(np.square(apart))) < 0.05
 
 
-def test_a_specimen_that_leaves_the_picture_is_found_when_it_returns(tmp_path: Path) -> None:
-    test_wild_clips.test_no_unit_is_wrong_and_called_good(
-        "leaves_and_returns", 44, rms=0.012, lost=0.02, tmp_path=tmp_path
-    )
+@pytest.mark.parametrize(
+    ("name", "frames", "rms", "lost"),
+    [
+        ("leaves_and_returns", 44, 0.012, 0.02),
+        ("low_light", 8, 0.06, 0.0),
+        ("tripod_knocked", 16, 0.008, 0.0),
+    ],
+)
+def test_no_unit_is_wrong_and_called_good(
+    name: str, frames: int, rms: float, lost: float, tmp_path: Path
+) -> None:
+    test_wild_clips.test_no_unit_is_wrong_and_called_good(name, frames, rms, lost, tmp_path)
 
 
 def _looped(monkeypatch: pytest.MonkeyPatch, length: int) -> int:

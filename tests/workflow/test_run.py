@@ -64,20 +64,15 @@ def test_run_goes_on_after_a_kill(sandbox: Sandbox) -> None:
     assert "Nothing to be done" in sandbox.run(DESIGN).stderr
 
 
-def test_second_run_beside_a_living_one_is_refused(sandbox: Sandbox) -> None:
+def test_a_second_run_is_refused_and_an_interrupt_leaves_neither_lock_nor_jobs(
+    sandbox: Sandbox,
+) -> None:
     sandbox.stage_seconds = 60.0
     run = start(sandbox)
     ended = sandbox.resume(DESIGN)
     assert ended.returncode != 0
     assert f"already at work in this folder (process {run.pid})" in ended.stderr
     assert len(jobs(sandbox.root)) >= 2
-    os.killpg(run.pid, signal.SIGINT)
-    run.wait()
-
-
-def test_interrupt_leaves_neither_lock_nor_jobs(sandbox: Sandbox) -> None:
-    sandbox.stage_seconds = 60.0
-    run = start(sandbox)
     os.killpg(run.pid, signal.SIGINT)
     assert run.wait() != 0
     assert not jobs(sandbox.root)

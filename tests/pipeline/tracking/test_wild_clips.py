@@ -21,10 +21,8 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
     ("name", "frames", "rms", "lost"),
     [
         ("hand", 12, 0.012, 0.02),
-        ("low_light", 8, 0.06, 0.0),
         ("motion_blur", 10, 0.05, 0.0),
         ("rolling_shutter", 10, 0.012, 0.0),
-        ("tripod_knocked", 16, 0.008, 0.0),
         ("fisheye", 6, 0.01, 0.0),
         ("red_on_teal", 6, 0.03, 0.0),
         ("bolts_and_tape", 6, 0.01, 0.0),

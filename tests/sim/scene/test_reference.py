@@ -91,16 +91,6 @@ def outcome_of_scene_a(accuracy: Accuracy) -> Outcome:
     )
 
 
-@pytest.fixture(scope="module")
-def default_a() -> Outcome:
-    return outcome_of_scene_a("default")
-
-
-@pytest.fixture(scope="module")
-def tight_a() -> Outcome:
-    return outcome_of_scene_a("tight")
-
-
 def relative(found: Floats, wanted: Floats) -> float:
     return float(np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
 
@@ -114,13 +104,10 @@ def assert_agrees_with_scene_a(found: Outcome, motion: float, loss: float, gradi
     assert relative(found.gradient, by_shifts) <= gradient
 
 
-def test_scene_a_at_default_accuracy(default_a: Outcome) -> None:
-    assert default_a.integrator == "implicit"
-    assert_agrees_with_scene_a(default_a, motion=4e-3, loss=2e-4, gradient=3e-4)
-
-
-def test_scene_a_at_tight_accuracy(tight_a: Outcome) -> None:
-    assert_agrees_with_scene_a(tight_a, motion=1e-4, loss=1e-6, gradient=5e-5)
+def test_scene_a_at_default_accuracy() -> None:
+    found = outcome_of_scene_a("default")
+    assert found.integrator == "implicit"
+    assert_agrees_with_scene_a(found, motion=4e-3, loss=2e-4, gradient=3e-4)
 
 
 def test_error_estimate_by_halving_the_steps() -> None:
