@@ -22,6 +22,9 @@ from reports.products.validation import pictures
 from reports.products.validation.figures import LIMIT, draw_cycles, draw_samples
 from sim.core import Floats
 
+NOTABLE = 0.1
+"""Part of the residual from which a mechanism is named."""
+
 
 def report(args: argparse.Namespace) -> None:
     """Makes the report that a command line asks for, of the parts that it names.
@@ -93,6 +96,13 @@ def _of_samples(made: xr.Dataset, asked: Mapping[str, Any]) -> dict[str, Any]:
         "signed": _signed(made),
         "held": list(_held(made)),
         "flat": list(_flat(made)),
+        "explained": [
+            f"{name} {100 * part:.0f} %"
+            for name, part in zip(
+                made["mechanism"].values.tolist(), made["explained"].values, strict=True
+            )
+            if part > NOTABLE
+        ],
         "inside": bool(made["inside"].item()),
         "correlation": [
             f"{value:+.2f}" for value in made["correlation"].values[np.triu_indices(3, 1)]
