@@ -1,7 +1,7 @@
 """Reads one structure of a design: the units and ligaments that are present."""
 
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -27,9 +27,9 @@ class UnitNetwork:
         labels: by id.
         index: (i, j) by id.
         ligaments: (id, (unit, vertex), (unit, vertex), unit vector from the first to the second).
+        clamped, driven: ids.
         turns: angles of the slots at both ends of ligaments against these, rad, by id; of those
             that were designed.
-        clamped, driven: ids.
     """
 
     numbers: tuple[int, ...]
@@ -37,9 +37,9 @@ class UnitNetwork:
     labels: dict[int, str]
     index: dict[int, tuple[int, int]]
     ligaments: tuple[tuple[int, tuple[int, int], tuple[int, int], Floats], ...]
-    turns: dict[int, tuple[float, float]]
     clamped: tuple[int, ...]
     driven: tuple[int, ...]
+    turns: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 def network(design: xr.Dataset, structure: str) -> UnitNetwork:
@@ -73,12 +73,12 @@ def network(design: xr.Dataset, structure: str) -> UnitNetwork:
         {ids[at]: names[at] for at in there},
         {ids[at]: index[at] for at in there},
         tuple(joints),
+        tuple(ids[at] for at in there if clamped[at]),
+        tuple(ids[at] for at in there if driven[at]),
         {
             number: (angles[number, 0], angles[number, 1])
             for number in np.flatnonzero(turned).tolist()
         },
-        tuple(ids[at] for at in there if clamped[at]),
-        tuple(ids[at] for at in there if driven[at]),
     )
 
 

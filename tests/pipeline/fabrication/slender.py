@@ -21,7 +21,7 @@ def built(name: str, letters: str = LETTERS) -> Unit:
     """The unit beside its neighbours, some of which have grown."""
     data = UNITS[name]
     polygons, labels = {0: Polygon(data["corners"])}, {0: data["label"]}
-    net = UnitNetwork((0,), polygons, labels, {0: (0, 0)}, (), {}, (), ())
+    net = UnitNetwork((0,), polygons, labels, {0: (0, 0)}, (), (), ())
     slotted = [
         Corner(vertex, number, np.array(along), 2.25)
         for number, (vertex, *along) in enumerate(data["slots"])

@@ -148,7 +148,6 @@ def network_of(lattice: Lattice, vertices: Floats) -> UnitNetwork:
         dict(zip(units, labels(index), strict=True)),
         dict(zip(units, index, strict=True)),
         tuple(joints),
-        {},
         (),
         (),
     )
