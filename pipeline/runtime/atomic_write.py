@@ -8,7 +8,25 @@ from pathlib import Path
 
 import psutil
 
-from pipeline.runtime.errors import refusal
+from pipeline.runtime.errors import UserError, refusal
+
+
+def described_beside(out: Path, source: Path) -> Path:
+    """Names the YAML file beside a result, which must not be the file that asked for it.
+
+    Raises:
+        UserError: it is.
+    """
+    path = out.with_suffix(".yaml")
+    if path.resolve() == source.resolve():
+        raise UserError(
+            "this file would be written over",
+            file=source,
+            key="--out",
+            value=str(out),
+            remedy="give the result another name or folder",
+        )
+    return path
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
-from pipeline.runtime import UserError, cli, found_in, write_atomically
+from pipeline.runtime import UserError, cli, described_beside, found_in, write_atomically
 from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
@@ -78,6 +78,7 @@ def _plan(args: argparse.Namespace) -> None:
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     asked, virtual = _virtual(path)
+    described = described_beside(out, path)
     if out.suffix not in virtual.codec.suffixes:
         raise UserError(
             f"{virtual.codec.name} does not go into such a file",
@@ -98,7 +99,7 @@ def _render(path: Path, response: Path, design: Path, out: Path) -> None:
         SYNTHETIC,
         "Written by the stage film; python -m pipeline track takes it.",
     )
-    with write_atomically(out.with_suffix(".yaml")) as aside:
+    with write_atomically(described) as aside:
         text = recordings.recording_yaml(_described(asked, virtual, out, design), comments)
         aside.write_text(text, encoding="utf-8")
 

@@ -53,6 +53,16 @@ def test_a_rendered_video_is_tracked_as_it_is(files: Path, tmp_path: Path) -> No
         assert float(video.streams.video[0].average_rate or 0) == 20.0
 
 
+def test_a_video_is_not_described_over_the_file_that_asked_for_it(
+    files: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    asked = recording(tmp_path)
+    before = asked.read_bytes()
+    assert render(files, asked, asked.with_suffix(".mp4")) == 2
+    assert asked.read_bytes() == before
+    assert "would be written over" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("codec", ["h264", "ffv1"])
 def test_the_same_recording_gives_the_same_bytes(files: Path, tmp_path: Path, codec: str) -> None:
     asked = recording(tmp_path, end="0.1 s", codec={"name": codec})
