@@ -113,7 +113,7 @@ def _turns_and_depths(
 ) -> tuple[Floats, Floats]:
     """Lists turns and depths to try, also along the ways that slots may be asked to point."""
     slots = settings.slots
-    depths = np.unique([*_depths(settings), _straight_depth(polygon, corner, settings)])
+    depths = np.unique([*_depths(settings), _designed_depth(polygon, corner, settings)])
     _, ways = _ways(polygon, corner)
     exact = [signed_angle(ways[slots.direction], way) for way in ways.values()]
     offered = np.unique(np.round([*_TURNS, *exact], 6)) if corner.turn is None else corner.turn
@@ -128,11 +128,12 @@ def _depths(settings: Fabrication) -> Floats:
     return np.append(steps, slots.depth)
 
 
-def _straight_depth(polygon: Polygon, corner: Corner, settings: Fabrication) -> float:
-    """Computes the depth that a design with straight shims keeps room for."""
+def _designed_depth(polygon: Polygon, corner: Corner, settings: Fabrication) -> float:
+    """Computes the depth that a design with straight shims, or with turned slots, has room for."""
     points = np.asarray(polygon.exterior.coords)[:-1]
     behind, here, ahead = (points[(corner.vertex + k) % len(points)] for k in (-1, 0, 1))
-    return float(_slot_depth(settings.slot_room, corner.along, behind - here, ahead - here))
+    along = _turned(corner.along, np.array([corner.turn or 0.0]))[0]
+    return float(_slot_depth(settings.slot_room, along, behind - here, ahead - here))
 
 
 def _candidates(
@@ -189,9 +190,14 @@ def _directions(
     """Finds the vertex, and unit vectors (n, 2) turned from the preferred direction."""
     mouth, ways = _ways(polygon, corner)
     way = ways["ligament" if corner.turn is not None else settings.slots.direction]
-    x, y = way / np.linalg.norm(way)
+    return mouth, _turned(way / np.linalg.norm(way), turns)
+
+
+def _turned(way: Floats, turns: Floats) -> Floats:
+    """Turns a vector (2,) by angles (n,), rad, counter-clockwise; returns (n, 2)."""
     cosine, sine = np.cos(turns), np.sin(turns)
-    return mouth, np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
+    x, y = way
+    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
 def _bisector(points: Floats, vertex: int) -> Floats:

@@ -13,8 +13,10 @@ from shapely import Polygon
 from pipeline.fabrication.checks.package_check import page_words
 from pipeline.fabrication.papers import read_bill
 from pipeline.fabrication.parts import Slot, UnbuildableUnitError, labels
-from pipeline.fabrication.units import build_specimen, network
+from pipeline.fabrication.units import build_specimen, end_angles, network
 from pipeline.fabrication.units.prebend import peak_curvature, prebend
+from pipeline.fabrication.units.slot_candidates import Corner
+from pipeline.fabrication.units.slots import place_slots
 from pipeline.fabrication.units.unit_bodies import UnitBody, unit_bodies
 from pipeline.fabrication.units.unit_network import UnitNetwork
 from pipeline.problem.fields import SIM_UNITS
@@ -172,6 +174,40 @@ def test_a_design_with_room_for_straight_slots_has_none_that_turns(seed: int) ->
     )
     assert straight.max() < 1e-9
     assert bent.max() > 0.01
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_slots_that_turn_with_the_design_are_drawn_so(seed: int) -> None:
+    """Random shifts and angles, as large as the limits allow."""
+    settings, lattice = Fabrication(), quads(4, 4, 15.0, 2.25, np.deg2rad(20.0))
+    space = design_space(lattice, np.array([5, 6, 9, 10]), turning=True)
+    limits = Limits(
+        edge_length=3.0, convex=True, void_angle=0.0, gap=0.2,
+        slots=settings.slot_room, slot_turn=np.deg2rad(30.0),
+    )  # fmt: skip
+    constraints = ConstraintVector(space, limits)
+    way = np.random.default_rng(seed).uniform(-1.0, 1.0, space.n_variables)
+    shares = np.linspace(0.0, 6.0, 121)
+    least = np.array([constraints.values(share * way).min() for share in shares])
+    design = shares[int(np.argmax(least < 0.0)) - 1] * way
+    angles = np.asarray(space.end_angles(design))
+    net = network_of(lattice, constraints.vertices(design))
+    turned = replace(net, turns={number: (a, b) for number, (a, b) in enumerate(angles.tolist())})
+    assert np.degrees(np.abs(angles)).max() > 3.0
+    np.testing.assert_allclose(end_angles(turned, settings, DESIGN), angles, atol=1e-9)
+
+
+def test_turned_slots_of_a_slender_unit_are_as_deep_as_its_design_has_room_for() -> None:
+    """A unit of a cloak, whose slots meet at any depth of the few that are preferred."""
+    unit = Polygon([[1.4302, 6.7237], [-0.9664, 8.5282], [-5.4147, -2.6463], [4.9509, -12.6055]])
+    ways = {2: (1.0, 0.0), 0: (-1.0, 0.0), 3: (0.0, 1.0), 1: (0.0, -1.0)}
+    turns = {2: 0.48616, 0: 0.25573, 3: 0.5236, 1: -0.08797}
+    corners = [Corner(at, at, np.array(way), 2.25, turns[at]) for at, way in ways.items()]
+    slots = place_slots(unit, corners, Fabrication(), unit)
+    for slot in slots:
+        x, y = ways[slot.vertex]
+        turned = np.arctan2(x * slot.direction[1] - y * slot.direction[0], slot.direction @ (x, y))
+        assert turned == pytest.approx(turns[slot.vertex], abs=1e-9)
 
 
 def strains(lattice: Lattice, made: dict[int, UnitBody], settings: Fabrication) -> Floats:
