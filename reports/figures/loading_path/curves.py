@@ -158,7 +158,8 @@ def robustness_panel(axes: Axes, study: StudyResults, measure: Measure, copies: 
     for name, dashes in (("altered", (4.0, 2.0)), ("cloaked", (1.5, 1.5))):
         colour, end = style.STRUCTURE_COLOURS[name], float(ends.sel(structure=name))
         axes.axvline(end, color=colour, lw=0.9, ls=(0, dashes), zorder=1)
-    axes.set_yticks(range(len(found)), [spread.noise.replace(" ", "\n", 1) for spread in found])
+    names = [each.noise.replace(" ", "\n", 1).replace(", ", ",\n") for each in found]
+    axes.set_yticks(range(len(found)), names)
     axes.set(ylim=(len(found) - 0.5, -0.5), xlim=(0, None), xlabel=measure.symbol)
     axes.xaxis.set_major_locator(MaxNLocator(4))
 
