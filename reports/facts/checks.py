@@ -25,6 +25,7 @@ _MARGINS = {
     "slot_angle": "Angles of slots",
     "slot_wall": "Walls at slots",
     "slot_gap": "Walls between slots",
+    "slot_turn": "Angles of slots against ligaments",
 }
 
 
