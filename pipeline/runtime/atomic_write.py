@@ -11,7 +11,7 @@ import psutil
 from pipeline.runtime.errors import UserError, refusal
 
 
-def described_beside(out: Path, source: Path) -> Path:
+def sidecar_path(out: Path, source: Path) -> Path:
     """Names the YAML file beside a result, which must not be the file that asked for it.
 
     Raises:

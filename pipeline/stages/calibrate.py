@@ -14,7 +14,7 @@ from pipeline.calibration import (
 from pipeline.calibration.inputs import Calibration
 from pipeline.datasets import provenance
 from pipeline.problem.reading import load_section
-from pipeline.runtime import UserError, described_beside, write_atomically
+from pipeline.runtime import UserError, sidecar_path, write_atomically
 from sim.core import SimulationError
 
 LOG = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ def work(args: argparse.Namespace) -> None:
 
 
 def _fit(path: Path, args: argparse.Namespace) -> None:
-    asked, fragment = load_section(path, Calibration), described_beside(args.out, path)
+    asked, fragment = load_section(path, Calibration), sidecar_path(args.out, path)
     fit = fit_calibration(asked, path)
     try:
         made, found = calibration_dataset.assemble_calibration(fit)

@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline import datasets
 from pipeline.datasets import provenance
 from pipeline.problem.sections import VirtualRecording
-from pipeline.runtime import UserError, cli, described_beside, found_in, write_atomically
+from pipeline.runtime import UserError, cli, found_in, sidecar_path, write_atomically
 from pipeline.tracking.frames import SYNTHETIC_LABEL, Recording
 from pipeline.tracking.frames import recording as recordings
 from pipeline.tracking.geometry import outlines_of_design
@@ -78,7 +78,7 @@ def _plan(args: argparse.Namespace) -> None:
 
 def _render(path: Path, response: Path, design: Path, out: Path) -> None:
     asked, virtual = _virtual(path)
-    described = described_beside(out, path)
+    described = sidecar_path(out, path)
     if out.suffix not in virtual.codec.suffixes:
         raise UserError(
             f"{virtual.codec.name} does not go into such a file",
