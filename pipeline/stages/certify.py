@@ -76,7 +76,7 @@ def certificate(
         [family.place(each) for each in scene.loads.motions if isinstance(each, DIRECTED)]
     )
     rows = []
-    with cli.progress(len(paths) * (LOADS + SEARCHES), "loads") as bar:
+    with cli.progress(len(paths) * (LOADS + len(own) + SEARCHES), "loads") as bar:
         for path in paths.values():
             structure = structures_of(scene, read_design(asked, path))["cloaked"]
             tried = _Design(*structure, family, journal, threads, bar.update)

@@ -15,11 +15,13 @@ from reports.study import study_results
 _PROSE = prose(__file__)
 _COLUMNS = (
     "design", "mean", "95 % of the loads", "worst of the loads", "worst found by a search",
-    "worst over mean", "drive's own loads, mean", "drive's own loads, worst",
+    "worst of the loads over mean", "drive's own loads, mean", "drive's own loads, worst",
 )  # fmt: skip
 _COLOURS = {"cloaked": style.CLOAKED, "study": style.GREY}
 _NAMES = {"cloaked": "this design", "study": "the study's own design"}
 _TOP, _HIGH = 13.0, 55.0
+_NEAR = 0.95
+"""Of the greatest loss that a search ended at: those above it found the same worst."""
 
 
 def report(args: argparse.Namespace) -> None:
@@ -33,10 +35,12 @@ def report(args: argparse.Namespace) -> None:
         loads=data.sizes["load"],
         searches=data.sizes["search"],
         worst=_worst(own),
+        at=_worst_load(own),
         mean=float(own["loss"].mean()),
     )
     over = _PROSE["over"]["motion" if _harmonic(data) else "path"]
-    caption = _PROSE["caption"].format(over=over)
+    near = int((own["found_loss"] > _NEAR * own["found_loss"].max()).sum())
+    caption = _PROSE["caption"].format(over=over, near=near, searches=data.sizes["search"])
     text = FigureText(titled(asked, args.problem), _PROSE["subject"], lead, caption)
     shown = PageTable(_COLUMNS, [_row(data.sel(design=name)) for name in data["design"].values])
     made = figure_page(
@@ -48,6 +52,17 @@ def report(args: argparse.Namespace) -> None:
 def _worst(of: xr.Dataset) -> float:
     """The greatest loss of a design, of all that was tried."""
     return max(float(of["loss"].max()), float(of["found_loss"].max()))
+
+
+def _worst_load(of: xr.Dataset) -> str:
+    """Names the load of the greatest loss of a design, of all that were tried."""
+    kind, loss = max(
+        (("load", "loss"), ("found", "found_loss")), key=lambda k: float(of[k[1]].max())
+    )
+    worst = int(np.nanargmax(of[loss].values))
+    units = {"direction": "°", "amplitude": " mm"} | ({"frequency": " Hz"} if _harmonic(of) else {})
+    told = (f"{float(of[f'{kind}_{part}'][worst]):.3g}{unit}" for part, unit in units.items())
+    return ", ".join(told)
 
 
 def _row(of: xr.Dataset) -> tuple[str, ...]:
