@@ -75,7 +75,9 @@ def _counted_from(scene: Scene, rest: RestState) -> Scene:
     return scene.updated(lattice=lattice, material=material, symmetry="none")
 
 
-def as_built(scene: Scene, vertices: Floats, end_angles: Floats) -> AsBuilt:
+def as_built(
+    scene: Scene, vertices: Floats, end_angles: Floats, designed_angles: Floats | None = None
+) -> AsBuilt:
     """Simulates a structure as designed and as built.
 
     Args:
@@ -84,11 +86,17 @@ def as_built(scene: Scene, vertices: Floats, end_angles: Floats) -> AsBuilt:
         end_angles: (n_ligaments, 2) of the slots against the ligaments, in the order of the
             structure's ligaments, rad. A shim is straight by itself, and slides in its slots until
             it is as long as the ligament: it is bent, but not stretched.
+        designed_angles: the same as designed; by default shims are straight.
 
     Raises:
         SimulationError: a motion cannot be followed to its end.
     """
-    designed = simulate(scene, vertices=vertices)
+    designed, corners = scene, vertices
+    if designed_angles is not None:
+        designed, corners, _ = relaxed(scene.bent(designed_angles), vertices)
     rest = relaxed(scene.bent(end_angles), vertices)
-    built = simulate(rest.scene, vertices=rest.vertices)
-    return AsBuilt(rest.motion[:, 2], float(designed.loss), float(built.loss))
+    losses = (
+        float(simulate(each, vertices=there).loss)
+        for each, there in ((designed, corners), (rest.scene, rest.vertices))
+    )
+    return AsBuilt(rest.motion[:, 2], *losses)

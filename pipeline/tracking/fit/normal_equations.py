@@ -24,7 +24,7 @@ _LANES = 8
 """Numbers that a processor adds at once, or a multiple."""
 _FEW = [(column + 2 * row) % 4 == 0 for row in range(SIZE) for column in range(SIZE)]
 _COMPARED = np.array([[False] * _PIXELS, _FEW, [True] * _PIXELS], np.uint8)
-"""Whether a pixel is compared, by the kind of its cell and its place in the block."""
+"""Selects the pixels that are compared, by the kind of its cell and its place in the block."""
 
 
 Indices: TypeAlias = NDArray[np.int32]
