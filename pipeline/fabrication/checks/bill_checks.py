@@ -29,12 +29,13 @@ def check_bill(record: PackageRecord) -> Iterator[Fault]:
     shims = [row for row in rows if row["item"] == "shim"]
     left = {row["id"]: int(row["count"]) for row in shims}
     for pair, length in _shim_lengths(record):
-        fits = [row["id"] for row in shims if abs(float(row["length_mm"]) - length) < _PLAY]
-        if not fits:
+        apart = {row["id"]: abs(float(row["length_mm"]) - length) for row in shims}
+        nearest = min(apart, key=lambda shim: apart[shim], default=None)
+        if nearest is None or apart[nearest] >= _PLAY:
             what = f"no shim is {length:.2f} mm long, from slot end to slot end"
             yield Fault(f"ligament {' - '.join(pair)}", what, "slots.depth", BUG, path)
-        for shim in fits[:1]:
-            left[shim] -= 1
+        else:
+            left[nearest] -= 1
     for shim, spare in left.items():
         if spare < 1:
             what = f"{1 - spare} too few of shim {shim}, with one to spare"
