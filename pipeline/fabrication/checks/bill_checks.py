@@ -1,7 +1,7 @@
 """Checks the bill of materials: each unit once, and shims that fit the slots and the sheets."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,10 @@ from pipeline.fabrication.checks.package_record import PackageRecord
 from pipeline.fabrication.checks.sheet_checks import rectangle_sides
 from pipeline.fabrication.checks.slot_checks import measured_slots
 from pipeline.fabrication.papers import BILL, read_bill
+from pipeline.fabrication.parts import SHIM_PLAY
 from pipeline.fabrication.readback import BUG, Drawing, Fault
 
-_PLAY = 0.02  # mm that a shim may be longer or shorter than from slot end to slot end
+_PLAY = 0.02  # mm by which measured slots may be deeper or shallower
 _WRITTEN = 1e-3  # mm
 
 
@@ -28,18 +29,25 @@ def check_bill(record: PackageRecord) -> Iterator[Fault]:
     yield from record.check_units(units, path)
     shims = [row for row in rows if row["item"] == "shim"]
     left = {row["id"]: int(row["count"]) for row in shims}
+    cut = {row["id"]: float(row["length_mm"]) for row in shims}
+    taken = {row["id"]: _shim_of(row) for row in rows if row["item"] == "ligament"}
     for pair, length in _shim_lengths(record):
-        apart = {row["id"]: abs(float(row["length_mm"]) - length) for row in shims}
-        nearest = min(apart, key=lambda shim: apart[shim], default=None)
-        if nearest is None or apart[nearest] >= _PLAY:
-            what = f"no shim is {length:.2f} mm long, from slot end to slot end"
-            yield Fault(f"ligament {' - '.join(pair)}", what, "slots.depth", BUG, path)
+        name = " - ".join(pair)
+        shim = taken.get(name, "")
+        if -_PLAY <= length - cut.get(shim, -np.inf) <= SHIM_PLAY + _PLAY:
+            left[shim] -= 1
         else:
-            left[nearest] -= 1
+            what = f"its shim {shim} does not fit {length:.2f} mm from slot end to slot end"
+            yield Fault(f"ligament {name}", what, "slots.depth", BUG, path)
     for shim, spare in left.items():
         if spare < 1:
             what = f"{1 - spare} too few of shim {shim}, with one to spare"
             yield Fault("the bill of materials", what, "shims.spares", BUG, path)
+
+
+def _shim_of(row: Mapping[str, str]) -> str:
+    """Reads which shim a ligament takes."""
+    return row["note"].partition(";")[0].removeprefix("shim ")
 
 
 def _shim_lengths(record: PackageRecord) -> Iterator[tuple[tuple[str, str], float]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.fabrication.papers.assembly_plan import TONES, WORST, AssemblyPlan, Tile, tiles
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, INK, POINT, SIGNAL, PdfDocument
-from pipeline.fabrication.parts import BuiltSpecimen
+from pipeline.fabrication.parts import SHIM_PLAY, BuiltSpecimen
 from pipeline.problem.sections import Fabrication
 
 _LINE = 4.4  # mm from one line of a table to the next
@@ -183,7 +183,7 @@ def assembly_steps(
         joining,
         "Tolerances: vertices within 0.1 mm of the plan, slots "
         f"{settings.slot_width:.2f} mm wide within 0.05 mm, shims no longer than listed and at "
-        "most 0.2 mm shorter.",
+        "most 0.1 mm shorter.",
         f"Sort {len(specimen.units)} units by their ids, {first} to {last}: a letter for the "
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
@@ -197,7 +197,8 @@ def assembly_steps(
         "Lay the plan, or the jig, on a flat table and put the units in their places with their "
         "ids and arrows as on the plan, row by row from the bottom left.",
         "Push the shims in from above, column by column and then row by row, until they stand "
-        "level with the units. Each must reach the inner end of both slots.",
+        "level with the units. Each must reach the inner end of both slots "
+        f"within {SHIM_PLAY:g} mm.",
         *_bent_step(specimen),
         "Check every gap with the comb, then glue (if at all) from the underside only.",
     ]

@@ -8,6 +8,7 @@ from .layered_solids import pen_area as pen_area
 from .layered_solids import solid_area as solid_area
 from .layered_solids import unit_solid as unit_solid
 from .specimen_parts import LETTERS as LETTERS
+from .specimen_parts import SHIM_PLAY as SHIM_PLAY
 from .specimen_parts import STRAIGHT as STRAIGHT
 from .specimen_parts import THIN_WALL as THIN_WALL
 from .specimen_parts import BuiltSpecimen as BuiltSpecimen

@@ -24,6 +24,9 @@ THIN_WALL = 0.9
 STRAIGHT = 1e-4
 """Strain below which a shim counts as straight."""
 
+SHIM_PLAY = 0.1
+"""Most that a shim may be shorter than from slot end to slot end, mm."""
+
 LETTERS = "ABCDEFGHJKLMNPRSTUVXY4"
 """What small units carry instead of their ids; none looks like another one that is turned."""
 

@@ -11,6 +11,7 @@ import shapely
 from pipeline.fabrication.engraving import orientation_mark, place_id
 from pipeline.fabrication.parts import (
     LETTERS,
+    SHIM_PLAY,
     BuiltSpecimen,
     Ligament,
     Shim,
@@ -25,6 +26,7 @@ from pipeline.fabrication.units.unit_outlines import cut, filleted
 from pipeline.problem.sections import Fabrication
 
 _HAIR = 1e-6
+_STEP = 0.05  # mm, of the lengths of shims
 
 
 def build_specimen(
@@ -56,7 +58,7 @@ def build_specimen(
     joints = _ligaments(net, units, settings)
     _refuse_bent(joints, units, settings, file)
     clamped, driven = (tuple(net.labels[n] for n in held) for held in (net.clamped, net.driven))
-    shims = _shims(joints, settings)
+    shims = sort_shims(joints, settings)
     return BuiltSpecimen(*names, tuple(units.values()), joints, shims, clamped, driven)
 
 
@@ -152,18 +154,21 @@ def _refuse_bent(
     )
 
 
-def _shims(ligaments: Sequence[Ligament], settings: Fabrication) -> tuple[Shim, ...]:
-    """Sorts the pieces to cut, one kind for each length."""
+def sort_shims(ligaments: Sequence[Ligament], settings: Fabrication) -> tuple[Shim, ...]:
+    """Sorts the pieces to cut into the fewest lengths: none is long, or `SHIM_PLAY` short."""
     taken: dict[float, list[int]] = defaultdict(list)
-    for ligament in ligaments:
-        taken[ligament.length].append(ligament.number)
+    length = -math.inf
+    for ligament in sorted(ligaments, key=lambda ligament: ligament.length):
+        if ligament.length > length + SHIM_PLAY:
+            length = round(math.floor((ligament.length + _HAIR) / _STEP) * _STEP, 2)
+        taken[length].append(ligament.number)
     spares = settings.shims.spares
     return tuple(
         Shim(
             f"S{length:g}",
             length,
             settings.thickness,
-            tuple(taken[length]),
+            tuple(sorted(taken[length])),
             max(1, math.ceil(spares * len(taken[length]))),
         )
         for length in sorted(taken)

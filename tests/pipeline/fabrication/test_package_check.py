@@ -182,7 +182,7 @@ def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(
     parts, settings = expected_parts(built.design(), "cloaked"), whole[1].fabrication
     shapes = unit_sections(read_stl(package / "print/assembled.stl"), parts, settings)
     faults = check_bill(PackageRecord(package, parts, shapes, settings, {}))
-    what = "no shim is 8.25 mm long, from slot end to slot end"
+    what = "its shim S8.25 does not fit 8.25 mm from slot end to slot end"
     assert [fault.what for fault in faults] == [what] * len(parts.joints)
 
 
