@@ -121,7 +121,7 @@ def _bent_pages(sheet: PdfDocument, specimen: BuiltSpecimen) -> None:
         title = f"{len(rows)} of {len(specimen.ligaments)} shims are bent before any load"
         heading = ("", "units", "ends, deg", "strain", "moment")
         tones = [SIGNAL if row[0] else INK for row in rows]
-        _table(sheet, title, heading, rows, (16, 26, 22, 16, 20), tones)
+        _table(sheet, title, heading, rows, (14, 22, 18, 14, 22), tones)
 
 
 def _table(

@@ -7,8 +7,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
-from pipeline.fabrication.fixtures import strips
-from pipeline.fabrication.parts import STRAIGHT, THIN_WALL, BuiltSpecimen, Ligament, Shim, Unit
+from shapely import LineString
+
+from pipeline.fabrication.fixtures import shim_pieces, strip_parts
+from pipeline.fabrication.parts import (
+    STRAIGHT,
+    THIN_WALL,
+    BuiltSpecimen,
+    FlatPart,
+    Ligament,
+    Shim,
+    Unit,
+)
 from pipeline.fabrication.plates import STRAND, PrintEstimate
 from pipeline.fabrication.readback import unreadable
 from pipeline.problem.sections import Fabrication
@@ -20,6 +30,7 @@ FOIL = 1.38e-9
 """Density of polyester foil, tonne/mm^3."""
 
 _GRAMS = 1e6  # in a tonne
+_FEED, _START = 10.0, 0.5  # mm/s of a laser through foil, s until a cut begins; assumed
 _HEADING = "item id count area_mm2 volume_mm3 mass_g length_mm width_mm height_mm files note"
 _KINDS = {"laser": "sheet", "print": "plate", "fixture": "fixture"}  # of files, by their folder
 
@@ -130,7 +141,9 @@ def bill(
     yield BillRow("total", "units", len(units), volume=volume, mass=mass, note=note)
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
-    note = f"polyester; {_counted(len(list(strips(specimen))), 'strip')} in the place of all"
+    joined = strip_parts(specimen, settings)
+    note = f"polyester; {_cut_words(shim_pieces(specimen, settings))}"
+    note += f"; {_counted(len(joined), 'strip')} in the place of all: {_cut_words(joined)}"
     yield BillRow("total", "shims", count, volume=volume, mass=mass, note=note)
     every = prints.values()
     whole = PrintEstimate(sum(p.seconds for p in every), sum(p.filament for p in every))
@@ -192,6 +205,15 @@ def prebend_words(ligament: Ligament) -> str:
         f"ends turned {ends} deg; strain {100 * ligament.strain:.2f} %,"
         f" moment {ligament.moment:.2f} N mm before any load"
     )
+
+
+def _cut_words(parts: Sequence[FlatPart]) -> str:
+    """Tells the cuts and scored lines of foil, and their time on a laser cutter."""
+    lines = [part.outline.exterior for part in parts]
+    lines += [LineString(score) for part in parts for score in part.scores]
+    path = sum(line.length for line in lines)
+    minutes = (path / _FEED + len(lines) * _START) / 60.0
+    return f"{_counted(len(lines), 'cut')} of {path / 1000.0:.2f} m, about {minutes:.1f} min"
 
 
 def _print_words(found: PrintEstimate, settings: Fabrication) -> str:

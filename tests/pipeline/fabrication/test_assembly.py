@@ -110,7 +110,10 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     plate = next(row for row in found if row["item"] == "plate")
     assert plate["note"] == "2 parts; about 1 h 05 min, 2.0 m or 6 g"
     shims = next(row for row in found if row["item"] == "total" and row["id"] == "shims")
-    assert shims["note"] == "polyester; 5 strips in the place of all"  # 2 rows and 3 columns
+    assert shims["note"] == (  # 8 rectangles of 32.7 mm; 2 rows and 3 columns, scored 18 times
+        "polyester; 8 cuts of 0.26 m, about 0.5 min;"
+        " 5 strips in the place of all: 23 cuts of 0.35 m, about 0.8 min"
+    )
     prints = found[-1]
     assert (prints["id"], prints["count"]) == ("prints", "1")
     assert float(prints["mass_g"]) == pytest.approx(2000 * np.pi / 4 * 1.75**2 * 1.24e-3, rel=1e-4)
