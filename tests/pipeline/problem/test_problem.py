@@ -27,7 +27,9 @@ from pipeline.problem.reading import load, overlay_keys, preset_names
 from pipeline.problem.sections import Fabrication, Quads
 from pipeline.runtime import ROOT, STAGES, UserError
 
-ROBUST = ("broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased")
+ROBUST = (
+    "broadband", "worst", "amplitudes", "tolerant", "pulse", "unbiased", "unbiased_as_built",
+)  # fmt: skip
 NAMES = ("edge3", "free", "text", *ROBUST, "as_built", "quick")
 PRESETS = (None, *NAMES)
 
