@@ -1,4 +1,8 @@
-"""Fits the templates of all units to a frame."""
+"""Fits the templates of all units to a frame, parts of them side by side."""
+
+import itertools
+import os
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -7,10 +11,14 @@ from pipeline.tracking.fit import patch_correlation
 from pipeline.tracking.fit.normal_equations import SIZE, FramePixels, workspace
 from pipeline.tracking.fit.patch_correlation import FitStart, PoseFits, Templates
 from pipeline.tracking.fit.template import block_places
+from pipeline.tracking.fit.template_cells import TemplateCells
 from pipeline.tracking.geometry import Camera
 from sim.core import Floats, Mask
 
 FULL_STEPS = 8
+_THREADS = min(4, len(os.sched_getaffinity(0)))
+_FEWEST = 16
+"""Units that are worth a thread of their own."""
 
 
 class PoseFitter:
@@ -26,6 +34,7 @@ class PoseFitter:
         self.camera, self.templates = camera, templates
         self.blocks = block_places(camera) if blocks is None else blocks
         self.full = np.zeros(len(templates.centre))
+        self._threads = ThreadPoolExecutor(_THREADS)
 
     def start(self, gain: float) -> tuple[Floats, Floats]:
         """Returns pose and photometry to start from: at rest, all with the same gain."""
@@ -71,9 +80,43 @@ class PoseFitter:
         wanted = wanted if chosen is None else wanted & chosen
         out = np.full((units, patch_correlation.WIDTH), np.nan)
         if wanted.any():
-            across = int(2 * start.radius[wanted].max()) // SIZE + 3
             scene = FramePixels(np.ascontiguousarray(image, np.float32), self.blocks)
-            patch_correlation.fit_patches(
-                scene, self.templates, start, wanted, FULL_STEPS, workspace(across**2), out
-            )
+            parts = [
+                self._threads.submit(self._fit_part, scene, start, wanted, out, part)
+                for part in _shares(wanted)
+            ]
+            for done in parts:
+                done.result()
         return patch_correlation.unpack(out)
+
+    def _fit_part(
+        self, scene: FramePixels, start: FitStart, wanted: Mask, out: Floats, part: slice
+    ) -> None:
+        """Fills the rows of a part of the units; loops over pixels hold no interpreter's lock."""
+        begin = FitStart(*(values[part] for values in start))
+        across = int(2 * begin.radius[wanted[part]].max()) // SIZE + 3
+        looks = _part_of(self.templates, part)
+        room = workspace(across**2)
+        patch_correlation.fit_patches(
+            scene, looks, begin, wanted[part], FULL_STEPS, room, out[part]
+        )
+
+
+def _part_of(looks: Templates, units: slice) -> Templates:
+    """Returns the templates of some of the units; arrays are shared."""
+    return looks._replace(
+        brightness=looks.brightness[units],
+        weight=looks.weight[units],
+        centre=looks.centre[units],
+        contrast=looks.contrast[units],
+        reach=looks.reach[units],
+        cells=TemplateCells(looks.cells.kind[units], looks.cells.span[units]),
+    )
+
+
+def _shares(wanted: Mask) -> list[slice]:
+    """Splits units (units,) into ranges with about as many to be fitted in each."""
+    places = np.flatnonzero(wanted)
+    count = max(1, min(_THREADS, len(places) // _FEWEST))
+    ends = [0, *(int(part[0]) for part in np.array_split(places, count)[1:]), len(wanted)]
+    return [slice(*pair) for pair in itertools.pairwise(ends)]

@@ -2,7 +2,9 @@
 
 import math
 import re
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -38,6 +40,8 @@ _SPARSE, _RANGE = 4, 200.0
 _LARGEST = 1 << 27
 """Pixels of a frame."""
 
+_AHEAD = 2
+"""Frames that are decoded while one is looked at."""
 _ALL = 0.95
 """A video with less of the frames than this that its file promises breaks off."""
 
@@ -75,7 +79,7 @@ class Frame:
 def read_frames(
     path: Path, start: float = 0.0, end: float = float("inf"), rate: float | None = None
 ) -> Iterator[Frame]:
-    """Decodes the video once, in sequence; nothing but the present frame is held.
+    """Decodes the video once, in sequence, a few frames ahead in a thread of its own.
 
     Args:
         path: the video, or a folder of pictures.
@@ -88,7 +92,7 @@ def read_frames(
         BrokenOffError: after the frames that there are, if it breaks off or changes its size.
     """
     if not path.is_dir():
-        yield from _even(path, _filmed(path, start, end))
+        yield from _ahead(_even(path, _filmed(path, start, end)))
         return
     if rate is None:
         remedy = "add how many were taken in a second, such as frame_rate: '30 Hz'"
@@ -113,6 +117,15 @@ def has_uneven_intervals(time: Floats) -> bool:
     """Tells intervals of frames (frames,) s that differ by more than stamps are rounded."""
     interval = np.diff(time)
     return bool(len(interval) and np.ptp(interval) > _ROUNDED * np.median(interval))
+
+
+def _ahead(frames: Iterator[Frame]) -> Iterator[Frame]:
+    """Yields frames that a thread decodes meanwhile; its errors come after the frames before."""
+    with ThreadPoolExecutor(1) as thread:
+        coming = deque(thread.submit(next, frames, None) for _ in range(_AHEAD))
+        while (frame := coming.popleft().result()) is not None:
+            coming.append(thread.submit(next, frames, None))
+            yield frame
 
 
 def _even(path: Path, shown: Iterator[Frame]) -> Iterator[Frame]:
@@ -219,7 +232,7 @@ def _decoded(
                 raise
             raise broken_off(path, str(error.strerror), index, time) from error
         if frame is None:
-            if index < _ALL * _promised(container, stream, index / max(time, 1e-9)):
+            if index < _ALL * _promised(container, stream, (index - 1) / max(time, 1e-9)):
                 raise broken_off(path, "the file should go on", index, time)
             return
         stamp = index / float(stream.average_rate or 1) if frame.pts is None else float(frame.time)

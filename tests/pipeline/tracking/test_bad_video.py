@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.tracking.rendering import write_video
 from pipeline.runtime import UserError
 from pipeline.tracking.detect import orientation_text
 from pipeline.tracking.frames import BrokenOffError, Frame, import_video, read_frames
@@ -106,6 +107,12 @@ def test_a_file_that_breaks_off_is_read_as_far_as_it_goes(tmp_path: Path) -> Non
     end = float(str(caught.value.remedy).split("end: ")[1].split(" s")[0])
     assert end == pytest.approx(read[-1].time, abs=0.001)
     assert list(read_frames(broken, end=end))
+
+
+def test_a_clip_of_a_few_frames_is_whole(tmp_path: Path) -> None:
+    images, times = [np.zeros((64, 64), np.uint8)] * 4, [0.0, 1 / 30, 2 / 30, 0.1]
+    film = write_video(tmp_path / "short.mkv", images, times, "libx264", "yuv420p", 20)
+    assert len(list(read_frames(film))) == 4
 
 
 @pytest.mark.parametrize("error", [BrokenOffError("it breaks off"), KeyboardInterrupt()])

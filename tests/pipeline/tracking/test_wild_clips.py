@@ -8,6 +8,7 @@ import pytest
 from benchmarks.tracking.rendering import View, pose_bound
 from benchmarks.tracking.wild_clips import WildClip, errors, make, specimen, tracked
 from pipeline.runtime import UserError
+from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
 
@@ -37,6 +38,17 @@ def test_no_unit_is_wrong_and_called_good(
     assert found.rms < rms
     assert found.lost <= lost
     assert ((track.quality == 0) == np.isfinite(track.displacement[..., 0])).all()
+
+
+def test_units_fitted_side_by_side_are_those_fitted_in_turn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip, tracks = make("plain", tmp_path, 2), []
+    for threads in (1, 3):
+        monkeypatch.setattr(frame_fit, "_THREADS", threads)
+        tracks.append(tracked(clip))
+    assert np.array_equal(tracks[0].displacement, tracks[1].displacement)
+    assert np.array_equal(tracks[0].sigma, tracks[1].sigma)
 
 
 def test_sigma_holds_while_a_specimen_sticks_and_slips(tmp_path: Path) -> None:
