@@ -6,6 +6,7 @@ set -euo pipefail
 [ "$(id -u)" -eq 0 ] || exec sudo "$0"
 
 node=$(hostname -s)
+cores=$(nproc --all) # without it OMP_NUM_THREADS is the answer, which is 1 under the tests
 memory=$(awk '/MemTotal/ { print int($2 / 1024 * 0.9) }' /proc/meminfo)
 
 install -d -m 755 /etc/slurm /var/spool/slurmctld /var/spool/slurmd
@@ -37,7 +38,7 @@ MpiDefault=none
 MinJobAge=600
 ReturnToService=0
 SchedulerParameters=batch_sched_delay=0,sched_interval=2
-NodeName=$node NodeAddr=127.0.0.1 CPUs=$(nproc) RealMemory=$memory State=UNKNOWN
+NodeName=$node NodeAddr=127.0.0.1 CPUs=$cores RealMemory=$memory State=UNKNOWN
 PartitionName=all Nodes=$node Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
 EOF
 

@@ -162,5 +162,6 @@ def disturb(checkout: Checkout) -> tuple[set[str], set[str]]:
         lost = numbers(jobs(checkout, "RUNNING"))
         lose_the_node(checkout)
         wait_until(lambda: numbers(jobs(checkout, "RUNNING")) - lost, run, PAUSE)
-    assert "node failure" in run.communicate()[0]
+    told = run.communicate()[0]
+    assert "node failure" in told, told
     return lost, numbers(jobs(checkout, "PENDING", "RUNNING"))
