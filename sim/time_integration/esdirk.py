@@ -63,6 +63,7 @@ def _worst(system: System, step: Floats) -> int:
 @compiled
 def march(
     times: Floats,
+    first: int,
     drive: Floats,
     system: System,
     stages: Floats,
@@ -77,6 +78,7 @@ def march(
 
     Args:
         times: (n_steps + 1,) s.
+        first: step to begin with; those before it are given.
         drive: (1 + n_steps (n_stages - 1), n_held) prescribed values at the start and all stages.
         system: the structure.
         stages: coefficients of the method.
@@ -97,8 +99,9 @@ def march(
     base_u, base_v = np.empty_like(motion), np.empty_like(motion)
     rate, factored_k = 0.1, -1.0
     fresh = factored_k > 0.0  # not the constant, for which the stage would be compiled once more
-    _start(drive[0], system, work, u[0, 0], v[0, 0], a[0, 0])
-    for n in range(n_steps):
+    if first == 0:
+        _start(drive[0], system, work, u[0, 0], v[0, 0], a[0, 0])
+    for n in range(first, n_steps):
         h = times[n + 1] - times[n]
         base = Base(base_u, base_v, h * stages[1, 1])
         fresh = fresh and abs(base.k - factored_k) <= 1e-9 * base.k

@@ -126,19 +126,21 @@ class ImplicitSolver:
         system = system_of(top, values, touching)
         check_masses(values)
         check_start(top, values, system.contacts, drive.start(top, float(times[0])))
-        counts = np.zeros(3, dtype=np.int64)
+        counts, step = np.zeros(3, dtype=np.int64), 0
+        shape = (len(times), len(tableau.nodes), top.n_dofs)
+        u, v, a = np.zeros(shape), np.zeros(shape), np.zeros(shape)
         for attempt in range(1, MAX_SPLITS + 1):
-            shape = (len(times), len(tableau.nodes), top.n_dofs)
-            u, v, a = np.zeros(shape), np.zeros(shape), np.zeros(shape)
             held = drive.values(top.held, time_grid.stage_times(times, tableau.nodes))
             status, step, worst = march(
-                times, held, system, tableau.stages, tableau.nodes, self.tolerance, u, v, a, counts
-            )
+                times, step, held, system, tableau.stages, tableau.nodes, self.tolerance, u, v, a,
+                counts,
+            )  # fmt: skip
             raise_new_pairs(system.contacts)
             if status == CONVERGED:
                 return ImplicitRecord(times, u, v, a, touching, counts, top)
             last = len(times) - 1 if attempt % PATIENCE == 0 else step + 1
             times = time_grid.split_steps(times, np.arange(step, last))
+            u, v, a = (_kept(stages, step, len(times)) for stages in (u, v, a))
         raise SimulationError(
             f"the step at t = {times[step]:.6g} s failed after {MAX_SPLITS} cuts, worst at unit"
             f" {worst // 3} (the tangent is indefinite or a contact jams); try a smaller drive or"
@@ -174,3 +176,10 @@ class ImplicitSolver:
                 "a stage's tangent is indefinite in the adjoint; try shorter steps"
             )
         return as_values(bars, top.n_units), stage_times, bars.drive
+
+
+def _kept(stages: Floats, step: int, n_times: int) -> Floats:
+    """Makes room for more times, with the values of the steps before ``step`` and at its start."""
+    kept = np.zeros((n_times, *stages.shape[1:]))
+    kept[: step + 1] = stages[: step + 1]
+    return kept

@@ -107,7 +107,7 @@ def _attempt(
     held = drive.values(top.held, time_grid.stage_times(times, tableau.nodes))
     system, counts = system_of(top, values), np.zeros(3, dtype=np.int64)
     status, _, _ = march(
-        times, held, system, tableau.stages, tableau.nodes, solver.tolerance, u, v, a, counts
+        times, 0, held, system, tableau.stages, tableau.nodes, solver.tolerance, u, v, a, counts
     )
     raise_new_pairs(system.contacts)
     if status != CONVERGED:
