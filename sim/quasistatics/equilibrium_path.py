@@ -40,6 +40,8 @@ CRITICAL = 1e-3
 UNLOADED = 1e-7
 """Share of the load that acts on a critical mode up to which it does not: there the path branches,
 elsewhere it turns back in a limit point."""
+ALIKE = 0.99
+"""Component of a mode over the largest above which they count as equally large."""
 NOTICEABLE = 1e-2
 """Movement at the end of a path that is a jump, mm."""
 BEYOND = 1e-3
@@ -142,6 +144,13 @@ def _crooked(motion: Floats, predicted: Floats, system: System, work: Workspace)
     return _length(work.product, system.dofs, system) / most
 
 
+@inlined
+def _first_of_largest(mode: Floats) -> int:
+    """First of the components that are largest but for rounding, as mirrored ones are."""
+    size = np.abs(mode)
+    return int(np.argmax(size > ALIKE * size.max()))
+
+
 @compiled
 def _leave(
     motion: Floats, load: Floats, ahead: float, mode: Floats, sense: float, first: float,
@@ -154,7 +163,8 @@ def _leave(
         load: (n_held,).
         ahead: part of the way there that leads beyond the end.
         mode: (n_free,) estimate of the critical one, S v.
-        sense: in which a branching is left: 1 moves the mode's largest component up, -1 down.
+        sense: in which a branching is left: 1 moves the first of the mode's largest
+            components up, -1 down.
         first: eigenvalue of the first state.
         drag: of the damped motion.
         relative: tolerance of the residual, relative to the largest reaction.
@@ -179,7 +189,7 @@ def _leave(
         force += (work.force[d] / system.scale[d]) ** 2
     branches = abs(along) <= UNLOADED * np.sqrt(force)
     if branches:
-        along = sense * mode[np.abs(mode).argmax()]
+        along = sense * mode[_first_of_largest(mode)]
         ahead = max(ahead, min(1.0, BEYOND / max(way, BEYOND)))
     for i in range(len(system.held)):
         d = system.held[i]
