@@ -21,5 +21,8 @@ def test_the_end_past_a_snap_does_not_depend_on_the_loads() -> None:
     )
     np.testing.assert_allclose(once[2].snaps, often[2].snaps, rtol=0, atol=1e-6)
     assert len(once[2].snaps) == 1
-    # the residual over the smallest eigenvalue, 2e-4 N/mm, is what the tolerance leaves open
-    np.testing.assert_allclose(once[0][-1], often[0][-1], rtol=0, atol=1e-4)
+    first, second = (states[-1].reshape(SIDE, SIDE, 3) for states, _, _ in (once, often))
+    # two mirrored places are critical at once: either may snap
+    mirrored = second[::-1] * np.array([1.0, -1.0, -1.0])
+    # what the residual's tolerance leaves open, over the smallest eigenvalue of 2e-4 N/mm
+    assert min(np.abs(first - second).max(), np.abs(first - mirrored).max()) < 2e-4

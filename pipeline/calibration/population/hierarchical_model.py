@@ -14,6 +14,7 @@ array of one shape, so that many sets of readings are sampled side by side, comp
 
 from collections.abc import Mapping
 from functools import partial
+from time import sleep
 from typing import NamedTuple
 
 import jax
@@ -34,6 +35,8 @@ LENGTH = 0.5
 """Of the Gaussian processes, over the range of a test's displacements."""
 DEEPEST = 7
 """Doublings of a trajectory of the sampler, at most."""
+PAUSE = 0.05
+"""Seconds between two looks at a sampler that runs."""
 _JITTER = 1e-8
 
 Draws = Mapping[str, Floats]
@@ -152,6 +155,8 @@ def sample_posteriors(
     """
     run = jax.jit(partial(_walks, warm_up=warm_up, draws=draws))
     found = run(readings, priors, jax.random.split(jax.random.PRNGKey(seed), len(readings.used)))
+    while not all(values.is_ready() for values in found.values()):
+        sleep(PAUSE)  # a wait within JAX would let no Ctrl-C in
     return {name: np.asarray(values) for name, values in found.items()}
 
 
