@@ -40,8 +40,6 @@ CRITICAL = 1e-3
 UNLOADED = 1e-7
 """Share of the load that acts on a critical mode up to which it does not: there the path branches,
 elsewhere it turns back in a limit point."""
-ALIKE = 0.99
-"""Component of a mode over the largest above which they count as equally large."""
 NOTICEABLE = 1e-2
 """Movement at the end of a path that is a jump, mm."""
 BEYOND = 1e-3
@@ -145,10 +143,9 @@ def _crooked(motion: Floats, predicted: Floats, system: System, work: Workspace)
 
 
 @inlined
-def _first_of_largest(mode: Floats) -> int:
-    """First of the components that are largest but for rounding, as mirrored ones are."""
-    size = np.abs(mode)
-    return int(np.argmax(size > ALIKE * size.max()))
+def _scatter(mode: Floats) -> None:
+    """Fills an estimate of a mode with fixed numbers that have no symmetry."""
+    mode[:] = np.sin(1.0 + np.arange(len(mode)))
 
 
 @compiled
@@ -162,9 +159,8 @@ def _leave(
         motion: at the end of the path; moved.
         load: (n_held,).
         ahead: part of the way there that leads beyond the end.
-        mode: (n_free,) estimate of the critical one, S v.
-        sense: in which a branching is left: 1 moves the first of the mode's largest
-            components up, -1 down.
+        mode: (n_free,) filled with the critical one, S v.
+        sense: in which a branching is left: 1 moves along the mode, -1 against it.
         first: eigenvalue of the first state.
         drag: of the damped motion.
         relative: tolerance of the residual, relative to the largest reaction.
@@ -178,6 +174,8 @@ def _leave(
         path's end.
     """
     work.saved[:] = motion
+    # of mirrored modes that are critical at once the mixture depends on the start of the iteration
+    _scatter(mode)
     value = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
     _towards(motion, load, 1.0, system, work)
     way = _length(work.product, system.held, system)
@@ -189,7 +187,7 @@ def _leave(
         force += (work.force[d] / system.scale[d]) ** 2
     branches = abs(along) <= UNLOADED * np.sqrt(force)
     if branches:
-        along = sense * mode[_first_of_largest(mode)]
+        along = sense
         ahead = max(ahead, min(1.0, BEYOND / max(way, BEYOND)))
     for i in range(len(system.held)):
         d = system.held[i]
@@ -363,7 +361,8 @@ def follow(
     """
     work = workspace(system)
     motion, step = np.zeros(len(system.mass)), np.empty(len(system.mass))
-    mode = np.sin(1.0 + np.arange(len(system.dofs)))
+    mode = np.empty(len(system.dofs))
+    _scatter(mode)
     # rest itself may be out of balance: a void may start in contact
     if not correct(motion, relative, absolute, True, system, work, counts):
         return 0, 0.0

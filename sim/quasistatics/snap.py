@@ -26,7 +26,7 @@ FLOW_ERROR = 3e-3
 AT_REST = 0.02
 """Newton step below which the damped motion ends in the minimum that the step leads to, mm."""
 CLOSER = 0.5
-"""What that is multiplied by after a step that led to none."""
+"""Factor of that limit after a step that led to no minimum."""
 FIRST_STEP = 1e-3
 """First step of the damped motion, times the drag over the median axial stiffness."""
 MAX_STEPS = 5000

@@ -11,7 +11,7 @@ SIDE = 160
 
 
 def test_the_end_past_a_snap_does_not_depend_on_the_loads() -> None:
-    """Just beyond its limit point this lattice creeps; the motion there is no rest."""
+    """Just beyond its limit point this lattice creeps, and mirrored columns are critical at once."""
     left = SIDE * np.arange(SIDE)
     lattice = quads(SIDE, SIDE, 15.0, 2.3, np.deg2rad(20.0))
     rig = Rig(lattice, left, left + SIDE - 1, LinearRamp(-0.1 * SIDE * 15.0, 1.0))
@@ -21,8 +21,5 @@ def test_the_end_past_a_snap_does_not_depend_on_the_loads() -> None:
     )
     np.testing.assert_allclose(once[2].snaps, often[2].snaps, rtol=0, atol=1e-6)
     assert len(once[2].snaps) == 1
-    first, second = (states[-1].reshape(SIDE, SIDE, 3) for states, _, _ in (once, often))
-    # two mirrored places are critical at once: either may snap
-    mirrored = second[::-1] * np.array([1.0, -1.0, -1.0])
     # what the residual's tolerance leaves open, over the smallest eigenvalue of 2e-4 N/mm
-    assert min(np.abs(first - second).max(), np.abs(first - mirrored).max()) < 2e-4
+    np.testing.assert_allclose(once[0][-1], often[0][-1], rtol=0, atol=2e-4)
