@@ -68,7 +68,7 @@ rule track:
         table="results/{name}{preset}/recordings/{recording}/track.csv",
     log:
         "results/{name}{preset}/logs/track_{recording}.log",
-    threads: 1
+    threads: 2
     params:
         source=source_hash("pipeline.stages.track"),
     message:

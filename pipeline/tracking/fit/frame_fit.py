@@ -1,9 +1,9 @@
 """Fits the templates of all units to a frame, parts of them side by side."""
 
 import itertools
-import os
 from concurrent.futures import ThreadPoolExecutor
 
+import cv2
 import numpy as np
 
 from pipeline.runtime import Picture
@@ -16,7 +16,7 @@ from pipeline.tracking.geometry import Camera
 from sim.core import Floats, Mask
 
 FULL_STEPS = 8
-_THREADS = min(4, len(os.sched_getaffinity(0)))
+_THREADS = min(4, cv2.getNumberOfCPUs())
 _FEWEST = 16
 """Units that are worth a thread of their own."""
 
