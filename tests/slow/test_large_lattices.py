@@ -11,7 +11,7 @@ SIDE = 160
 
 
 def test_the_end_past_a_snap_does_not_depend_on_the_loads() -> None:
-    """Just beyond its limit point this lattice creeps, and mirrored columns are critical at once."""
+    """Beyond its limit point this lattice creeps, and mirrored columns are critical at once."""
     left = SIDE * np.arange(SIDE)
     lattice = quads(SIDE, SIDE, 15.0, 2.3, np.deg2rad(20.0))
     rig = Rig(lattice, left, left + SIDE - 1, LinearRamp(-0.1 * SIDE * 15.0, 1.0))
