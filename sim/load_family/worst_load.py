@@ -60,7 +60,8 @@ def ascend(
 ) -> FoundLoad:
     """Searches the load of the greatest loss near a place, by projected quasi-Newton steps.
 
-    A load that cannot be simulated counts as harmless, with a warning.
+    A load that cannot be simulated counts as harmless, with a warning. The search goes by the loss
+    over that at its start, as the stopping rule of L-BFGS-B is relative to 1 at least.
 
     Args:
         loss: of a place, with its gradient (n,).
@@ -69,10 +70,10 @@ def ascend(
     """
     from scipy.optimize import minimize
 
-    best = FoundLoad(start, -np.inf, start)
+    best, unit = FoundLoad(start, -np.inf, start), 0.0
 
     def negative(place: Floats) -> tuple[float, Floats]:
-        nonlocal best
+        nonlocal best, unit
         try:
             value, slope = loss(place)
         except SimulationError as failure:
@@ -80,7 +81,8 @@ def ascend(
             return 0.0, np.zeros_like(place)
         if value > best.loss:
             best = FoundLoad(place.copy(), value, start)
-        return -value, -slope
+        unit = unit or abs(value) or 1.0
+        return -value / unit, -slope / unit
 
     minimize(
         negative, start, jac=True, method="L-BFGS-B", bounds=[(0.0, 1.0)] * len(start),

@@ -109,6 +109,19 @@ def test_the_search_finds_the_highest_of_several_hills() -> None:
     np.testing.assert_allclose(found[0].place, [0.8, 0.7], atol=1e-2)
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_a_search_does_not_depend_on_the_unit_of_the_loss(unit: float) -> None:
+    def scaled(place: Floats) -> tuple[float, Floats]:
+        value, slope = bell(place)
+        return unit * value, unit * slope
+
+    start = np.array([0.45, 0.2])
+    found, expected = ascend(scaled, start, 30), ascend(bell, start, 30)
+    assert found.loss == pytest.approx(unit * expected.loss, rel=1e-9)
+    assert np.abs(expected.place - start).max() > 0.05  # it does search
+    np.testing.assert_allclose(found.place, expected.place, atol=1e-6)
+
+
 def test_a_load_that_cannot_be_simulated_is_avoided(caplog: pytest.LogCaptureFixture) -> None:
     def half(place: Floats) -> tuple[float, Floats]:
         if place[0] > 0.75:
