@@ -38,7 +38,7 @@ def test_a_design_is_made_and_certified(
     fig2: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(certify, "LOADS", 12)
-    monkeypatch.setattr(certify, "SEARCHES", 1)
+    monkeypatch.setattr(certify, "SEARCHES", 4)  # one alone may end in a lesser maximum
     path, out = write(fig2, tmp_path), tmp_path / "certificate.nc"
     words = ["--problem", str(path), "--quiet"]
     made, chosen = str(tmp_path / "design_sqp.nc"), str(tmp_path / "design.nc")
