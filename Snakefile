@@ -22,7 +22,7 @@ min_version("9.20")
 
 if workflow.is_main_process:
     rule_inputs.check_problems(sys.argv[1:])
-rule_inputs.prepare_jobs()
+rule_inputs.prepare_jobs(workflow.is_main_process)
 
 
 include: "pipeline/rules/targets.smk"

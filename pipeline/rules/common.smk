@@ -16,6 +16,9 @@ wildcard_constraints:
 
 onstart:
     rule_inputs.check_room("results")
+    rule_inputs.hold_studies(
+        file for job in workflow.dag.needrun_jobs() for file in job.output
+    )
     if not workflow.non_local_exec:
         stage_server.start()
     first_look.show(

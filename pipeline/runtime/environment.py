@@ -12,7 +12,8 @@ import platformdirs
 from pipeline.runtime.locations import CACHE
 from sim.core import instruction_set
 
-RUN_MARK = "METACLOAK_RUN"  # names the repository in the environment of every job of a workflow
+RUN_MARK = "METACLOAK_RUN"
+"""Names folder and process (FOLDER:NUMBER) of their run in the environment of all jobs."""
 
 ONE_THREAD = {
     "MKL_NUM_THREADS": "1",

@@ -16,6 +16,7 @@ from snakemake.iocontainers import Wildcards
 from pipeline.problem import Problem, outputs, over_measured_constants, section_hash
 from pipeline.problem.sections import group_count
 from pipeline.runtime import RUN_MARK, WORK, UserError
+from pipeline.workflow import study_lock
 from pipeline.workflow.recordings import shown_recordings
 from pipeline.workflow.studies import (
     Study,
@@ -121,6 +122,14 @@ def check_room(folder: str) -> None:
         sys.exit(f"error: {told}")
 
 
+def hold_studies(files: Iterable[str]) -> None:
+    """Locks the studies that files are of; ends the process with one clear message if it cannot."""
+    try:
+        study_lock.hold(files)
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
 def study_of(wildcards: Wildcards) -> Study:
     """Names the study that a job works on, from its wildcards `name` and `preset`."""
     return Study.parse(f"{wildcards.name}{wildcards.preset}")
@@ -214,7 +223,11 @@ def section(stage: str) -> Callable[[Wildcards], str]:
     )
 
 
-def prepare_jobs() -> None:
-    """Makes the jobs of this workflow run with this Python, and marks them as ours."""
+def prepare_jobs(main: bool) -> None:
+    """Makes the jobs of this workflow run with this Python, and marks them as this run's.
+
+    A process that snakemake starts for one job, rather than the `main` one, keeps the mark.
+    """
     os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    os.environ[RUN_MARK] = str(WORK)
+    if main or RUN_MARK not in os.environ:
+        os.environ[RUN_MARK] = f"{WORK}:{os.getpid()}"

@@ -1,13 +1,11 @@
 """Starts snakemake so that it goes on after any kind of end.
 
-A `kill -9` leaves a lock in the folder and may leave jobs running, here or on a cluster. They are
-cleared first, unless another snakemake is at work here; snakemake itself then continues what is
-incomplete.
+A `kill -9` may leave jobs running, here or on a cluster. They are ended first, and snakemake then
+continues what is incomplete. Runs that build other studies in the same folder are left alone.
 """
 
 import ctypes
 import os
-import shutil
 import signal
 import sys
 from pathlib import Path
@@ -46,27 +44,28 @@ def _places() -> list[str]:
 
 
 def _clear_the_ground() -> None:
-    """Ends left-over jobs and removes the lock of a killed run.
+    """Ends left-over jobs of killed runs.
 
     Raises:
-        UserError: a snakemake is at work in this folder, or the cluster does not answer.
+        UserError: jobs on a cluster may be those of another run, or the cluster does not answer.
     """
-    active = [process for process in _others() if _is_snakemake(process)]
-    if active:
+    active = [process.pid for process in _others() if _is_snakemake(process)]
+    if active and stale_jobs.remaining(WORK):
         raise UserError(
-            f"snakemake is already at work in this folder (process {active[0].pid})",
+            f"jobs on the cluster may be those of the run at work here (process {active[0]})",
             file=WORK,
-            remedy=f"wait for it, or end it with: kill -INT {active[0].pid}",
+            remedy=f"wait for it, or end it with: kill -INT {active[0]}",
         )
     for number in stale_jobs.cancel(WORK):
         print(f"cancelled job {number} of a killed run", file=sys.stderr)  # noqa: T201
-    orphans = [process for process in _others() if _mark(process) == str(WORK)]
+    runs = [f"{WORK}:{number}" for number in active]
+    marks = {process: _mark(process) for process in _others()}
+    orphans = [p for p, m in marks.items() if m.startswith(f"{WORK}:") and m not in runs]
     for process in orphans:
         process.terminate()
     _, stubborn = psutil.wait_procs(orphans, timeout=_PATIENCE)
     for process in stubborn:
         process.kill()
-    shutil.rmtree(WORK / ".snakemake/locks", ignore_errors=True)
 
 
 def _others() -> list[psutil.Process]:
@@ -85,12 +84,12 @@ def _is_snakemake(process: psutil.Process) -> bool:
         return False
 
 
-def _mark(process: psutil.Process) -> str | None:
-    """Reads for which folder a job runs; None if the process is no job or is not ours."""
+def _mark(process: psutil.Process) -> str:
+    """Reads for which run a job works; empty if the process is no job or is not ours."""
     try:
-        return process.environ().get(RUN_MARK)
+        return process.environ().get(RUN_MARK, "")
     except psutil.Error:
-        return None
+        return ""
 
 
 def _end_with_parent() -> None:

@@ -22,7 +22,7 @@ def cancel(folder: Path) -> list[str]:
     Raises:
         UserError: SLURM does not answer, or a job does not end.
     """
-    if not (folder / LOGS).exists() or not (found := jobs(folder)):
+    if not (found := remaining(folder)):
         return []
     _ask("scancel", *found)
     until = time.monotonic() + _PATIENCE
@@ -32,6 +32,11 @@ def cancel(folder: Path) -> list[str]:
             raise UserError(f"job {left[0]} of a killed run does not end", remedy=remedy)
         time.sleep(0.5)
     return found
+
+
+def remaining(folder: Path) -> list[str]:
+    """Lists our jobs for a folder; asks SLURM only if there ever was a job on a cluster."""
+    return jobs(folder) if (folder / LOGS).exists() else []
 
 
 def jobs(folder: Path) -> list[str]:

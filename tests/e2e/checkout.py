@@ -159,7 +159,7 @@ class Checkout:
         found = []
         for process in psutil.process_iter():
             try:
-                if process.environ().get(RUN_MARK) == str(self.root):
+                if process.environ().get(RUN_MARK, "").startswith(f"{self.root}:"):
                     found.append(process)
             except psutil.Error:
                 continue

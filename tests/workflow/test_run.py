@@ -26,54 +26,61 @@ def jobs(root: Path) -> list[psutil.Process]:
     found = []
     for process in psutil.process_iter():
         try:
-            if process.environ().get(RUN_MARK) == str(root):
+            if process.environ().get(RUN_MARK, "").startswith(f"{root}:"):
                 found.append(process)
         except psutil.Error:
             continue
     return found
 
 
-DESIGN = "results/fig2/design.nc"
+DESIGN, OTHER = "results/fig2/design.nc", "results/fig4/design.nc"
 
 
-def start(sandbox: Sandbox) -> subprocess.Popen[bytes]:
-    """Starts the design of a study and waits until its first jobs are at work."""
+def start(sandbox: Sandbox, target: str, more: int = 0) -> subprocess.Popen[bytes]:
+    """Starts the design of a study and waits until its first jobs, and `more`, are at work."""
     run = subprocess.Popen(
-        [sys.executable, "-m", "pipeline", "run", DESIGN],
+        [sys.executable, "-m", "pipeline", "run", target],
         cwd=sandbox.root,
         env=sandbox.environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
-    wait_for(lambda: len(jobs(sandbox.root)) >= 2)
+    wait_for(lambda: len(jobs(sandbox.root)) >= 2 + more)
     return run
 
 
-def test_run_goes_on_after_a_kill(sandbox: Sandbox) -> None:
+def test_run_goes_on_after_a_kill_beside_another_study(sandbox: Sandbox) -> None:
+    """Left-over jobs end, those of a run that is at work on another study do not."""
     sandbox.stage_seconds = 60.0
-    run = start(sandbox)
-    left = jobs(sandbox.root)
+    other = start(sandbox, OTHER)
+    theirs = jobs(sandbox.root)
+    run = start(sandbox, DESIGN, more=len(theirs))
+    left = [process for process in jobs(sandbox.root) if process not in theirs]
     run.kill()
     run.wait()
-    assert any((sandbox.root / ".snakemake/locks").iterdir())
     sandbox.stage_seconds = 0.0
     ended = sandbox.resume(DESIGN)
     assert ended.returncode == 0, ended.stderr
     assert not psutil.wait_procs(left, timeout=0)[1]
     assert "Nothing to be done" in sandbox.run(DESIGN).stderr
+    assert all(process.is_running() for process in theirs)
+    os.killpg(other.pid, signal.SIGINT)
+    assert other.wait() != 0
 
 
-def test_a_second_run_is_refused_and_an_interrupt_leaves_neither_lock_nor_jobs(
-    sandbox: Sandbox,
-) -> None:
+def test_a_study_is_built_once_at_a_time_and_an_interrupt_leaves_no_job(sandbox: Sandbox) -> None:
     sandbox.stage_seconds = 60.0
-    run = start(sandbox)
-    ended = sandbox.resume(DESIGN)
-    assert ended.returncode != 0
-    assert f"already at work in this folder (process {run.pid})" in ended.stderr
+    run = start(sandbox, DESIGN)
+    at_work = f"another run is at work on fig2 (process {run.pid})"
+    for refused in (sandbox.resume(DESIGN), sandbox.run("fig2")):
+        assert refused.returncode != 0
+        assert refused.stderr.count("error: ") == 1
+        assert at_work in refused.stderr
+    sandbox.stage_seconds = 0.0
+    assert sandbox.resume(OTHER).returncode == 0
     assert len(jobs(sandbox.root)) >= 2
     os.killpg(run.pid, signal.SIGINT)
     assert run.wait() != 0
     assert not jobs(sandbox.root)
-    assert not list((sandbox.root / ".snakemake").glob("locks/*"))
+    assert sandbox.resume(DESIGN).returncode == 0
