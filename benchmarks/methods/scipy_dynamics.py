@@ -14,7 +14,7 @@ from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.methods.own_solvers import gradient_of
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats
-from sim.energy import gradient, system_of
+from sim.energy import gradient, kinematics_of, system_of
 from sim.solvers import Harmonic
 from sim.structure import ConcreteParameters
 from sim.vibration import linearised
@@ -42,7 +42,7 @@ class FirstOrderSystem:
         driven = 3 * scene.loads.driven
         self._along_x, self._along_y = driven, driven + 1
         self._system = system_of(self.topology, values)
-        self._turn = np.empty((self.topology.n_units, 4))
+        self._kinematics = kinematics_of(self._system)
         self._force = np.empty(self.topology.n_dofs)
         self.mass = values.mass.ravel()[self.free]
         self.damping = values.damping.ravel()[self.free]
@@ -59,7 +59,7 @@ class FirstOrderSystem:
     def rates(self, time: float, state: Floats) -> Floats:
         """Computes velocities and accelerations (2 n_free,)."""
         u, v = np.split(state, 2)
-        gradient(self.all_dofs(time, u), self._system, self._turn, self._force)
+        gradient(self.all_dofs(time, u), self._system, self._kinematics, self._force)
         return np.concatenate([v, -(self._force[self.free] + self.damping * v) / self.mass])
 
     def jacobian(self, time: float, state: Floats) -> sp.csc_array:

@@ -15,7 +15,7 @@ from benchmarks.harness import Method, Run, Sample, Task, settings_of
 from benchmarks.methods.jax_baseline import force
 from benchmarks.scenes import LoadCase, case
 from sim.core import Floats, Ints
-from sim.energy import gradient, system_of
+from sim.energy import gradient, kinematics_of, system_of
 from sim.scene import parameters_of_design
 from sim.structure import VoidAngleContact
 from sim.vibration import Linear, linearised
@@ -35,7 +35,7 @@ class EquilibriumProblem:
         self.work = {"forces": 0, "factorisations": 0}
         self.free, self.held = np.sort(self.topology.free_dofs), self.topology.held
         self._system = system_of(self.topology, self.values)
-        self._turn = np.empty((self.topology.n_units, 4))
+        self._kinematics = kinematics_of(self._system)
         self._force = np.empty(self.topology.n_dofs)
 
     def residual(self, state: Floats) -> tuple[Floats, float]:
@@ -49,7 +49,7 @@ class EquilibriumProblem:
         law = self.topology.contact
         if isinstance(law, VoidAngleContact) and void <= law.barrier_angle:
             raise ArithmeticError("units passed through each other")
-        gradient(state, self._system, self._turn, self._force)
+        gradient(state, self._system, self._kinematics, self._force)
         return self._force[self.free], float(np.abs(self._force[self.held]).max())
 
     def tangent(self, state: Floats) -> tuple[Linear, spla.SuperLU]:

@@ -7,6 +7,7 @@ from .distance_contact import pair_energy as pair_energy
 from .ligament import LigamentLaw as LigamentLaw
 from .ligament import ligament_energy as ligament_energy
 from .ligament import ligament_strain as ligament_strain
+from .network_arrays import Kinematics as Kinematics
 from .network_arrays import Sensitivity as Sensitivity
 from .observables import Observables as Observables
 from .observables import observe as observe
@@ -18,11 +19,13 @@ from .system import System as System
 from .system import Workspace as Workspace
 from .system import as_values as as_values
 from .system import empty_bars as empty_bars
+from .system import kinematics_of as kinematics_of
 from .system import system_of as system_of
 from .system import workspace as workspace
 from .total import admissible_step as admissible_step
 from .total import gradient as gradient
 from .total import hessian_product as hessian_product
+from .total import locate as locate
 from .total import mixed as mixed
 from .total import tangent as tangent
 from .void_contact import ContactLaw as ContactLaw

@@ -1,16 +1,18 @@
 """Compiles loops over the ligaments: energy, gradient, tangent and mixed derivatives.
 
-Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. With d
-the current
-ligament vector, n and t its unit tangent and normal, L its length and gamma its shear angle,
+Derived by hand from sim/energy/ligament.py and tested against its automatic derivatives. With d the
+current ligament vector, n and t its unit tangent and normal, L its length, gamma its shear angle,
 
-    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta
-    kappa,
+    dW/dd = k_l (L - l0) n + k_s l0^2 gamma t / L,
+    dW/dtheta = -k_s l0^2 gamma / 2 -+ k_theta kappa,
 
 each strain taken from its natural value (zero but where a ligament is not free of stress at rest),
+and the motions of the two units enter through
 
-and the motions of the two units enter through d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a -
-r_a).
+    d = vector + (u_b + R_b r_b - r_b) - (u_a + R_a r_a - r_a).
+
+Second derivatives read the kinematics that ``gradient`` or ``locate`` left of the same state: sines
+and arctangents are two thirds of their cost.
 """
 
 import math
@@ -18,7 +20,7 @@ import math
 import numpy as np
 
 from sim.core import Floats, Ints, compiled
-from sim.energy.network_arrays import NetworkArrays, Sensitivity
+from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity
 from sim.linalg import Matrix, entry
 
 
@@ -35,13 +37,10 @@ def _trigonometry(motion: Floats, turn: Floats) -> None:
 
 
 @compiled
-def _kinematics(
+def _rotated(
     motion: Floats, turn: Floats, net: NetworkArrays, k: int
-) -> tuple[float, float, float, float, float, float, float, float, tuple[float, float, float]]:
-    """Rotated arms of ligament k, its current vector and length, the reference length, its strain.
-
-    That is stretch, shear angle and relative rotation, from their natural values.
-    """
+) -> tuple[float, float, float, float, float, float]:
+    """Rotated arms of ligament k, and its current vector."""
     a, b = net.unit[k, 0], net.unit[k, 1]
     ca, sa, cb, sb = turn[a, 0], turn[a, 1], turn[b, 0], turn[b, 1]
     pax = ca * net.arm[k, 0, 0] - sa * net.arm[k, 0, 1]
@@ -55,15 +54,45 @@ def _kinematics(
         + (motion[3 * b + 1] + pby - net.arm[k, 1, 1])
         - (motion[3 * a + 1] + pay - net.arm[k, 0, 1])
     )
+    return pax, pay, pbx, pby, dx, dy
+
+
+@compiled
+def _shear(turn: Floats, net: NetworkArrays, k: int, dx: float, dy: float) -> float:
+    """Shear angle of ligament k with the current vector d, from its natural value."""
+    a, b = net.unit[k, 0], net.unit[k, 1]
+    vx, vy = net.vector[k, 0], net.vector[k, 1]
     ch = turn[a, 2] * turn[b, 2] - turn[a, 3] * turn[b, 3]
     sh = turn[a, 3] * turn[b, 2] + turn[a, 2] * turn[b, 3]
     ex, ey = ch * vx - sh * vy, sh * vx + ch * vy
     # gamma: angle from the reference vector, turned by the mean of both rotations, to d
-    shear = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy) - net.natural[k, 1]
+    return math.atan2(ex * dy - ey * dx, ex * dx + ey * dy) - net.natural[k, 1]
+
+
+@compiled
+def _lengths(
+    motion: Floats, net: NetworkArrays, k: int, dx: float, dy: float
+) -> tuple[float, float, float, float]:
+    """Length and reference length of ligament k, its stretch and relative rotation.
+
+    The latter are from their natural values.
+    """
+    a, b = net.unit[k, 0], net.unit[k, 1]
+    vx, vy = net.vector[k, 0], net.vector[k, 1]
     length, reference = math.sqrt(dx * dx + dy * dy), math.sqrt(vx * vx + vy * vy)
     stretch = length - reference - net.natural[k, 0]
     bend = motion[3 * b + 2] - motion[3 * a + 2] - net.natural[k, 2]
-    return pax, pay, pbx, pby, dx, dy, length, reference, (stretch, shear, bend)
+    return length, reference, stretch, bend
+
+
+@compiled
+def locate(motion: Floats, net: NetworkArrays, kinematics: Kinematics) -> None:
+    """Fills the kinematics of a state, as the second derivatives read them."""
+    turn, shears = kinematics.turn, kinematics.shear
+    _trigonometry(motion, turn)
+    for k in range(net.unit.shape[0]):
+        _, _, _, _, dx, dy = _rotated(motion, turn, net, k)
+        shears[k] = _shear(turn, net, k, dx, dy)
 
 
 @compiled
@@ -89,16 +118,24 @@ def _forces(
 
 
 @compiled
-def gradient(motion: Floats, net: NetworkArrays, turn: Floats, out: Floats) -> float:
-    """Fills the energy gradient ``out`` (3 n_units,); returns the strain energy, N mm."""
+def gradient(motion: Floats, net: NetworkArrays, kinematics: Kinematics, out: Floats) -> float:
+    """Fills the energy gradient ``out`` (3 n_units,), and the kinematics.
+
+    Returns:
+        the strain energy, N mm.
+    """
+    turn, shears = kinematics.turn, kinematics.shear
     _trigonometry(motion, turn)
     out[:] = 0.0
     strain_energy = 0.0
     for k in range(net.unit.shape[0]):
         a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
-        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        pax, pay, pbx, pby, dx, dy = _rotated(motion, turn, net, k)
+        length, rest, stretch, bend = _lengths(motion, net, k, dx, dy)
+        shear = _shear(turn, net, k, dx, dy)
+        shears[k] = shear
+        strain = stretch, shear, bend
         gx, gy, wa, wb = _forces(net, k, dx, dy, length, rest, strain)
-        stretch, shear, bend = strain
         # W = k_l (l - l0)^2 / 2 + k_s (l0 gamma)^2 / 2 + k_b bend^2 / 2
         strain_energy += 0.5 * (
             net.law[k, 0] * stretch**2
@@ -140,10 +177,12 @@ def _second(
 
 @compiled
 def _ligament_block(
-    k: int, motion: Floats, turn: Floats, net: NetworkArrays, block: Floats
+    k: int, motion: Floats, turn: Floats, shear: float, net: NetworkArrays, block: Floats
 ) -> None:
     """Fills the lower half of the Hessian (6, 6) of ligament ``k`` in the dofs of its two units."""
-    pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+    pax, pay, pbx, pby, dx, dy = _rotated(motion, turn, net, k)
+    length, rest, stretch, bend = _lengths(motion, net, k, dx, dy)
+    strain = stretch, shear, bend
     gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
     hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
     torsion, bending = 0.25 * net.law[k, 1] * rest * rest, net.law[k, 2]
@@ -166,19 +205,21 @@ def _ligament_block(
 
 
 @compiled
-def tangent(motion: Floats, net: NetworkArrays, turn: Floats, free: Ints, matrix: Matrix) -> None:
+def tangent(
+    motion: Floats, net: NetworkArrays, kinematics: Kinematics, free: Ints, matrix: Matrix
+) -> None:
     """Adds the energy's Hessian among the free dofs to a matrix.
 
     ``free`` (3 n_units,) numbers the free dofs and is negative for the others.
     """
-    _trigonometry(motion, turn)
+    turn, shears = kinematics.turn, kinematics.shear
     block, place = np.empty((6, 6)), np.empty(6, dtype=np.int64)
     # taken apart here: passing the matrix for each entry would cost more than all the rest
     values, width, fronts = matrix.values, matrix.pattern.size[1], matrix.pattern.fronts
     owner, first, edge = fronts.owner, fronts.first, fronts.edge
     boundary, panel = fronts.boundary, fronts.panel
     for k in range(net.unit.shape[0]):
-        _ligament_block(k, motion, turn, net, block)
+        _ligament_block(k, motion, turn, shears[k], net, block)
         for m in range(3):
             place[m] = free[3 * net.unit[k, 0] + m]
             place[3 + m] = free[3 * net.unit[k, 1] + m]
@@ -196,15 +237,17 @@ def tangent(motion: Floats, net: NetworkArrays, turn: Floats, free: Ints, matrix
 
 @compiled
 def hessian_product(
-    motion: Floats, net: NetworkArrays, turn: Floats, direction: Floats, out: Floats
+    motion: Floats, net: NetworkArrays, kinematics: Kinematics, direction: Floats, out: Floats
 ) -> None:
     """Fills ``out`` (3 n_units,) with the Hessian times ``direction``, over all dofs."""
-    _trigonometry(motion, turn)
+    turn, shears = kinematics.turn, kinematics.shear
     out[:] = 0.0
     for k in range(net.unit.shape[0]):
         a, b = 3 * net.unit[k, 0], 3 * net.unit[k, 1]
         la, lb = direction[a + 2], direction[b + 2]
-        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        pax, pay, pbx, pby, dx, dy = _rotated(motion, turn, net, k)
+        length, rest, stretch, bend = _lengths(motion, net, k, dx, dy)
+        strain = stretch, shears[k], bend
         gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
         hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
         torsion = 0.25 * net.law[k, 1] * rest * rest
@@ -230,18 +273,20 @@ def hessian_product(
 def mixed(
     motion: Floats,
     net: NetworkArrays,
-    turn: Floats,
+    kinematics: Kinematics,
     direction: Floats,
     which: Ints,
     out: Sensitivity,
 ) -> None:
     """Adds d/dp of (``direction`` . dE/dmotion) to ``out`` for the ligaments in ``which``."""
-    _trigonometry(motion, turn)
+    turn, shears = kinematics.turn, kinematics.shear
     for k in which:
         ua, ub = net.unit[k, 0], net.unit[k, 1]
         a, b = 3 * ua, 3 * ub
         la, lb = direction[a + 2], direction[b + 2]
-        pax, pay, pbx, pby, dx, dy, length, rest, strain = _kinematics(motion, turn, net, k)
+        pax, pay, pbx, pby, dx, dy = _rotated(motion, turn, net, k)
+        length, rest, stretch, bend = _lengths(motion, net, k, dx, dy)
+        strain = stretch, shears[k], bend
         gx, gy, _, _ = _forces(net, k, dx, dy, length, rest, strain)
         hxx, hxy, hyy, mx, my = _second(net, k, dx, dy, length, rest, strain)
         ex = direction[b] - direction[a] - pby * lb + pay * la

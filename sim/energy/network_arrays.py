@@ -31,6 +31,18 @@ class NetworkArrays(NamedTuple):
     touching: Ints
 
 
+class Kinematics(NamedTuple):
+    """Holds what the derivatives of the energy share at one state of a network.
+
+    Attributes:
+        turn: (n_units, 4) cos and sin of all rotations, then of their halves.
+        shear: (n_ligaments,) shear angles, from their natural values, rad.
+    """
+
+    turn: Floats
+    shear: Floats
+
+
 class Sensitivity(NamedTuple):
     """Derivatives with respect to a network's parameters, shaped as in ``NetworkArrays``.
 

@@ -11,7 +11,7 @@ from sim.collision import pairs_in_contact, raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs, compiled
 from sim.energy.connectivity import Topology
 from sim.energy.ligament import LigamentStrain, ligament_strain
-from sim.energy.system import System, system_of
+from sim.energy.system import System, kinematics_of, system_of
 from sim.energy.total import gradient
 from sim.structure import ConcreteParameters, VoidAngleContact
 
@@ -46,9 +46,9 @@ class Observables(NamedTuple):
 
 @compiled
 def _visit(states: Floats, system: System, energies: Floats, forces: Floats, pairs: Ints) -> None:
-    turn = np.empty((states.shape[1] // 3, 4))
+    kinematics = kinematics_of(system)
     for n in range(len(states)):
-        energies[n] = gradient(states[n], system, turn, forces[n])
+        energies[n] = gradient(states[n], system, kinematics, forces[n])
         pairs[n] = pairs_in_contact(states[n], system.contacts)
 
 

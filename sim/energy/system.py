@@ -7,7 +7,7 @@ import numpy as np
 from sim.collision import ContactArrays, contact_arrays
 from sim.core import Floats, Ints, compiled
 from sim.energy.connectivity import Topology
-from sim.energy.network_arrays import NetworkArrays, Sensitivity
+from sim.energy.network_arrays import Kinematics, NetworkArrays, Sensitivity
 from sim.linalg import Matrix, Pattern, matrix
 from sim.structure import ConcreteParameters
 
@@ -43,13 +43,13 @@ class Workspace(NamedTuple):
     """Holds scratch arrays of a solve, overwritten at will.
 
     Attributes:
-        turn: (n_units, 4) of the kernels.
+        kinematics: of the state that the gradient was last computed at.
         force, step, product, trial, saved, guess: (n_dofs,).
         right: (n_free,).
         matrix: the tangent, then its factor.
     """
 
-    turn: Floats
+    kinematics: Kinematics
     force: Floats
     step: Floats
     product: Floats
@@ -76,11 +76,17 @@ class Bars(NamedTuple):
 
 
 @compiled
+def kinematics_of(system: System) -> Kinematics:
+    """Room for the kinematics of a state."""
+    return Kinematics(np.empty((len(system.mass) // 3, 4)), np.empty(len(system.net.unit)))
+
+
+@compiled
 def workspace(system: System) -> Workspace:
     """Scratch arrays that fit a system."""
     n_dofs, n_free = len(system.mass), len(system.dofs)
     return Workspace(
-        np.empty((n_dofs // 3, 4)),
+        kinematics_of(system),
         np.empty(n_dofs),
         np.empty(n_dofs),
         np.empty(n_dofs),

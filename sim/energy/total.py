@@ -3,7 +3,8 @@
 A load q on a degree of freedom u adds -q u. It is a prescribed coordinate of the motion like a held
 displacement, so that solvers follow it, and adjoints differentiate by it, as they do by that one.
 
-The solvers see the energy and the admissible states through these functions alone.
+The solvers see the energy and the admissible states through these functions alone. Second
+derivatives read the kinematics that `gradient` or `locate` left of the same state.
 """
 
 from sim.collision import collision_free_step
@@ -15,19 +16,29 @@ from sim.energy.distance_contact_kernels import (
     add_mixed,
     add_tangent,
 )
-from sim.energy.network_arrays import Sensitivity
+from sim.energy.network_arrays import Kinematics, Sensitivity
 from sim.energy.system import System
 from sim.linalg import Matrix
 
 
 @compiled
-def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple[float, float]:
-    """Fills the energy gradient ``out`` (n_dofs,); returns strain and contact energy, N mm.
+def locate(motion: Floats, system: System, kinematics: Kinematics) -> None:
+    """Fills the kinematics of a state, as the second derivatives read them."""
+    ligament_kernels.locate(motion, system.net, kinematics)
 
-    The work of the loads is taken from the strain energy; the gradient by them is left at zero. The
-    contact energy of a state that is not admissible is infinite.
+
+@compiled
+def gradient(
+    motion: Floats, system: System, kinematics: Kinematics, out: Floats
+) -> tuple[float, float]:
+    """Fills the energy gradient ``out`` (n_dofs,), and the kinematics.
+
+    The work of the loads is taken from the strain energy; the gradient by them is left at zero.
+
+    Returns:
+        strain and contact energy, N mm; the latter is infinite in a state that is not admissible.
     """
-    strain = ligament_kernels.gradient(motion, system.net, turn, out)
+    strain = ligament_kernels.gradient(motion, system.net, kinematics, out)
     contact = void_contact_kernels.add_gradient(motion, system.net, out)
     if len(system.contacts.pairs) > 0:
         contact += add_gradient(motion, system.contacts, out)
@@ -41,9 +52,9 @@ def gradient(motion: Floats, system: System, turn: Floats, out: Floats) -> tuple
 
 
 @compiled
-def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> None:
+def tangent(motion: Floats, system: System, kinematics: Kinematics, matrix: Matrix) -> None:
     """Adds the energy's Hessian among the free dofs to a matrix."""
-    ligament_kernels.tangent(motion, system.net, turn, system.free, matrix)
+    ligament_kernels.tangent(motion, system.net, kinematics, system.free, matrix)
     void_contact_kernels.add_tangent(motion, system.net, system.free, matrix)
     if len(system.contacts.pairs) > 0:
         add_tangent(motion, system.contacts, system.free, matrix)
@@ -51,10 +62,10 @@ def tangent(motion: Floats, system: System, turn: Floats, matrix: Matrix) -> Non
 
 @compiled
 def hessian_product(
-    motion: Floats, system: System, turn: Floats, direction: Floats, out: Floats
+    motion: Floats, system: System, kinematics: Kinematics, direction: Floats, out: Floats
 ) -> None:
     """Fills ``out`` (n_dofs,) with the Hessian times ``direction``, over all dofs."""
-    ligament_kernels.hessian_product(motion, system.net, turn, direction, out)
+    ligament_kernels.hessian_product(motion, system.net, kinematics, direction, out)
     void_contact_kernels.add_hessian_product(motion, system.net, direction, out)
     if len(system.contacts.pairs) > 0:
         add_hessian_product(motion, system.contacts, direction, out)
@@ -68,13 +79,14 @@ def hessian_product(
 
 @compiled
 def mixed(
-    motion: Floats, system: System, turn: Floats, direction: Floats, which: Ints, out: Sensitivity
-) -> None:
+    motion: Floats, system: System, kinematics: Kinematics, direction: Floats, which: Ints,
+    out: Sensitivity,
+) -> None:  # fmt: skip
     """Adds d/dp of (``direction`` . dE/dmotion), of the ligaments' own p only for ``which``."""
-    ligament_kernels.mixed(motion, system.net, turn, direction, which, out)
+    ligament_kernels.mixed(motion, system.net, kinematics, direction, which, out)
     void_contact_kernels.add_mixed(motion, system.net, direction, which, out)
     if len(system.contacts.pairs) > 0:
-        add_mixed(motion, system.contacts, turn, direction, out)
+        add_mixed(motion, system.contacts, kinematics.turn, direction, out)
 
 
 @compiled

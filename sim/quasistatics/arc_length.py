@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from sim.collision import raise_new_pairs
 from sim.core import Floats, Ints, NewContactPairs
-from sim.energy import System, Topology, gradient, hessian_product, system_of, workspace
+from sim.energy import System, Topology, gradient, hessian_product, locate, system_of, workspace
 from sim.quasistatics.equilibrium_path import BRANCHING
 from sim.quasistatics.static_solver import StaticRecord, StaticSolver
 from sim.solvers import PrescribedMotion
@@ -246,7 +246,7 @@ class _Path:
         return max(float(np.linalg.norm(rates * self._scale[self._held])), 1e-12)
 
     def _force(self, point: _Point) -> Floats:
-        gradient(point.state, self.system, self._work.turn, self._work.force)
+        gradient(point.state, self.system, self._work.kinematics, self._work.force)
         return np.asarray(self._work.force[self._free] / self._scale[self._free])
 
     def _stiffness(self, point: _Point) -> sp.csc_array:
@@ -260,7 +260,8 @@ class _Path:
         way = np.zeros_like(point.state)
         way[self._held] = self._drive.rates(self._held, np.array([point.load]))[0] / pace
         along = np.empty_like(way)
-        hessian_product(point.state, self.system, self._work.turn, way, along)
+        locate(point.state, self.system, self._work.kinematics)
+        hessian_product(point.state, self.system, self._work.kinematics, way, along)
         column = sp.csc_array((along[self._free] / self._scale[self._free])[:, None])
         whole = sp.block_array(
             [[self._stiffness(point), column], [ahead[None, :-1], ahead[None, -1:]]], format="csc"

@@ -17,6 +17,8 @@ from sim.energy import (
     as_values,
     empty_bars,
     hessian_product,
+    kinematics_of,
+    locate,
     mixed,
     system_of,
     workspace,
@@ -75,12 +77,13 @@ def eigenvalue_and_slopes(
     system = system_of(topology, values)
     value, mode = lowest_eigenpair(system, state)
     bars = empty_bars(system, (1, len(system.held)))
-    turn, product = np.empty((topology.n_units, 4)), np.empty_like(state)
+    kinematics, product = kinematics_of(system), np.empty_like(state)
     bar = np.zeros_like(state)
     for place, weight in STENCIL:  # v . dK v is the derivative of d(v . dE/du) along v
         moved, direction = state + place * STEP * mode, weight / STEP * mode
-        mixed(moved, system, turn, direction, topology.designed, bars.sensitivity)
-        hessian_product(moved, system, turn, direction, product)
+        locate(moved, system, kinematics)
+        mixed(moved, system, kinematics, direction, topology.designed, bars.sensitivity)
+        hessian_product(moved, system, kinematics, direction, product)
         bar += product
     adjoint(state[None], bar[None], system, topology.designed, bars)
     return value, as_values(bars, topology.n_units)

@@ -12,7 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import Bars, System, Workspace, admissible_step, hessian_product, mixed, workspace
+from sim.energy import (
+    Bars,
+    System,
+    Workspace,
+    admissible_step,
+    hessian_product,
+    locate,
+    mixed,
+    workspace,
+)
 from sim.quasistatics.newton import (
     INCREMENTS,
     KEEP_FROM_BARRIER,
@@ -88,7 +97,8 @@ class Branch(NamedTuple):
 def _tangent_step(motion: Floats, system: System, work: Workspace) -> None:
     """Fills ``work.step`` with that of the path for the held dofs' part in ``work.product``."""
     # K_ff du_f = -K_fh du_h
-    hessian_product(motion, system, work.turn, work.product, work.force)
+    locate(motion, system, work.kinematics)
+    hessian_product(motion, system, work.kinematics, work.product, work.force)
     solve_free(system, work)
     for d in system.held:
         work.step[d] = work.product[d]
@@ -179,7 +189,8 @@ def _leave(
     value = lowest_mode(system, work, mode, SWEEPS_AT_LOADS, EIGENVALUE)
     _towards(motion, load, 1.0, system, work)
     way = _length(work.product, system.held, system)
-    hessian_product(motion, system, work.turn, work.product, work.force)
+    locate(motion, system, work.kinematics)
+    hessian_product(motion, system, work.kinematics, work.product, work.force)
     along, force = 0.0, 0.0
     for i in range(len(mode)):
         d = system.dofs[i]
@@ -416,8 +427,8 @@ def adjoint(states: Floats, bar: Floats, system: System, which: Ints, bars: Bars
             return p
         work.force[:] = bar[p]
         solve_free(system, work)
-        mixed(states[p], system, work.turn, work.step, which, bars.sensitivity)
-        hessian_product(states[p], system, work.turn, work.step, work.product)
+        mixed(states[p], system, work.kinematics, work.step, which, bars.sensitivity)
+        hessian_product(states[p], system, work.kinematics, work.step, work.product)
         for i in range(len(system.held)):
             bars.drive[p, i] += work.product[system.held[i]]
     return -1

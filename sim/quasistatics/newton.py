@@ -8,7 +8,7 @@ a saddle.
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import System, Workspace, admissible_step, gradient, tangent
+from sim.energy import System, Workspace, admissible_step, gradient, locate, tangent
 from sim.linalg import add, clear, factorise, solve
 
 KEEP_FROM_BARRIER = 0.9
@@ -30,7 +30,7 @@ GRADIENTS, FACTORS, SHIFTED, INCREMENTS = 0, 1, 2, 3
 @inlined
 def balance(motion: Floats, system: System, work: Workspace) -> tuple[float, float, float]:
     """Energy, and the largest out-of-balance and reaction force (moments over the scale), N."""
-    strain, contact = gradient(motion, system, work.turn, work.force)
+    strain, contact = gradient(motion, system, work.kinematics, work.force)
     residual, reaction = 0.0, 0.0
     for d in system.dofs:
         residual = max(residual, abs(work.force[d]) / system.scale[d])
@@ -46,7 +46,8 @@ def factorise_tangent(
     """Factor of the (shifted) tangent; False if it is not positive definite."""
     counts[FACTORS] += 1
     clear(work.matrix)
-    tangent(motion, system, work.turn, work.matrix)
+    locate(motion, system, work.kinematics)
+    tangent(motion, system, work.kinematics, work.matrix)
     if shift > 0.0:
         for i in range(len(system.dofs)):
             add(work.matrix, i, i, shift * system.scale[system.dofs[i]] ** 2)

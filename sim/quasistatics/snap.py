@@ -94,7 +94,7 @@ def relax(
     """
     h = FIRST_STEP * drag[system.dofs].min() / float(np.median(system.net.law[:, 0]))
     near = AT_REST
-    gradient(motion, system, work.turn, work.force)
+    gradient(motion, system, work.kinematics, work.force)
     for _ in range(MAX_STEPS):
         if not _ros2(motion, drag, h, system, work, counts):
             h *= 0.25
@@ -109,7 +109,7 @@ def relax(
             continue
         h *= min(5.0, longer)
         motion += work.product
-        gradient(motion, system, work.turn, work.force)
+        gradient(motion, system, work.kinematics, work.force)
         if moved < AT_REST and factorise_tangent(motion, system, work, 0.0, counts):
             solve_free(system, work)
             if _largest(work.step, system) < near:
@@ -118,7 +118,7 @@ def relax(
                 if correct(motion, relative, absolute, False, system, work, counts):
                     return factorise_tangent(motion, system, work, 0.0, counts)
                 motion[:] = work.guess
-                gradient(motion, system, work.turn, work.force)
+                gradient(motion, system, work.kinematics, work.force)
                 near *= CLOSER
     return False
 
@@ -137,12 +137,12 @@ def _ros2(
 ) -> bool:
     """Fills ``work.product`` with a step of the damped motion; False if it is too long for that.
 
-    ``work.force`` holds the gradient at ``motion``; ``work.guess`` is filled with the difference
-    from the step of first order.
+    The workspace holds gradient and kinematics at ``motion``; ``work.guess`` is filled with the
+    difference from the step of first order.
     """
     counts[FACTORS] += 1
     clear(work.matrix)
-    tangent(motion, system, work.turn, work.matrix)
+    tangent(motion, system, work.kinematics, work.matrix)
     for i in range(len(system.dofs)):
         add(work.matrix, i, i, drag[system.dofs[i]] / (GAMMA * h))
     if not factorise(work.matrix):
@@ -152,14 +152,14 @@ def _ros2(
     work.product[:] = work.step / GAMMA
     work.trial[:] = motion + work.product
     if KEEP_FROM_BARRIER * admissible_step(motion, system, work.product) < 1.0:
-        gradient(motion, system, work.turn, work.force)
+        gradient(motion, system, work.kinematics, work.force)
         return False
-    gradient(work.trial, system, work.turn, work.force)
+    gradient(work.trial, system, work.kinematics, work.force)
     # (K + C / (gamma h)) d2 = -g(q + d1) / gamma - 2 C d1 / (gamma h)
     for d in system.dofs:
         work.force[d] = (work.force[d] + 2.0 * drag[d] * work.product[d] / h) / GAMMA
     solve_free(system, work)
     work.guess[:] = 0.5 * (work.product + work.step)
     work.product[:] = work.product + work.guess
-    gradient(motion, system, work.turn, work.force)
+    gradient(motion, system, work.kinematics, work.force)
     return True

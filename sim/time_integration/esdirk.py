@@ -45,7 +45,7 @@ def _start(drive: Floats, system: System, work: Workspace, u: Floats, v: Floats,
     for i in range(len(system.held)):
         u[system.held[i]] = drive[i]
     a[:] = 0.0
-    gradient(u, system, work.turn, work.force)
+    gradient(u, system, work.kinematics, work.force)
     for d in system.dofs:  # M a = -dW/du - C v
         a[d] = -(work.force[d] + system.damping[d] * v[d]) / system.mass[d]
 

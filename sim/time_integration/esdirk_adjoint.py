@@ -6,7 +6,7 @@ It factors every stage's tangent anew, so that it does not depend on which facto
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import Bars, System, Workspace, hessian_product, mixed, workspace
+from sim.energy import Bars, System, Workspace, hessian_product, locate, mixed, workspace
 from sim.linalg import solve
 from sim.time_integration.esdirk_stage import factorise_stage
 
@@ -22,15 +22,18 @@ def _gather(
     bars: Bars,
     drive: Floats,
 ) -> None:
-    """Adds what the balance of one state contributes; ``work.right`` holds its multiplier."""
+    """Adds what the balance of one state contributes.
+
+    The workspace holds its multiplier (``right``) and its kinematics.
+    """
     work.step[:] = 0.0
     for i in range(len(system.dofs)):
         d = system.dofs[i]
         work.step[d] = -work.right[i]
         bars.mass[d] -= work.right[i] * acceleration[d]
         bars.damping[d] -= work.right[i] * velocity[d]
-    mixed(motion, system, work.turn, work.step, which, bars.sensitivity)
-    hessian_product(motion, system, work.turn, work.step, work.product)
+    mixed(motion, system, work.kinematics, work.step, which, bars.sensitivity)
+    hessian_product(motion, system, work.kinematics, work.step, work.product)
     for i in range(len(system.held)):
         drive[i] += work.product[system.held[i]]
 
@@ -119,5 +122,6 @@ def adjoint(
         next_a += a[0]
     for i in range(len(system.dofs)):
         work.right[i] = next_a[system.dofs[i]] / system.mass[system.dofs[i]]
+    locate(stage_u[0, 0], system, work.kinematics)
     _gather(stage_u[0, 0], stage_v[0, 0], stage_a[0, 0], system, work, which, bars, bars.drive[0])
     return True

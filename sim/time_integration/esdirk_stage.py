@@ -11,7 +11,15 @@ contracts.
 from typing import NamedTuple
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import System, Workspace, admissible_step, gradient, hessian_product, tangent
+from sim.energy import (
+    System,
+    Workspace,
+    admissible_step,
+    gradient,
+    hessian_product,
+    locate,
+    tangent,
+)
 from sim.linalg import add, clear, factorise, solve
 
 MAX_ITERATIONS = 30
@@ -39,7 +47,8 @@ class Base(NamedTuple):
 def factorise_stage(motion: Floats, system: System, work: Workspace, k: float) -> bool:
     """Factor of a stage's tangent M/k^2 + C/k + K in the workspace; False if not positive."""
     clear(work.matrix)
-    tangent(motion, system, work.turn, work.matrix)
+    locate(motion, system, work.kinematics)
+    tangent(motion, system, work.kinematics, work.matrix)
     for i in range(len(system.dofs)):
         d = system.dofs[i]
         add(work.matrix, i, i, (system.mass[d] / k + system.damping[d]) / k)
@@ -55,7 +64,7 @@ def _newton_step(
     Returns:
         the largest move of a held dof and the (scaled) largest of a free one.
     """
-    gradient(motion, system, work.turn, work.force)
+    gradient(motion, system, work.kinematics, work.force)
     gap = 0.0
     work.step[:] = 0.0
     for i in range(len(system.held)):
@@ -63,7 +72,7 @@ def _newton_step(
         work.step[d] = target[i] - motion[d]
         gap = max(gap, abs(work.step[d]))
     if gap > 0.0:
-        hessian_product(motion, system, work.turn, work.step, work.product)
+        hessian_product(motion, system, work.kinematics, work.step, work.product)
         for d in system.dofs:
             work.force[d] += work.product[d]
     for i in range(len(system.dofs)):

@@ -108,8 +108,10 @@ class ExplicitSolver:
     def adjoint_memory(self) -> int:
         """Counts the bytes that checkpoints and one segment's states take."""
         n_dofs, segment = self.topology.n_dofs, _segment(self.n_steps)
-        n_states = 2 * -(-self.n_steps // segment) + segment * (3 * len(self.splitting.kicks) + 2)
-        return np.dtype(float).itemsize * n_dofs * n_states
+        n_kicks, n_ligaments = len(self.splitting.kicks), len(self.topology.ligament_units)
+        n_states = 2 * -(-self.n_steps // segment) + segment * (3 * n_kicks + 2)
+        kinematics = segment * n_kicks * (4 * n_dofs // 3 + n_ligaments)
+        return np.dtype(float).itemsize * (n_dofs * n_states + kinematics)
 
     def _steps_for(self, frequency: float) -> int:
         """Counts the steps that are stable at an angular eigenfrequency (rad/s), on a ladder.

@@ -15,7 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.core import Floats, Ints, compiled, inlined
-from sim.energy import Bars, System, Workspace, gradient, hessian_product, mixed, workspace
+from sim.energy import (
+    Bars,
+    Kinematics,
+    System,
+    Workspace,
+    gradient,
+    hessian_product,
+    mixed,
+    workspace,
+)
 from sim.time_integration.contact_substeps import Flight, Pace, flight_of, fly, fly_back
 
 
@@ -60,20 +69,26 @@ class Trace(NamedTuple):
     Attributes:
         u, v: (n, n_kicks + 1, n_dofs) where the flights start, that is at and after the kicks.
         before: (n, n_kicks, n_dofs) velocities before the kicks.
+        turn: (n, n_kicks, n_units, 4) of the kinematics at the kicks.
+        shear: (n, n_kicks, n_ligaments) likewise.
     """
 
     u: Floats
     v: Floats
     before: Floats
+    turn: Floats
+    shear: Floats
 
 
 @inlined
-def _trace(n: int, steps: Steps) -> Trace:
+def _trace(n: int, steps: Steps, system: System) -> Trace:
     n_kicks, n_dofs = steps.gain.shape
     return Trace(
         np.empty((n, n_kicks + 1, n_dofs)),
         np.empty((n, n_kicks + 1, n_dofs)),
         np.empty((n, n_kicks, n_dofs)),
+        np.empty((n, n_kicks, n_dofs // 3, 4)),
+        np.empty((n, n_kicks, len(system.net.unit))),
     )
 
 
@@ -106,7 +121,8 @@ def _step(
             trace.before[slot, m] = v
             for i in range(len(system.held)):
                 u[system.held[i]] = steps.drive[n, m, i]
-            strain, contact = gradient(u, system, work.turn, work.force)
+            kinematics = Kinematics(trace.turn[slot, m], trace.shear[slot, m])
+            strain, contact = gradient(u, system, kinematics, work.force)
             total += strain + contact
             for d in system.dofs:  # v+ = e v- - g dW/du: the exact flow of M v' + C v = -dW/du
                 v[d] = steps.decay[m, d] * v[d] - steps.gain[m, d] * work.force[d]
@@ -132,7 +148,8 @@ def run(
         the step at which the motion left the admissible states, or -1.
     """
     n_dofs = steps.gain.shape[1]
-    work, flight, trace = workspace(system), flight_of(watched, n_dofs // 3), _trace(1, steps)
+    work, flight = workspace(system), flight_of(watched, n_dofs // 3)
+    trace = _trace(1, steps, system)
     u, v = np.zeros(n_dofs), np.zeros(n_dofs)
     last_u, last_v = np.zeros(n_dofs), np.zeros(n_dofs)
     output = 0
@@ -185,9 +202,9 @@ def _kick_back(
         bar_decay[m, d] += bar_v[d] * before
         bar_gain[m, d] -= bar_v[d] * (steps.decay[m, d] * before - trace.v[slot, m + 1, d]) / gain
         bar_v[d] *= steps.decay[m, d]
-    u = trace.u[slot, m + 1]
-    hessian_product(u, system, work.turn, work.step, work.product)
-    mixed(u, system, work.turn, work.step, which, bars.sensitivity)
+    u, kinematics = trace.u[slot, m + 1], Kinematics(trace.turn[slot, m], trace.shear[slot, m])
+    hessian_product(u, system, kinematics, work.step, work.product)
+    mixed(u, system, kinematics, work.step, which, bars.sensitivity)
     for d in system.dofs:
         bar_u[d] += work.product[d]
     for i in range(len(system.held)):
@@ -225,7 +242,7 @@ def sweep_back(
     """
     n_dofs = steps.gain.shape[1]
     work, flight = workspace(system), flight_of(watched, n_dofs // 3)
-    trace = _trace(steps.segment, steps)
+    trace = _trace(steps.segment, steps, system)
     u, v = np.empty(n_dofs), np.empty(n_dofs)
     bar_u, bar_v = np.zeros(n_dofs), np.zeros(n_dofs)
     left_u, left_v = np.zeros(n_dofs), np.zeros(n_dofs)

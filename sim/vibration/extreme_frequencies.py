@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse.linalg as spla
 
 from sim.core import Floats, Ints
-from sim.energy import Topology, hessian_product, system_of, tangent
+from sim.energy import Topology, hessian_product, kinematics_of, locate, system_of, tangent
 from sim.linalg import clear, factorise, matrix, solve
 from sim.structure import ConcreteParameters
 
@@ -23,13 +23,14 @@ def highest_frequency(
     """
     system = system_of(topology, values, touching)
     state = np.zeros(topology.n_dofs) if motion is None else motion.ravel()
-    turn = np.empty((topology.n_units, 4))
+    kinematics = kinematics_of(system)
+    locate(state, system, kinematics)
     free, root = topology.free_dofs, _root_mass(topology, values)
 
     def product(x: Floats) -> Floats:
         full, out = np.zeros(topology.n_dofs), np.empty(topology.n_dofs)
         full[free] = np.ravel(x) / root
-        hessian_product(state, system, turn, full, out)
+        hessian_product(state, system, kinematics, full, out)
         return np.asarray(out[free] / root)
 
     return float(np.sqrt(abs(_largest(product, topology.n_free, 1e-2))))
@@ -45,8 +46,9 @@ def lowest_frequency(topology: Topology, values: ConcreteParameters) -> float:
     system = system_of(topology, values)
     made = matrix(system.pattern)
     clear(made)
-    turn = np.empty((topology.n_units, 4))
-    tangent(np.zeros(topology.n_dofs), system, turn, made)
+    rest, kinematics = np.zeros(topology.n_dofs), kinematics_of(system)
+    locate(rest, system, kinematics)
+    tangent(rest, system, kinematics, made)
     if not factorise(made):
         return 0.0
     root = _root_mass(topology, values)

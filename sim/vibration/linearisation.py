@@ -9,7 +9,7 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from sim.core import Floats, Ints
-from sim.energy import Topology, system_of, tangent
+from sim.energy import Topology, kinematics_of, locate, system_of, tangent
 from sim.linalg import clear, matrix, number_free_dofs
 from sim.structure import ConcreteParameters
 
@@ -68,13 +68,14 @@ class WholeTangent:
             whole.site, whole.coupled_units, whole.held, by_fronts=False
         )
         self._system = system_of(whole, values)._replace(free=self._place, pattern=pattern)
-        self._matrix, self._turn = matrix(pattern), np.empty((whole.n_units, 4))
+        self._matrix, self._kinematics = matrix(pattern), kinematics_of(self._system)
 
     def among(self, rows: Ints, columns: Ints, state: Floats) -> sp.csc_array:
         """Assembles the part (n_rows, n_columns) of some dofs at a state (n_dofs,)."""
         made, (n, width) = self._matrix, self._system.pattern.size
         clear(made)
-        tangent(state, self._system, self._turn, made)
+        locate(state, self._system, self._kinematics)
+        tangent(state, self._system, self._kinematics, made)
         bands = made.values.reshape(n, width + 1).T
         lower = sp.dia_array((bands, -np.arange(width + 1)), shape=(n, n))
         full = sp.csr_array(lower + sp.tril(lower, -1).T)

@@ -19,7 +19,7 @@ from benchmarks.suites import (
     sweep_growth,
 )
 from sim.core import Floats
-from sim.energy import gradient, system_of
+from sim.energy import gradient, kinematics_of, system_of
 from sim.scene import concrete_parameters, parameters_of_design
 from sim.solvers import Harmonic
 
@@ -78,7 +78,8 @@ def test_the_baseline_has_the_same_forces() -> None:
     values = concrete_parameters(scene, scene.lattice.vertices)
     motion = 0.05 * np.random.default_rng(0).normal(size=scene.topology.n_dofs)
     ours = np.empty_like(motion)
-    gradient(motion, system_of(scene.topology, values), np.empty((225, 4)), ours)
+    system = system_of(scene.topology, values)
+    gradient(motion, system, kinematics_of(system), ours)
     made = parameters_of_design(scene)(jnp.zeros(scene.space.n_variables))
     theirs = jax_baseline.force(scene)(made, jnp.asarray(motion.reshape(-1, 3)))
     np.testing.assert_allclose(np.ravel(theirs), ours, atol=1e-12 * np.abs(ours).max())

@@ -166,7 +166,7 @@ def _by_dop853(case: StressScene, motion: Harmonic | Pulse) -> Floats:
 
     def rate(time: float, y: Floats) -> Floats:
         state[free], state[3 * unit : 3 * unit + 2] = y[: len(free)], place(time)
-        gradient(state, system, work.turn, work.force)
+        gradient(state, system, work.kinematics, work.force)
         speed = y[len(free) :]
         return np.concatenate([speed, -(work.force[free] + damping * speed) / mass])
 

@@ -16,7 +16,7 @@ from sim.energy import (
     topology,
     void_contact_kernels,
 )
-from sim.energy.network_arrays import NetworkArrays
+from sim.energy.network_arrays import Kinematics, NetworkArrays
 from sim.energy.observables import observe
 from sim.scene import concrete_parameters
 from sim.structure import ConcreteParameters, Lattice, VoidAngleContact, parameters, shape
@@ -38,8 +38,9 @@ SQUARES, MIXED = network(rotating_squares()), network(mixed_polygons())
 
 
 def energy(motion: Floats, net: NetworkArrays) -> tuple[float, float]:
-    turn, force = np.empty((len(motion) // 3, 4)), np.empty(len(motion))
-    strain = ligament_kernels.gradient(motion, net, turn, force)
+    n_units, n_ligaments = len(motion) // 3, len(net.unit)
+    kinematics, force = Kinematics(np.empty((n_units, 4)), np.empty(n_ligaments)), 0.0 * motion
+    strain = ligament_kernels.gradient(motion, net, kinematics, force)
     return strain, void_contact_kernels.add_gradient(motion, net, force)
 
 

@@ -20,7 +20,7 @@ from sim.energy import (
     ligament_kernels,
     void_contact_kernels,
 )
-from sim.energy.network_arrays import NetworkArrays
+from sim.energy.network_arrays import Kinematics, NetworkArrays
 from sim.linalg import clear, matrix, number_free_dofs
 from sim.solvers import LinearRamp
 from sim.structure import Lattice, quads, shape
@@ -133,14 +133,18 @@ def assert_equal(found: Floats, wanted: Floats) -> None:
     assert np.abs(found - wanted).max() <= EXACT * np.abs(wanted).max()
 
 
-def scratch(motion: Floats) -> tuple[Floats, Floats]:
-    return np.empty((len(motion) // 3, 4)), np.empty(len(motion))
+def located(motion: Floats, net: NetworkArrays) -> Kinematics:
+    kinematics = Kinematics(np.empty((len(motion) // 3, 4)), np.empty(len(net.unit)))
+    ligament_kernels.locate(motion, net, kinematics)
+    return kinematics
 
 
 def gradient(motion: Floats, net: NetworkArrays) -> tuple[float, float, Floats]:
     """Strain and contact energy, and the gradient of their sum."""
-    turn, force = scratch(motion)
-    strain = ligament_kernels.gradient(motion, net, turn, force)
+    force, kinematics = np.empty(len(motion)), located(0.0 * motion, net)
+    strain = ligament_kernels.gradient(motion, net, kinematics, force)
+    for one, other in zip(kinematics, located(motion, net), strict=True):
+        np.testing.assert_array_equal(one, other)
     return strain, void_contact_kernels.add_gradient(motion, net, force), force
 
 
@@ -163,7 +167,7 @@ def test_tangent(random_case: Case, by_fronts: bool) -> None:
     free, pattern = number_free_dofs(lattice.site, net.unit, held, by_fronts)
     made = matrix(pattern)
     clear(made)
-    ligament_kernels.tangent(motion, net, scratch(motion)[0], free, made)
+    ligament_kernels.tangent(motion, net, located(motion, net), free, made)
     void_contact_kernels.add_tangent(motion, net, free, made)
     order = np.argsort(free)[len(held) :]
     wanted = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))
@@ -172,8 +176,8 @@ def test_tangent(random_case: Case, by_fronts: bool) -> None:
 
 def test_hessian_product(random_case: Case) -> None:
     net, motion = random_case.net, random_case.motion
-    turn, product = scratch(motion)
-    ligament_kernels.hessian_product(motion, net, turn, random_case.direction, product)
+    kinematics, product = located(motion, net), np.empty(len(motion))
+    ligament_kernels.hessian_product(motion, net, kinematics, random_case.direction, product)
     void_contact_kernels.add_hessian_product(motion, net, random_case.direction, product)
     hessian = np.asarray(hessian_of_definition(motion, numbers(net), net.unit))
     assert_equal(product, hessian @ random_case.direction)
@@ -193,7 +197,7 @@ def mixed(of: Case, which: Ints) -> Sensitivity:
     parts = (net.arm, net.vector, net.void, net.law, net.natural, net.contact[:, 0])
     none = np.zeros((0, 2))
     out = Sensitivity(*(np.zeros(part.shape) for part in (*parts, none, none)))
-    ligament_kernels.mixed(of.motion, net, scratch(of.motion)[0], of.direction, which, out)
+    ligament_kernels.mixed(of.motion, net, located(of.motion, net), of.direction, which, out)
     void_contact_kernels.add_mixed(of.motion, net, of.direction, which, out)
     return out
 

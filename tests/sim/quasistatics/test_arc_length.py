@@ -44,7 +44,7 @@ def test_a_path_turns_where_the_structure_snaps_and_its_points_are_equilibria() 
     free, scale = rig.topology.free_dofs, rig.topology.scale[rig.topology.free_dofs]
 
     def force(state: Floats) -> Floats:
-        gradient(state, system, work.turn, work.force)
+        gradient(state, system, work.kinematics, work.force)
         return np.array(work.force[free] / scale)
 
     for k in range(0, len(found.loads), 7):

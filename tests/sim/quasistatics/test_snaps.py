@@ -133,7 +133,7 @@ def test_a_snap_ends_where_damped_motion_comes_to_rest() -> None:
 
     def rate(_: float, q: Floats) -> Floats:
         state[free] = q
-        gradient(state, system, work.turn, work.force)
+        gradient(state, system, work.kinematics, work.force)
         return -work.force[free] / system.damping[free]
 
     found = solve_ivp(rate, (0.0, 1e4), before[free], method="BDF", rtol=1e-6, atol=1e-8)

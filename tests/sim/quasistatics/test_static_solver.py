@@ -25,7 +25,7 @@ def out_of_balance(rig: Rig, state: Floats) -> Floats:
     """Forces (n_free,) on the free dofs, N and N mm."""
     system = system_of(rig.topology, rig.values)
     work = workspace(system)
-    gradient(state.ravel(), system, work.turn, work.force)
+    gradient(state.ravel(), system, work.kinematics, work.force)
     return work.force[rig.topology.free_dofs]
 
 
@@ -117,7 +117,7 @@ def test_polygons_of_any_kind() -> None:
     work = workspace(system)
     energies, forces = [], []
     for state in states:
-        energies.append(sum(gradient(state, system, work.turn, work.force)))
+        energies.append(sum(gradient(state, system, work.kinematics, work.force)))
         forces.append(work.force.copy())
     done = np.sum((np.array(forces)[1:] + forces[:-1]) / 2 * np.diff(states, axis=0))
     assert done == pytest.approx(energies[-1] - energies[0], rel=1e-4)

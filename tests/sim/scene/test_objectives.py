@@ -2,6 +2,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from sim.energy import Kinematics
 from sim.energy.ligament_kernels import gradient
 from sim.scene import DisplacementMimicking, StrainEnergyMimicking, strain_energies
 from sim.scene.objectives import RelativeMimicking, extent
@@ -55,10 +56,10 @@ def test_strain_energies_are_the_kernels() -> None:
     units, values = RIG.lattice.ligament_units[ligaments], RIG.values
     found = strain_energies(jnp.asarray(MOTION), values, ligaments, units)
     net = RIG.topology.network(values)
-    force, turn = np.empty(75), np.empty((25, 4))
+    force, kinematics = np.empty(75), Kinematics(np.empty((25, 4)), np.empty(1))
     for case, time, k in np.ndindex(2, 5, 3):
         alone = some_ligaments(net, ligaments[k : k + 1])
-        energy = gradient(MOTION[case, time].ravel(), alone, turn, force)
+        energy = gradient(MOTION[case, time].ravel(), alone, kinematics, force)
         assert found[case, time, k] == pytest.approx(energy, rel=1e-12)
     losses = StrainEnergyMimicking(ligaments, units, WEIGHTS)(jnp.asarray(MOTION), values)
     np.testing.assert_allclose(losses, np.asarray(found).sum(axis=2) @ WEIGHTS, rtol=1e-13)

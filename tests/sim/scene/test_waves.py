@@ -80,7 +80,7 @@ def test_energy_does_not_drift_in_1e5_steps(bias_deg: float, share: float) -> No
     u, v = undamped(rig, step, 100_000)
     system = system_of(rig.topology, rig.values)
     work = workspace(system)
-    potential = np.array([sum(gradient(state, system, work.turn, work.force)) for state in u])
+    potential = np.array([sum(gradient(state, system, work.kinematics, work.force)) for state in u])
     energy = potential + 0.5 * v**2 @ rig.values.mass.ravel()
     voids = rig.topology.smallest_void_angle(rig.values.void, u.reshape(len(u), -1, 3))
     assert (voids.min() < CUTOFF) == (bias_deg > 20.0)

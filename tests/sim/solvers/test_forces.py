@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse.linalg as spla
 
 from sim.core import Floats, SimulationError
-from sim.energy import gradient, hessian_product, observe, system_of
+from sim.energy import gradient, hessian_product, kinematics_of, locate, observe, system_of
 from sim.quasistatics import StaticSolver
 from sim.solvers import (
     DISPLACEMENT,
@@ -131,7 +131,7 @@ def test_states_under_a_growing_moment_are_balanced_and_stable() -> None:
     for load, state in zip(loads, record.states, strict=True):
         system = system_of(made.topology, made.values)
         force = np.empty(made.topology.n_dofs)
-        gradient(state, system, np.empty((26, 4)), force)
+        gradient(state, system, kinematics_of(system), force)
         assert np.abs(force[made.topology.free_dofs]).max() < 1e-7
         assert state[-1] == pytest.approx(40.0 * load)
 
@@ -140,17 +140,18 @@ def test_the_work_of_a_load_is_part_of_the_energy() -> None:
     made = rig(LinearRamp(1.0, 1.0), [[FORCE] * 3])
     rng, system = np.random.default_rng(3), system_of(made.topology, made.values)
     state, step = (rng.normal(size=78) * np.tile([0.1, 0.1, 0.01], 26) for _ in range(2))
-    turn, ahead, behind, product = np.empty((26, 4)), np.empty(78), np.empty(78), np.empty(78)
+    kinematics, (ahead, behind, product) = kinematics_of(system), np.empty((3, 78))
     units = np.append(np.ones(75, dtype=bool), np.zeros(3, dtype=bool))
     h = 1e-5
-    gradient(state, system, turn, product)
+    gradient(state, system, kinematics, product)
     slope = product[units] @ step[units]
     moved = np.where(units, step, 0.0)
-    energies = [sum(gradient(state + s * h * moved, system, turn, ahead)) for s in (1, -1)]
+    energies = [sum(gradient(state + s * h * moved, system, kinematics, ahead)) for s in (1, -1)]
     assert (energies[0] - energies[1]) / (2 * h) == pytest.approx(slope, rel=1e-6)
-    gradient(state + h * step, system, turn, ahead)
-    gradient(state - h * step, system, turn, behind)
-    hessian_product(state, system, turn, step, product)
+    gradient(state + h * step, system, kinematics, ahead)
+    gradient(state - h * step, system, kinematics, behind)
+    locate(state, system, kinematics)
+    hessian_product(state, system, kinematics, step, product)
     wanted = (ahead - behind)[units] / (2 * h)
     np.testing.assert_allclose(product[units], wanted, atol=1e-6)
     np.testing.assert_allclose(product[75:], -step[36:39])

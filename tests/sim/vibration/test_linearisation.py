@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.energy import gradient, system_of
+from sim.energy import gradient, kinematics_of, system_of
 from sim.quasistatics import StaticSolver
 from sim.solvers import Harmonic, LinearRamp, solve_case
 from sim.time_integration import ExplicitSolver
@@ -23,13 +23,14 @@ def test_the_stiffness_is_the_derivative_of_the_force(rig: Rig) -> None:
     top, rng = rig.topology, np.random.default_rng(1)
     state = 0.05 * rng.normal(size=top.n_dofs)
     made = linearised(top, rig.values, state)
-    system, turn = system_of(top, rig.values), np.empty((top.n_units, 4))
+    system = system_of(top, rig.values)
+    kinematics = kinematics_of(system)
     for ids, block in ((made.free, made.stiffness), (made.held, made.coupling)):
         step = np.zeros(top.n_dofs)
         step[ids] = rng.normal(size=len(ids))
         ahead, behind = np.empty(top.n_dofs), np.empty(top.n_dofs)
-        gradient(state + 1e-5 * step, system, turn, ahead)
-        gradient(state - 1e-5 * step, system, turn, behind)
+        gradient(state + 1e-5 * step, system, kinematics, ahead)
+        gradient(state - 1e-5 * step, system, kinematics, behind)
         force = (ahead - behind)[made.free] / 2e-5
         assert block @ step[ids] == pytest.approx(force, rel=1e-6, abs=1e-6 * np.abs(force).max())
 
