@@ -6,7 +6,7 @@ from scipy.ndimage import distance_transform_edt
 
 from pipeline.tracking.fit.patch_correlation import Templates
 from pipeline.tracking.fit.template_cells import classify
-from sim.core import Floats, Singles
+from sim.core import Floats, Reals, Singles
 
 _LEAST = 0.4
 """A way that is not worth a template of its own, px; so is a change of a third of this."""
@@ -20,9 +20,17 @@ class ExposureBlur:
     Their weights are averaged likewise: the blurred edge reaches farther out, and tells of the
     place wherever the sharp one passes.
 
+    A picture shows more of a unit's acceleration than none: the mean of its shifts over the
+    exposure, weighed by how much each instant tells of the place. An edge that is blurred far tells
+    least at its ends.
+
     Args:
         templates: as learned at rest.
         pixel: size of a pixel, mm.
+
+    Attributes:
+        share: (units, 2) what shows of an acceleration along the way, and about the middle, over
+            the mean of its shifts.
     """
 
     def __init__(self, templates: Templates, pixel: float) -> None:
@@ -32,6 +40,7 @@ class ExposureBlur:
             for face, mask in zip(templates.brightness.copy(), templates.weight.copy(), strict=True)
         ]
         self._way = np.zeros((len(self._sharp), 3))
+        self.share = np.ones((len(self._sharp), 2), np.float16)
 
     def redraw(self, way: Floats) -> None:
         """Blurs by ways (units, 3) in mm and rad, in the units' frames, from end to end."""
@@ -47,6 +56,7 @@ class ExposureBlur:
         self._way[unit] = way
         made = self._templates
         made.brightness[unit], made.weight[unit] = self._sharp[unit]
+        self.share[unit] = 1.0
         if way.any():
             count = int(np.clip(_PER_PIXEL * length, 3, _MOST))
             share = (np.arange(count) + 0.5) / count - 0.5
@@ -54,6 +64,8 @@ class ExposureBlur:
             masks = [self._moved(self._sharp[unit][1], way * part) for part in share]
             made.brightness[unit] = np.mean(faces, axis=0)
             made.weight[unit] = np.mean(masks, axis=0)
+            bent = np.average(faces, axis=0, weights=share**2)
+            self.share[unit] = _share(made.brightness[unit], bent, made.weight[unit], way)
         classify(
             made.brightness[unit],
             made.weight[unit],
@@ -79,6 +91,31 @@ class ExposureBlur:
             ),
             np.float32,
         )
+
+
+def _share(face: Reals, bent: Reals, weight: Reals, way: Floats) -> Floats:
+    """Fits what accelerations along a way (3,) and about the middle change of a blurred face.
+
+    Instants t of an exposure T shift the face by a t^2 / 2, in the mean a T^2 / 24; ``bent`` is the
+    mean face with weights t^2 over their mean.
+    """
+    line = np.arange(len(face)) - len(face) // 2
+    used = weight > 0
+    x, y = (np.broadcast_to(one, face.shape)[used] for one in (line, line[:, None]))
+
+    def slopes(values: Reals) -> tuple[Floats, Floats]:
+        right, down = (np.gradient(values, axis=axis)[used] for axis in (1, 0))
+        return np.asarray(right, float), np.asarray(down, float)
+
+    ahead = way[:2] / max(float(np.linalg.norm(way[:2])), 1e-12)
+    (right, down), (bent_right, bent_down) = slopes(face), slopes(bent)
+    light = (np.ones(len(x)), x, y, face[used])
+    across = (ahead[0] * down - ahead[1] * right, *light)
+    columns = (ahead[0] * right + ahead[1] * down, x * down - y * right, *across)
+    shown = (ahead[0] * bent_right + ahead[1] * bent_down, x * bent_down - y * bent_right)
+    root = np.sqrt(weight[used])[:, None]
+    fit = np.linalg.lstsq(np.stack(columns, 1) * root, np.stack(shown, 1) * root, rcond=None)[0]
+    return np.asarray(np.clip(np.diagonal(fit[:2]), 0.0, 1.0))
 
 
 def _filled(face: Singles, weight: Singles) -> Singles:

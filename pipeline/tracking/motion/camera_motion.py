@@ -1,14 +1,13 @@
-"""Takes out of motions what camera and shutter add: drifts, knocks, rows that are read later."""
+"""Takes out of motions what the camera adds: drifts, knocks, rows that are read later."""
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion, rotation_matrix
 from pipeline.tracking.reference_frame import CameraCalibration, RecordingSetup
 from sim.core import Floats, Mask, Reals
 
-_LEAST, _FEWEST = 2, 4
-"""Clamped units that tell of the camera; frames that tell how a unit moves."""
+_LEAST = 2
+"""Clamped units that tell of the camera."""
 
 
 def camera_motion(motion: Reals, sigma: Reals, centre: Floats, held: Mask) -> Floats | None:
@@ -62,24 +61,3 @@ def row_times(
     """
     row = calibration.camera.project(specimen.centre + motion[..., :2].astype(float))[..., 1]
     return np.asarray(setup.readout * ((row + 0.5) / calibration.camera.size[1] - 0.5))
-
-
-def at_frame_times(motion: Reals, time: Floats, late: Floats, exposure: float) -> Reals:
-    """Computes poses (frames, units, 3) at frames' times (frames,), by cubic splines in time.
-
-    A picture shows the mean over its exposure: x + x'' exposure^2 / 24, to second order.
-
-    Args:
-        motion: as seen, NaN where missing.
-        time: of the frames, s; middle of the exposure of the middle row.
-        late: (frames, units) by how much later each pose was seen, s.
-        exposure: of a row, s.
-    """
-    out = motion.copy()
-    for unit in range(motion.shape[1]):
-        known = np.isfinite(motion[:, unit, 0])
-        if known.sum() > _FEWEST:
-            spline = CubicSpline(time[known] + late[known, unit], motion[known, unit])
-            bent = spline(time[known], 2) * (exposure**2 / 24)
-            out[known, unit] = spline(time[known]) - bent
-    return out

@@ -21,8 +21,10 @@ IEEE Trans. Inf. Theory 60 (2014) 5040)."""
 _COMMON = 8
 _FILLINGS, _FILLED = 80, 0.1
 """Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
-_REACHES = (1, 2, 3)
+_REACHES = (1, 2, 3, 4, 5)
 """Frames to either side of one whose place the polynomial through them tells."""
+_TELLING = 4
+"""Fewest frames that tell how much a polynomial of higher order leaves."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0
 
@@ -121,8 +123,12 @@ def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
     motion too, so values are held to a few times the usual; frames at the ends are as the next.
     """
     found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
-    usual = np.array([np.nanmedian(np.abs(one), axis=0) / 0.6745 for one in found])
-    usual = np.nan_to_num(usual)
+    usual = np.full((len(found), amplitude.shape[1]), np.inf)
+    for order, one in enumerate(found):
+        told = np.isfinite(one).all(axis=1)
+        if told.sum() >= (_TELLING if order else 1):
+            usual[order] = np.median(np.abs(one[told]), axis=0) / 0.6745
+    usual = np.where(np.isfinite(usual).any(axis=0), usual, 0.0)
     out = np.empty_like(amplitude)
     for column in range(amplitude.shape[1]):
         order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))

@@ -9,6 +9,27 @@ from sim.core import Floats, Mask
 _NEAREST = 6
 
 
+def latest_velocity(seen: list[tuple[float, Floats]]) -> Floats:
+    """Returns the time derivative (units, 3) at the last of the frames seen.
+
+    It is that of the polynomial through all of them; of fewer, the last ones, where a unit is not
+    in all; NaN where it is in fewer than two.
+
+    Args:
+        seen: times, s, and poses (units, 3) there, NaN where missing.
+    """
+    out = np.full_like(seen[-1][1], np.nan)
+    for first in range(len(seen) - 1):
+        time = np.array([one for one, _ in seen[first:]])
+        if (np.diff(time) <= 0).any():
+            continue
+        powers = (time - time[-1]) ** np.arange(len(time))[:, None]
+        weight = np.linalg.solve(powers, np.arange(len(time)) == 1)
+        told = np.tensordot(weight, [pose for _, pose in seen[first:]], 1)
+        out = np.where(np.isfinite(out), out, told)
+    return out
+
+
 class Neighbourhood:
     """Predicts units from those about them that were found.
 

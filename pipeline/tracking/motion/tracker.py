@@ -10,8 +10,8 @@ from pipeline.tracking.detect import Relocaliser
 from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.light_slopes import LightSlopes
-from pipeline.tracking.motion.prediction import Neighbourhood
-from sim.core import Floats, Ints, Mask
+from pipeline.tracking.motion.prediction import Neighbourhood, latest_velocity
+from sim.core import Floats, Ints, Mask, Reals
 
 GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
 """Quality of a unit in a frame, and the reason why it is missing."""
@@ -28,8 +28,10 @@ _QUICK, _SHARP = 2.0, 0.7
 may be blurred by its motion where the exposure is not known."""
 _PARTS = np.linspace(0.0, 1.0, 9)
 """Exposures that are tried where none is told, over the interval of frames."""
-_TELLING, _FEW_QUICK = 5.0, 3
-"""Motion from frame to frame that tells of the exposure, px; number of units that must make it."""
+_TELLING, _FEW_QUICK, _ENOUGH = 5.0, 3, 5
+"""Motion from frame to frame that tells of the exposure, px; units that must make it; frames."""
+_PAST = 3
+"""Frames before one that tell of its velocities."""
 _GLARE = 0.4
 _MISFIT = 0.15
 """Residuals of a good fit, in contrasts of the unit; or so many times the reference frame's: """
@@ -57,7 +59,7 @@ class Shutter(NamedTuple):
     """Holds the shutter of a camera.
 
     Attributes:
-        exposure: of a row, s; without it, the first quick motion tells.
+        exposure: of a row, s; without it, the first quick motions tell.
         readout: from the first row to the last, s.
         noise: residuals to expect of the sensor's noise, levels.
     """
@@ -68,6 +70,20 @@ class Shutter(NamedTuple):
 
 
 _GLOBAL = Shutter()
+
+
+class MotionBlur(NamedTuple):
+    """Holds what a quick motion tells of the exposure.
+
+    Attributes:
+        time: of the frame, s.
+        exposure: which blurs as is seen, s.
+        speed: (units,) by which it does, mm/s; NaN of those that are not quick.
+    """
+
+    time: float
+    exposure: float
+    speed: Floats
 
 
 class TrackedFrame(NamedTuple):
@@ -96,6 +112,7 @@ class Tracker:
 
     Attributes:
         exposure: of a row, s; zero as long as it is not known.
+        blurs: by which it was measured, if it is not told.
     """
 
     def __init__(
@@ -112,6 +129,8 @@ class Tracker:
         self._shutter, self._blur, self._slopes = shutter, blur, slopes
         self.exposure = shutter.exposure or 0.0
         self._open = shutter.exposure is None and blur is not None
+        self.blurs: list[MotionBlur] = []
+        self._past: list[tuple[float, Floats]] = []
         self._time, self._interval = 0.0, 0.0
         self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
@@ -172,32 +191,41 @@ class Tracker:
         usual = self._usual if chosen is None else None
         return self._fitter.fit(image, pose, photometry, chosen, tight, usual, drift)
 
+    @property
+    def bend_share(self) -> Reals:
+        """Shares (units, 2) of accelerations that the blurred frame shows, as `ExposureBlur`."""
+        whole = np.ones((len(self._pose), 2), np.float16)
+        return whole if self._blur is None else self._blur.share.copy()
+
     def _measure_exposure(self, image: Picture, fits: PoseFits) -> None:
-        """Takes the exposure that leaves the least residuals of the units that are quick enough."""
+        """Takes the exposure that leaves the least residuals of the units that are quick enough.
+
+        It is the median of what the first such frames tell.
+        """
         way = np.linalg.norm(self._velocity[:, :2], axis=1) * self._interval / self._pixel
         quick = self._accepted(fits, _SHARE, sharp=False) & (way > _TELLING)
-        if quick.sum() < _FEW_QUICK:
+        quick &= np.isfinite([pose[:, 0] for _, pose in self._past]).all(axis=0)
+        if quick.sum() < _FEW_QUICK or len(self._past) < 2:
             return
         left = []
         for part in _PARTS:
             self.exposure = part * self._interval
             again = self._fit(image, fits.pose, fits.photometry, quick)
             left.append(float(np.nanmean((again.noise / again.photometry[:, 0])[quick] ** 2)))
-        best = int(np.argmin(left))
-        part = _PARTS[best]
-        if 0 < best < len(left) - 1:  # the lowest point of the parabola through it and those beside
-            before, here, after = left[best - 1 : best + 2]
-            part += 0.5 * (before - after) / (before - 2 * here + after) * _PARTS[1]
-        self.exposure = float(part) * self._interval
-        self._open = False
+        best = int(np.clip(np.argmin(left), 1, len(left) - 2))
+        near = slice(best - 1, best + 2)  # the blur's variance grows with the square of its length
+        bend, slope, _ = np.polyfit(_PARTS[near] ** 2, left[near], 2)
+        square = -0.5 * slope / bend if bend > 0 else _PARTS[np.argmin(left)] ** 2
+        told = float(np.sqrt(np.clip(square, 0.0, 1.0))) * self._interval
+        speed = np.where(quick, way / self._interval, np.nan) * self._pixel
+        self.blurs.append(MotionBlur(self._time, told, speed))
+        self.exposure = float(np.median([blur.exposure for blur in self.blurs]))
+        self._open = len(self.blurs) < _ENOUGH
 
     def _improve_velocity(self, pose: Floats) -> None:
-        """Takes the velocities from the poses of this frame, where they are found."""
-        if self._interval > 0:
-            now = (pose - self._pose) / self._interval
-            change = now - np.where(self._velocity == 0, now, self._velocity)
-            now = now + 0.5 * change  # at this frame's time, not half an interval before
-            self._velocity = np.where(np.isfinite(now), now, self._velocity)
+        """Takes the velocities at this frame from the poses of it and of those before."""
+        now = latest_velocity([*self._past, (self._time, pose)])
+        self._velocity = np.where(np.isfinite(now), now, self._velocity)
 
     def _predicted(self) -> Floats:
         """Extrapolates the poses by their velocities, and redraws the walls there."""
@@ -359,6 +387,8 @@ class Tracker:
         relative = fits.noise / np.abs(fits.photometry[:, 0])
         if not still:
             self._usual = np.where(good, relative, self._usual)
+        seen = np.where(good[:, None], fits.pose, np.nan)
+        self._past = [*self._past, (self._time, seen)][-_PAST:]
         self._pose = pose
         if good.mean() > _WHOLE:
             self._whole = pose

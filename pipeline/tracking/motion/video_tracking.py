@@ -21,14 +21,10 @@ from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_tem
 from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
-from pipeline.tracking.motion.camera_motion import (
-    at_frame_times,
-    camera_motion,
-    row_times,
-    subtract_motion,
-)
+from pipeline.tracking.motion.camera_motion import camera_motion, row_times, subtract_motion
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
+from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
 from pipeline.tracking.motion.tracker import Shutter, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
@@ -46,9 +42,11 @@ LOG = logging.getLogger(__name__)
 
 _USUAL = RecordingSetup()
 _End = BrokenOffError | KeyboardInterrupt
-_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float]
+_Row = tuple[float, int, Singles, Singles, NDArray[np.int8], bool, float, Reals]
 """Time, number, poses, sigma, quality, whether it is the one before again, likeness of residuals
-within blocks: what is kept of a frame."""
+within blocks, shares of accelerations that show: what is kept of a frame."""
+_OF_DOF = [0, 0, 1]
+"""Which of these shares a shift, or a rotation, has."""
 _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _CHANGED = 0.005
@@ -115,17 +113,19 @@ def track_video(
     offset = _centre_offset(shown.image, specimen, ways[0], calibration, setup.kind)
     tracker = _tracker(shown, specimen, calibration, setup)
     rows, ended = _track_frames(shown.frames, tracker, tell)
-    times, numbers, motion, sigmas, qualities, same, likeness = (
+    times, numbers, motion, sigmas, qualities, same, likeness, shares = (
         np.array(values) for values in zip(*rows, strict=True)
     )
-    exposure = tracker.exposure
+    exposure = setup.exposure or _exposure(tracker, motion, times)
     del rows, tracker
     if setup.exposure is None and exposure:
-        LOG.info("exposure, by the blur of quick motions: %.2g ms", 1000 * exposure)
+        LOG.info("exposure, by the blur of quick motions: %.3g ms", 1000 * exposure)
     time = times - times[0]
+    missed = np.zeros_like(motion)
     if setup.readout or exposure:
         late = row_times(motion, specimen, calibration, setup)
-        motion = at_frame_times(motion, time, late, exposure)
+        bend = exposure**2 / 24 * shares[..., _OF_DOF]
+        motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, shown.averaged)
     motion = _since_rest(motion, shown.averaged, offset)
     _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
@@ -135,9 +135,20 @@ def track_video(
     sigma = uncertainty.calibrate_sigma(
         motion, sigmas, specimen.centre, steady, time, shown.averaged, coded
     )
-    sigma[~np.isfinite(motion)] = np.nan
+    sigma = np.where(np.isfinite(motion), np.hypot(sigma, np.sqrt(missed)), np.nan)
     start = float(times[0])
     return Track(time, start, numbers, motion, sigma, qualities, faults, calibration, ended)
+
+
+def _exposure(tracker: Tracker, motion: Reals, times: Floats) -> float:
+    """Returns the exposure that blurs as was seen, by speeds that later frames tell as well."""
+    found = []
+    for blur in tracker.blurs:
+        speed = middle_speed(motion.astype(float), times, int(np.searchsorted(times, blur.time)))
+        ratio = blur.speed / speed
+        known = np.isfinite(ratio)
+        found.append(blur.exposure * float(np.median(ratio[known])) if known.any() else np.nan)
+    return float(np.nanmedian(found)) if np.isfinite(found).any() else tracker.exposure
 
 
 def _since_rest(motion: Reals, count: int, offset: Singles) -> Reals:
@@ -219,7 +230,8 @@ def _track_frames(
             pose = fits.pose.astype(np.float32)
             same = before is not None and _same(before, frame.image)
             before, like = frame.image, uncertainty.residual_likeness(fits)
-            rows.append((frame.time, frame.index, pose, sigma, quality.astype(np.int8), same, like))
+            kept = pose, sigma, quality.astype(np.int8), same, like, tracker.bend_share
+            rows.append((frame.time, frame.index, *kept))
             if tell is not None:
                 tell()
     except (BrokenOffError, KeyboardInterrupt) as error:
