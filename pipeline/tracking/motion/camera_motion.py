@@ -1,13 +1,51 @@
 """Takes out of motions what the camera adds: drifts, knocks, rows that are read later."""
 
+import logging
+
 import numpy as np
 
+from pipeline.runtime import UserError
 from pipeline.tracking.geometry import SpecimenOutlines, rigid_motion, rotation_matrix
 from pipeline.tracking.reference_frame import CameraCalibration, RecordingSetup
 from sim.core import Floats, Mask, Reals
 
+LOG = logging.getLogger(__name__)
+
 _LEAST = 2
 """Clamped units that tell of the camera."""
+_MOVED = 0.2
+"""Motion of all clamped units that is told of, px."""
+
+
+def remove_camera_motion(
+    motion: Reals, sigma: Reals, specimen: SpecimenOutlines, pixel: float, setup: RecordingSetup
+) -> None:
+    """Takes out, in place, what all clamped units do together, or tells of it.
+
+    Raises:
+        UserError: the camera is to follow supports, and fewer than two are in view.
+    """
+    held = np.zeros(specimen.count, bool) if setup.held is None else setup.held
+    common = camera_motion(motion, sigma, specimen.centre, held)
+    if common is None:
+        if setup.follows_supports:
+            raise UserError(
+                f"{np.count_nonzero(held)} clamped units are in the design, fewer than two in view",
+                key="camera",
+                value="follows supports",
+                remedy="write `camera: fixed`, or film so that clamped units are in view",
+            )
+        return
+    if setup.follows_supports:
+        subtract_motion(motion, specimen.centre, common)
+        return
+    ends = np.abs(common[:, :2]).max() / pixel
+    if ends > _MOVED:
+        LOG.warning(
+            "warning: all clamped units move together, by up to %.2f px: the camera moved, or what"
+            " holds them; `camera: follows supports` takes it out",
+            ends,
+        )
 
 
 def camera_motion(motion: Reals, sigma: Reals, centre: Floats, held: Mask) -> Floats | None:

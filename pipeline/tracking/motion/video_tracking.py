@@ -21,7 +21,7 @@ from pipeline.tracking.fit import ExposureBlur, PoseFitter, SideWalls, learn_tem
 from pipeline.tracking.frames import BrokenOffError, Frame
 from pipeline.tracking.geometry import SpecimenOutlines, arm_swing
 from pipeline.tracking.motion import uncertainty
-from pipeline.tracking.motion.camera_motion import camera_motion, row_times, subtract_motion
+from pipeline.tracking.motion.camera_motion import remove_camera_motion, row_times
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
@@ -51,8 +51,6 @@ _CODED = 1.8
 """Likeness from which on a codec is at work."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
-_MOVED = 0.2
-"""Motion of all clamped units that is told of, px."""
 
 
 class Track(NamedTuple):
@@ -127,7 +125,7 @@ def track_video(
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, shown.averaged)
     motion = _since_rest(motion, shown.averaged, offset)
-    _remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
+    remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
     steady = faults != DUPLICATE
     later = likeness[1:][np.isfinite(likeness[1:])]
@@ -161,37 +159,6 @@ def _since_rest(motion: Reals, count: int, offset: Singles) -> Reals:
         motion = motion - np.nan_to_num(np.nanmean(motion[:count], axis=0))
     motion[..., :2] += arm_swing(motion[..., 2], offset)
     return motion
-
-
-def _remove_camera_motion(
-    motion: Reals, sigma: Reals, specimen: SpecimenOutlines, pixel: float, setup: RecordingSetup
-) -> None:
-    """Takes out, in place, what all clamped units do together, or tells of it.
-
-    Raises:
-        UserError: the camera is to follow supports, and fewer than two are in view.
-    """
-    held = np.zeros(specimen.count, bool) if setup.held is None else setup.held
-    common = camera_motion(motion, sigma, specimen.centre, held)
-    if common is None:
-        if setup.follows_supports:
-            raise UserError(
-                f"{np.count_nonzero(held)} clamped units are in the design, fewer than two in view",
-                key="camera",
-                value="follows supports",
-                remedy="write `camera: fixed`, or film so that clamped units are in view",
-            )
-        return
-    if setup.follows_supports:
-        subtract_motion(motion, specimen.centre, common)
-        return
-    ends = np.abs(common[:, :2]).max() / pixel
-    if ends > _MOVED:
-        LOG.warning(
-            "warning: all clamped units move together, by up to %.2f px: the camera moved, or what"
-            " holds them; `camera: follows supports` takes it out",
-            ends,
-        )
 
 
 def _centre_offset(
