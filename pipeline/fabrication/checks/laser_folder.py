@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from pipeline.fabrication.checks.assembled_specimen import check_outline
 from pipeline.fabrication.checks.bill_checks import check_shim_pieces
 from pipeline.fabrication.checks.package_record import NOMINAL, PackageRecord
 from pipeline.fabrication.checks.sheet_checks import (
+    INNER,
     REFERENCE,
     TOLERANCE,
     check_compensation,
@@ -17,8 +19,10 @@ from pipeline.fabrication.checks.sheet_checks import (
     check_form,
     check_scale,
     check_sheet,
+    check_tabs,
+    rectangle_sides,
 )
-from pipeline.fabrication.papers import BILL
+from pipeline.fabrication.papers import BILL, read_bill
 from pipeline.fabrication.readback import BUG, Curve, Drawing, Fault, read_drawing
 from pipeline.problem.sections import Fabrication
 from sim.core import Floats
@@ -34,11 +38,13 @@ def check_laser(record: PackageRecord) -> Iterator[Fault]:
     for label, shape, file in outlines:
         if label in record.expected.polygons:
             yield from check_outline(label, file, shape, record.shapes)
+    yield from _check_pins(record)
     shims = variants.get(("shims", NOMINAL), [])
     yield from check_shim_pieces(record.folder / BILL, shims)
     for drawing in (drawing for sheets in variants.values() for drawing in sheets):
         yield from check_curves(drawing)
         yield from check_sheet(drawing, settings.laser, _thickness(drawing.file, settings))
+        yield from check_tabs(drawing, settings)
         yield from _check_formats(drawing, settings)
     yield from _check_kerfs(record)
 
@@ -46,9 +52,37 @@ def check_laser(record: PackageRecord) -> Iterator[Fault]:
 def _thickness(file: Path, settings: Fabrication) -> float:
     """Looks up the material that a sheet is cut from, by the file's name; mm."""
     foil = settings.shims.thickness
-    kinds = {"units": settings.thickness, "coupon": settings.thickness}
-    kinds |= {"shims": foil, "strips": foil}
+    kinds = {"units": settings.laser_sheet_thickness, "coupon": settings.thickness, "shims": foil}
     return kinds.get(file.name.partition("_")[0], settings.laser.template_thickness)
+
+
+def _check_pins(record: PackageRecord) -> Iterator[Fault]:
+    """Checks holes for pins: as many as pins in the bill, true to size, walls around each.
+
+    All layers of a unit are cut by one drawing: a stack of them is aligned where its pins are.
+    """
+    settings, found = record.settings, 0
+    for drawing in record.drawings.get(("units", NOMINAL), []):
+        outlines = dict(drawing.outlines())
+        for part, curves in drawing.parts().items():
+            holes = [curve.polygon for curve in curves if curve.layer == INNER and curve.closed]
+            found += len(holes)
+            walls = [float(outlines[part].exterior.distance(hole)) for hole in holes]
+            walls += [float(one.distance(other)) for one, other in combinations(holes, 2)]
+            if min(walls, default=settings.minimum_wall) < settings.minimum_wall - TOLERANCE:
+                what = f"a wall of {min(walls):.2f} mm beside a pin"
+                shown = (outlines[part], holes[0])
+                yield drawing.fault(what, part, shown, "laser.pin", "take thinner pins")
+            for hole in holes:
+                width = rectangle_sides(hole)[1]
+                if abs(width - settings.laser.pin) > TOLERANCE:
+                    what = f"a hole of {width:.3f} mm for pins of {settings.laser.pin:g} mm"
+                    yield drawing.fault(what, part, (hole,), "laser.pin")
+    path = record.folder / BILL
+    listed = sum(int(row["count"]) for row in read_bill(path) if row["item"] == "pin")
+    if listed != found:
+        what = f"{listed} pins for {found} holes"
+        yield Fault("the bill of materials", what, "laser.pin", BUG, path)
 
 
 def _check_formats(drawing: Drawing, settings: Fabrication) -> Iterator[Fault]:
@@ -65,7 +99,7 @@ def _check_formats(drawing: Drawing, settings: Fabrication) -> Iterator[Fault]:
 def _difference(one: Drawing, other: Drawing) -> str | None:
     """Compares two files of one sheet; one goes part by part, another layer by layer."""
     pairs = [sorted(drawing.curves, key=lambda curve: curve.layer) for drawing in (one, other)]
-    ours, theirs = ([(c.part, c.layer, c.closed) for c in curves] for curves in pairs)
+    ours, theirs = ([(c.part, c.layer, c.closed, len(c.tabs)) for c in cs] for cs in pairs)
     if ours != theirs:
         return f"other parts, layers or another order than in {one.file.name}"
     for mine, yours in zip(*pairs, strict=True):

@@ -10,16 +10,16 @@ from shapely import Geometry, STRtree, affinity
 from pipeline.fabrication.checks.package_record import NOMINAL
 from pipeline.fabrication.plates import MITRE
 from pipeline.fabrication.readback import MILLIMETRES, OUTER, Curve, Drawing, Fault, closest
-from pipeline.problem.sections import Laser
+from pipeline.problem.sections import Fabrication, Laser
 from sim.core import Floats
 
 REFERENCE = "REFERENCE"
 TOLERANCE = 1e-3
 """Lengths of a drawing are right to this, mm."""
 
-_INNER, _ENGRAVE = "CUT_INNER", "ENGRAVE"
-_LAYERS = (_INNER, OUTER, _ENGRAVE, "SCORE", REFERENCE)
-_CUTS = (_INNER, OUTER)
+INNER, _ENGRAVE = "CUT_INNER", "ENGRAVE"
+_LAYERS = (INNER, OUTER, _ENGRAVE, "SCORE", REFERENCE)
+_CUTS = (INNER, OUTER)
 _CUT_KINDS = ("LWPOLYLINE", "POLYLINE", "CIRCLE", "PATH", "POLYGON", "RECT")
 _LINE_KINDS = (*_CUT_KINDS, "LINE", "SIMPLELINE", "ARC")
 _SHORTEST = 1e-4  # mm; segments below this count as none, so do gaps
@@ -48,7 +48,7 @@ def check_curves(drawing: Drawing) -> Iterator[Fault]:
     for part, curves in drawing.parts().items():
         outer = [c.polygon for c in curves if c.layer == OUTER and c.closed and len(c.points) > 2]
         for curve in curves:
-            if curve.layer == _INNER and not any(area.contains(curve.line) for area in outer):
+            if curve.layer == INNER and not any(area.contains(curve.line) for area in outer):
                 what = f"an inner cut outside of {part or 'a part'}"
                 yield drawing.fault(what, part, (curve.line,))
 
@@ -67,7 +67,7 @@ def check_form(drawing: Drawing) -> Iterator[Fault]:
             yield drawing.fault(what, curve.part, (curve.line,))
         if curve.layer == OUTER:
             cut_out.add(curve.part)
-        elif curve.layer == _INNER and curve.part in cut_out:
+        elif curve.layer == INNER and curve.part in cut_out:
             what = "an inner cut comes after the outer one"
             yield drawing.fault(what, curve.part, (curve.line,))
 
@@ -111,15 +111,39 @@ def check_sheet(drawing: Drawing, laser: Laser, thickness: float) -> Iterator[Fa
     yield from _check_places(drawing, laser)
     kerf = 0.0 if drawing.file.stem.endswith(NOMINAL) else laser.kerf
     for curve in drawing.curves:
-        if curve.layer == _INNER and curve.closed:
+        if curve.layer == INNER and curve.closed:
             width = rectangle_sides(curve.polygon)[0] + kerf
             if width < thickness - TOLERANCE:
                 what = f"a hole {width:.2f} mm wide in material of {thickness:g} mm"
                 remedy = "take thinner material, or ask for larger dots"
                 remedy = f"{remedy} (fabrication.markers.diameter)"
-                shown, key = (curve.line,), "laser.template_thickness"
-                yield drawing.fault(what, curve.part, shown, key, remedy)
+                key = "laser.template_thickness"
+                if drawing.file.name.startswith("units"):
+                    remedy, key = "take thicker pins", "laser.pin"
+                yield drawing.fault(what, curve.part, (curve.line,), key, remedy)
     yield from _check_letters(drawing)
+
+
+def check_tabs(drawing: Drawing, settings: Fabrication) -> Iterator[Fault]:
+    """Checks that pieces of foil, and no other parts, hang on the tabs asked for, within slots."""
+    asked = settings.shims.tabs if drawing.file.name.startswith("shims") else None
+    kerf = 0.0 if drawing.file.stem.endswith(NOMINAL) else settings.laser.kerf
+    for curve in (curve for curve in drawing.curves if curve.layer == OUTER):
+        count, key = 0 if asked is None else asked.count, "shims.tabs"
+        if len(curve.tabs) != count:
+            what = f"{len(curve.tabs)} tabs instead of {count}"
+            yield drawing.fault(what, curve.part, (curve.line,), key)
+        elif asked is not None:
+            low, high = curve.points.min(axis=0), curve.points.max(axis=0)
+            ends = curve.tabs.reshape(-1, 2)
+            along, across = np.minimum(ends - low, high - ends).T
+            wide = np.linalg.norm(np.diff(curve.tabs, axis=1), axis=-1) - kerf
+            if np.abs(wide - asked.width).max() > _KERF_TOLERANCE:
+                what = f"a tab {wide.max():.3f} mm wide instead of {asked.width:g} mm"
+                yield drawing.fault(what, curve.part, (curve.line,), key)
+            if across.max() > TOLERANCE or along.max() > settings.slots.depth_min + kerf:
+                what = "a tab that is not on a long edge, within the slots"
+                yield drawing.fault(what, curve.part, (curve.line,), key)
 
 
 def check_scale(drawing: Drawing, laser: Laser) -> Iterator[Fault]:

@@ -75,8 +75,9 @@ def _add_part(space: Modelspace, part: FlatPart) -> Iterator[Any]:
         yield _add_line(space, stroke, "SCORE")
     for hole in part.holes:
         yield space.add_circle(hole.centre, hole.diameter / 2, dxfattribs={"layer": "CUT_INNER"})
-    outline = np.asarray(part.outline.exterior.coords)[:-1]
-    yield _add_line(space, outline, "CUT_OUTER", closed=True)
+    for cut in part.cuts:
+        whole = not part.tabs
+        yield _add_line(space, cut[:-1] if whole else cut, "CUT_OUTER", closed=whole)
 
 
 def _add_line(space: Modelspace, points: Floats, layer: str, *, closed: bool = False) -> Any:  # noqa: ANN401
@@ -125,8 +126,9 @@ def _shapes(layer: str, sheet: LaserSheet) -> Iterator[str]:
             x, y, radius = hole.centre[0], height - hole.centre[1], hole.diameter / 2
             yield f'<circle cx="{_number(x)}" cy="{_number(y)}" r="{_number(radius)}"/>'
         if layer == "CUT_OUTER":
-            outline = np.asarray(part.outline.exterior.coords)[:-1]
-            yield f'<path inkscape:label="{part.id}" d="M{_pairs(outline, height)}Z"/>'
+            for cut in part.cuts:
+                way = _pairs(cut, height) if part.tabs else f"{_pairs(cut[:-1], height)}Z"
+                yield f'<path inkscape:label="{part.id}" d="M{way}"/>'
 
 
 def _pairs(points: Floats, height: float) -> str:

@@ -12,7 +12,6 @@ from pipeline.fabrication.fixtures import (
     coupon_solid,
     fixtures,
     shim_pieces,
-    strip_parts,
     templates,
 )
 from pipeline.fabrication.parts import BuiltSpecimen, FlatPart, PrintedPart, unit_solid
@@ -81,8 +80,6 @@ class PackageFolder:
         spacing, gap = self.problem.lattice.spacing, self.problem.lattice.ligament_length
         yield "units", [unit.part for unit in specimen.units]
         yield "shims", shim_pieces(specimen, settings)
-        if settings.shims.strips:
-            yield "strips", strip_parts(specimen, settings)
         yield "template", list(templates(specimen, spacing, settings))
         yield "comb", [comb(specimen, spacing, gap, settings)]
         yield "coupon", [coupon(settings)]

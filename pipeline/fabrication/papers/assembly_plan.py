@@ -1,14 +1,14 @@
 """Draws the specimen for its assembly, at true scale over as few pages as hold it."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from pipeline.fabrication.papers.pdf_paper import BOLD, GREY, PALE, POINT, SIGNAL, Box, PdfDocument
-from pipeline.fabrication.parts import BuiltSpecimen, Ligament, Unit, column_letters
+from pipeline.fabrication.parts import BuiltSpecimen, Ligament, Slot, Unit, column_letters
 from sim.core import Floats
 
 OVERLAP = 12.0
@@ -25,8 +25,14 @@ WORST = 10
 _CROSS = 3.0
 _ID, _SMALLEST = 6.5, 3.0  # points
 _ASPECT = 0.75  # a letter's width to its size, with some room
-_NUMBER = 4.5
+_NUMBER, _DIGIT = 7.5, (0.556, 0.71)  # points; width and height of a digit to its size
+_AROUND = 0.25  # mm around a number
+_FAR = 3.2  # mm from its shim, beyond which a line leads to it
 _RING = 2.5  # mm
+_DISTANCES = np.array([1.8, 2.4, 3.0, 3.7, 4.5, 5.5, 6.5, 8.0])  # mm from the shim's middle
+_TURNS = np.deg2rad(np.arange(0.0, 360.0, 15.0) + 45.0)
+_CROSSED = 3.0  # mm farther are as bad as the line of another shim beneath
+_COVERED = 100.0  # mm^-2 for what must not be covered
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,19 @@ class AssemblyPlan:
             for ligament in shim.ligaments
         }
         self._worst = {ligament.number for ligament in specimen.bent[:WORST]}
+        self._paths = _shim_paths(specimen)
+        self._numbers = self._place_numbers()
+
+    def _place_numbers(self) -> dict[int, tuple[float, float]]:
+        """Finds the middles of the shims' numbers, clear of ids and arrows."""
+        ligaments = [one for one in self._specimen.ligaments if one.number in self._paths]
+        middles = {one.number: np.array(one.middle) for one in ligaments}
+        sizes = {number: _number_size(self._number(number)) for number in middles}
+        taken = [box for unit in self._specimen.units for box in _written_boxes(unit)]
+        return number_places(middles, sizes, self._paths, taken)
+
+    def _number(self, ligament: int) -> str:
+        return str(self._kind[ligament] + 1)
 
     @property
     def box(self) -> Box:
@@ -119,6 +138,8 @@ class AssemblyPlan:
                     self._unit(unit, origin)
             for ligament in self._specimen.ligaments:
                 self._ligament(ligament, origin)
+            for ligament in self._specimen.ligaments:
+                self._shim_number(ligament, origin)
             self._headings(origin)
         self._joints(tile, origin)
 
@@ -141,7 +162,7 @@ class AssemblyPlan:
         held = unit.label in {*self._specimen.clamped, *self._specimen.driven}
         fill = "#dccdee" if held else PALE
         self._sheet.polygon(np.asarray(unit.outline.exterior.coords)[:-1] + origin, fill)
-        name = f"{unit.label}={unit.letter}" if unit.letter else unit.label
+        name = _name(unit)
         x, y, size = _name_place(unit, name)
         place = np.array([x, y - 0.12 * size]) + origin
         self._sheet.text(place[0], place[1], name, size, BOLD, at="middle")
@@ -149,21 +170,31 @@ class AssemblyPlan:
             self._sheet.line(np.asarray(stroke) + origin, 0.25, SIGNAL)
 
     def _ligament(self, ligament: Ligament, origin: Floats) -> None:
-        """Draws the shim from slot end to slot end, with its number between the units."""
-        ends = (self._specimen.by_label[label] for label in ligament.labels)
-        slots = [slot for unit in ends for slot in unit.slots if slot.ligament == ligament.number]
-        if len(slots) != 2:
+        """Draws the shim from slot end to slot end, with a ring if it is one of the worst."""
+        if ligament.number not in self._paths:
             return
-        first, second = slots
-        kind = self._kind[ligament.number]
-        tone = TONES[kind % len(TONES)]
-        path = np.array([first.end, first.mouth, second.mouth, second.end])
-        self._sheet.line(path + origin, 0.3, tone)
-        x, y = np.array(ligament.middle) + origin
+        self._sheet.line(self._paths[ligament.number] + origin, 0.3, self._tone(ligament))
         if ligament.number in self._worst:
-            ring = np.asarray(shapely.Point(x, y).buffer(_RING).exterior.coords)
-            self._sheet.line(ring, 0.4, SIGNAL)
-        self._sheet.text(x + 0.4, y + 0.4, str(kind + 1), _NUMBER, colour=tone)
+            spot = shapely.Point(np.array(ligament.middle) + origin)
+            self._sheet.line(np.asarray(spot.buffer(_RING).exterior.coords), 0.4, SIGNAL)
+
+    def _tone(self, ligament: Ligament) -> str:
+        return TONES[self._kind[ligament.number] % len(TONES)]
+
+    def _shim_number(self, ligament: Ligament, origin: Floats) -> None:
+        """Writes the number of a shim on white, and leads a line to it from farther away."""
+        if ligament.number not in self._numbers:
+            return
+        middle, spot = np.array(ligament.middle), np.array(self._numbers[ligament.number])
+        words, tone = self._number(ligament.number), self._tone(ligament)
+        if np.linalg.norm(spot - middle) > _FAR:
+            self._sheet.line(np.array([middle, spot]) + origin, 0.12, tone)
+        half = np.array(_number_size(words)) / 2
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        self._sheet.polygon(spot + corners + origin, width=0.0)
+        x, y = spot + origin
+        low = y - _DIGIT[1] * _NUMBER / POINT / 2
+        self._sheet.text(x, low, words, _NUMBER, colour=tone, at="middle")
 
     def _headings(self, origin: Floats) -> None:
         """Writes letters of the columns below and above, numbers of the rows left and right."""
@@ -200,9 +231,80 @@ class AssemblyPlan:
                     self._sheet.line(np.array([centre - step, centre + step]), 0.15)
 
 
+def _shim_paths(specimen: BuiltSpecimen) -> dict[int, Floats]:
+    """Traces shims from slot end to slot end: (4, 2) by id."""
+    slots: dict[int, list[Slot]] = {}
+    for unit in specimen.units:
+        for slot in unit.slots:
+            slots.setdefault(slot.ligament, []).append(slot)
+    return {
+        number: np.array([pair[0].end, pair[0].mouth, pair[1].mouth, pair[1].end])
+        for number, pair in slots.items()
+        if len(pair) == 2
+    }
+
+
+def _number_size(words: str) -> tuple[float, float]:
+    """Measures the box of a number, mm."""
+    wide, high = _DIGIT
+    size = _NUMBER / POINT
+    return wide * size * len(words) + 2 * _AROUND, high * size + 2 * _AROUND
+
+
+def _name(unit: Unit) -> str:
+    return f"{unit.label}={unit.letter}" if unit.letter else unit.label
+
+
+def _written_boxes(unit: Unit) -> Iterator[tuple[float, float, float, float]]:
+    """Yields the boxes of a unit's id and of its arrow on the plan."""
+    x, y, size = _name_place(unit, _name(unit))
+    half = _ASPECT * len(_name(unit)) * size / POINT / 2
+    yield x - half, y - 0.45 * size / POINT, x + half, y + 0.45 * size / POINT
+    if unit.mark:
+        yield shapely.MultiLineString(list(unit.mark)).bounds
+
+
 def _name_place(unit: Unit, name: str) -> tuple[float, float, float]:
     """Finds the middle of a unit, where it is widest, and the size of type that fits there."""
     circle = shapely.maximum_inscribed_circle(unit.outline, tolerance=0.05)
     (x, y), radius = circle.coords[0], float(circle.length)
     fitting = 2.0 * radius * POINT / (_ASPECT * len(name))
     return x, y, min(_ID, max(_SMALLEST, fitting))
+
+
+def number_places(
+    middles: Mapping[int, Floats],
+    sizes: Mapping[int, tuple[float, float]],
+    paths: Mapping[int, Floats],
+    taken: Sequence[tuple[float, float, float, float]],
+) -> dict[int, tuple[float, float]]:
+    """Finds the middle of each number, near to its shim and clear of all else.
+
+    Args:
+        middles: (2,) of shims, mm, by id.
+        sizes: width and height of the numbers' boxes, by id.
+        paths: (n, 2) lines of the shims, by id.
+        taken: boxes (left, bottom, right, top) of ids and arrows.
+    """
+    reach, turn = (grid.ravel() for grid in np.meshgrid(_DISTANCES, _TURNS, indexing="ij"))
+    aside = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    lines, owners = [shapely.LineString(path) for path in paths.values()], np.array(list(paths))
+    tree, boxes = shapely.STRtree(lines), np.array(taken, dtype=float).reshape(-1, 4)
+    places = {}
+    for number, middle in middles.items():
+        half, spots = np.array(sizes[number]) / 2, middle + aside
+        corners = np.column_stack([spots - half, spots + half])
+        over, under = tree.query(shapely.box(*corners.T), "intersects")
+        crossed = np.bincount(over[owners[under] != number], minlength=len(spots))
+        cost = reach + _CROSSED * crossed + _COVERED * _covered(corners, boxes)
+        best = int(np.argmin(np.round(cost, 6)))
+        places[number] = (float(spots[best, 0]), float(spots[best, 1]))
+        boxes = np.vstack([boxes, corners[best]])
+    return places
+
+
+def _covered(boxes: Floats, others: Floats) -> Floats:
+    """Measures the areas (n,) that boxes (n, 4) share with others (m, 4)."""
+    low = np.maximum(boxes[:, None, :2], others[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], others[None, :, 2:])
+    return np.asarray(np.clip(high - low, 0.0, None).prod(axis=-1).sum(axis=-1))

@@ -188,9 +188,10 @@ def assembly_steps(
         "column (from the left), a number for the row (from the bottom). The id is on the "
         "underside of a printed unit and on top of a cut one; the arrow beside it points to the "
         f"top of the plan, as does a ring at the upper end.{letters}",
-        f"Cut and sort {pieces} shims and the spares by their length (next pages); on the sheet "
-        "the first of each length tells it in mm and is a spare. Numbers and colours on the plan "
-        "are those of the list. A shim is as wide as a unit is high.",
+        *_layers_step(specimen, settings),
+        f"{_foil_words(settings)} Sort {pieces} shims and the spares by their length (next pages); "
+        "on the sheet the first of each length tells it in mm and is a spare. Numbers and colours "
+        "on the plan are those of the list. A shim is as wide as a unit is high.",
         f"Try a shim in the coupon first: the slots are made {settings.slot_width:.2f} mm wide for "
         f"a foil of {settings.shims.thickness:g} mm. If it is loose or stuck, change "
         "fabrication.slots.clearance and make the package again.",
@@ -210,6 +211,31 @@ def assembly_steps(
         room = "Where neighbours leave an adapter no room for fingers, glue it on."
         steps.append(f"Fix the adapter or the grip of the drive to: {driven}. {room}")
     return [*steps, "Lift the specimen out of the jig and move it by hand: no shim may slip."]
+
+
+def _foil_words(settings: Fabrication) -> str:
+    """Tells how the shims leave their sheet."""
+    tabs = settings.shims.tabs
+    if tabs is None:
+        return "Cut the shims; each comes free from the foil."
+    return (
+        f"Each shim hangs in its sheet by tabs of {tabs.width:g} mm ({tabs.count} a shim): keep "
+        "the sheets whole, twist out what the next row takes, and trim what stands out of an edge."
+    )
+
+
+def _layers_step(specimen: BuiltSpecimen, settings: Fabrication) -> list[str]:
+    """Writes the step on units that are cut in layers; none if a laser cuts them whole or not."""
+    if not settings.laminated:
+        return []
+    few = [unit.label for unit in specimen.units if len(unit.pins) < 2]
+    alone = f" {len(few)} units have room for one pin or none (bill); their pocket aligns them."
+    return [
+        f"Units by laser: cut the drawing {settings.laser_layers} times from sheet of "
+        f"{settings.laser_sheet_thickness:.2f} mm, stack the layers of a unit on pins of "
+        f"{settings.laser.pin:g} mm in its pocket of the jig, ids up, and glue."
+        + (alone if few else "")
+    ]
 
 
 def _bent_step(specimen: BuiltSpecimen) -> list[str]:

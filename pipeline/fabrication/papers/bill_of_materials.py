@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 
 from shapely import LineString
@@ -40,7 +40,8 @@ class BillRow:
     """Holds one line of the bill. Lengths in mm, areas in mm^2, volumes in mm^3, masses in g.
 
     Attributes:
-        item: unit, shim, ligament, sheet, plate, fixture or total.
+        item: unit, shim, ligament, pin, sheet, plate, fixture, foil (how shims may be handled) or
+            total.
         id: of the part, the units that a ligament joins, or path of the file in the package.
         count: pieces.
         area, volume: of one piece; the volume as if it were solid.
@@ -126,12 +127,16 @@ def bill(
         note = f"shim {kinds[ligament.number]}; {prebend_words(ligament)}"
         yield BillRow("ligament", ligament.name, 1, length=ligament.length, note=note)
     for file, parts in contents.items():
-        note = _counted(len(parts), "part")
+        note, count = _counted(len(parts), "part"), 1
         if file.startswith("laser/units_"):
             note += f"; {settings.laser_route}"
+            count = settings.laser_layers if settings.laminated else 1
         if file in prints:
             note += f"; {_print_words(prints[file], settings)}"
-        yield BillRow(_KINDS[file.partition("/")[0]], file, 1, note=note)
+        yield BillRow(_KINDS[file.partition("/")[0]], file, count, note=note)
+    if settings.laminated:
+        yield _pins(specimen, settings)
+    yield from _foil(specimen, settings, contents)
     mass, volume = _sum(units, "mass"), _sum(units, "volume")
     solid = volume * settings.solid_density * _GRAMS
     fill = f"print {100 * infill:.0f} % full"
@@ -141,10 +146,7 @@ def bill(
     yield BillRow("total", "units", len(units), volume=volume, mass=mass, note=note)
     mass, volume = _sum(shims, "mass"), _sum(shims, "volume")
     count = sum(row.count for row in shims)
-    joined = strip_parts(specimen, settings)
-    note = f"polyester; {_cut_words(shim_pieces(specimen, settings))}"
-    note += f"; {_counted(len(joined), 'strip')} in the place of all: {_cut_words(joined)}"
-    yield BillRow("total", "shims", count, volume=volume, mass=mass, note=note)
+    yield BillRow("total", "shims", count, volume=volume, mass=mass, note="polyester")
     every = prints.values()
     whole = PrintEstimate(sum(p.seconds for p in every), sum(p.filament for p in every))
     volume = whole.filament * STRAND
@@ -207,13 +209,42 @@ def prebend_words(ligament: Ligament) -> str:
     )
 
 
-def _cut_words(parts: Sequence[FlatPart]) -> str:
+def _pins(specimen: BuiltSpecimen, settings: Fabrication) -> BillRow:
+    """Describes the pins that align layers; names the units that have room for less than two."""
+    counts = {unit.label: len(unit.pins) for unit in specimen.units}
+    note = f"aligns {settings.laser_layers} layers"
+    for count, words in ((1, "one pin only"), (0, "no room for a pin: the jig alone aligns")):
+        if few := [label for label, pins in counts.items() if pins == count]:
+            note += f"; {words}: {', '.join(few)}"
+    pin, total = settings.laser.pin, sum(counts.values())
+    return BillRow(
+        "pin", f"PIN{pin:g}", total, length=settings.thickness, width=pin, height=pin, note=note
+    )
+
+
+def _foil(
+    specimen: BuiltSpecimen, settings: Fabrication, contents: Mapping[str, Sequence[str]]
+) -> Iterator[BillRow]:
+    """Describes the ways to handle shims: parts, and the cuts that they take."""
+    tabs = settings.shims.tabs
+    pieces = shim_pieces(specimen, settings)
+    free = [replace(piece, tabs=()) for piece in pieces]
+    sheets = [file for file in contents if file.startswith("laser/shims_") and "nominal" in file]
+    joined = strip_parts(specimen, settings)
+    yield _way("free pieces", len(free), free, drawn=tabs is None)
+    if tabs is not None:
+        yield _way("sheets of pieces on tabs", len(sheets), pieces, drawn=True)
+    yield _way("strips, one a row and a column", len(joined), joined, drawn=False)
+
+
+def _way(name: str, count: int, parts: Sequence[FlatPart], *, drawn: bool) -> BillRow:
     """Tells the cuts and scored lines of foil, and their time on a laser cutter."""
-    lines = [part.outline.exterior for part in parts]
-    lines += [LineString(score) for part in parts for score in part.scores]
-    path = sum(line.length for line in lines)
+    lines = [line for part in parts for line in (*part.cuts, *part.scores)]
+    path = sum(LineString(line).length for line in lines)
     minutes = (path / _FEED + len(lines) * _START) / 60.0
-    return f"{_counted(len(lines), 'cut')} of {path / 1000.0:.2f} m, about {minutes:.1f} min"
+    note = f"{_counted(len(lines), 'cut')} of {path / 1000.0:.2f} m, about {minutes:.1f} min"
+    note += "; drawn" if drawn else "; for comparison, not drawn"
+    return BillRow("foil", name, count, length=path, note=note)
 
 
 def _print_words(found: PrintEstimate, settings: Fabrication) -> str:

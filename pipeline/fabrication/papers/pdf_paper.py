@@ -87,12 +87,12 @@ class PdfDocument:
         self.canvas.drawPath(self._path(points), stroke=1, fill=0)
 
     def polygon(self, points: Floats, fill: str = "#ffffff", width: float = 0.15) -> None:
-        """Draws a closed polygon (n, 2), outlined in ink."""
+        """Draws a closed polygon (n, 2), outlined in ink if the line has a width."""
         self._pen(width, INK)
         self.canvas.setFillColor(fill)
         path = self._path(points)
         path.close()
-        self.canvas.drawPath(path, stroke=1, fill=1)
+        self.canvas.drawPath(path, stroke=int(width > 0.0), fill=1)
 
     def dashed(self, points: Floats, colour: str = GREY) -> None:
         """Draws a thin dashed line."""

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import shapely
 from shapely import Geometry, Polygon
+from shapely.ops import substring
 
 from pipeline.runtime import UserError
 from sim.core import Floats
@@ -58,7 +60,7 @@ class UnbuildableUnitError(UserError):
 
 @dataclass(frozen=True)
 class Circle:
-    """Holds a round hole, or a dot."""
+    """Holds a round hole, a dot, or a place of an outline that is not cut."""
 
     centre: tuple[float, float]
     diameter: float
@@ -75,6 +77,7 @@ class FlatPart:
         holes: inside the outline.
         engraving: lettering and orientation mark, to be read from the top.
         scores: lines to fold or to mark along.
+        tabs: where the outline is not cut, so that its sheet holds the part.
     """
 
     id: str
@@ -83,6 +86,21 @@ class FlatPart:
     holes: tuple[Circle, ...] = ()
     engraving: Strokes = ()
     scores: Strokes = ()
+    tabs: tuple[Circle, ...] = ()
+
+    @property
+    def cuts(self) -> list[Floats]:
+        """Outer cuts, polylines (n, 2) from tab to tab; without tabs the closed outline."""
+        ring = self.outline.exterior
+        if not self.tabs:
+            return [np.asarray(ring.coords)]
+        places = sorted((ring.project(shapely.Point(t.centre)), t.diameter / 2) for t in self.tabs)
+        ends = [(at + half, after - more) for (at, half), (after, more) in pairwise(places)]
+        pieces = [np.asarray(substring(ring, *piece).coords) for piece in ends]
+        (first, before), (last, half) = places[0], places[-1]
+        around = [(last + half, ring.length), (0.0, first - before)]
+        end, start = (np.asarray(substring(ring, *piece).coords) for piece in around)
+        return [*pieces, np.concatenate([end[:-1], start])]
 
     @cached_property
     def size(self) -> tuple[float, float]:
@@ -94,13 +112,15 @@ class FlatPart:
         """Moves the lower left corner of the bounding box to (x, y)."""
         shift = np.array([x, y]) - self.outline.bounds[:2]
         dx, dy = shift
+
+        def there(circles: tuple[Circle, ...]) -> tuple[Circle, ...]:
+            return tuple(Circle((c.centre[0] + dx, c.centre[1] + dy), c.diameter) for c in circles)
+
         return replace(
             self,
             outline=shapely.transform(self.outline, lambda points: points + shift),
-            holes=tuple(
-                Circle((hole.centre[0] + dx, hole.centre[1] + dy), hole.diameter)
-                for hole in self.holes
-            ),
+            holes=there(self.holes),
+            tabs=there(self.tabs),
             engraving=tuple(stroke + shift for stroke in self.engraving),
             scores=tuple(stroke + shift for stroke in self.scores),
         )
@@ -159,6 +179,7 @@ class Unit:
         underside: the lettering, to be read from below, seen from the top.
         thickened: area added beside slots so that their walls are thick enough, mm^2.
         letter: carried instead of the id, where there is no room for that.
+        pins: holes for the pins that align its layers, where it is cut in layers.
     """
 
     number: int
@@ -175,6 +196,7 @@ class Unit:
     underside: Strokes = ()
     thickened: float = 0.0
     letter: str = ""
+    pins: tuple[Circle, ...] = ()
 
     @property
     def wall(self) -> float:
@@ -183,8 +205,9 @@ class Unit:
 
     @property
     def part(self) -> FlatPart:
-        """The unit as a part to be cut."""
-        return FlatPart(self.label, self.outline, self.height, engraving=self.lettering + self.mark)
+        """The unit, or each of its layers, as a part to be cut."""
+        engraved = self.lettering + self.mark
+        return FlatPart(self.label, self.outline, self.height, self.pins, engraved)
 
 
 @dataclass(frozen=True)

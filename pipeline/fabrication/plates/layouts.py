@@ -55,6 +55,8 @@ def laser_sheets(
 def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
     """Offsets the outer cut of a part by half a kerf outwards and its holes inwards.
 
+    Of a tab as much is left as asked for: the laser stops half a kerf before it.
+
     Raises:
         UserError: a slot or a hole is narrower than the kerf.
     """
@@ -69,7 +71,8 @@ def compensated(part: FlatPart, kerf: float, file: str) -> FlatPart:
         raise UserError(what, file=file, key="fabrication.laser.kerf", remedy=remedy)
     outline = shapely.orient_polygons(grown.simplify(_SHORT))
     holes = tuple(Circle(hole.centre, hole.diameter - kerf) for hole in part.holes)
-    return replace(part, outline=outline, holes=holes)
+    tabs = tuple(Circle(tab.centre, tab.diameter + kerf) for tab in part.tabs)
+    return replace(part, outline=outline, holes=holes, tabs=tabs)
 
 
 def print_plates(

@@ -7,8 +7,9 @@ a curve, in an SVG the label of an outer cut does. All else belongs to the outli
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,7 @@ MILLIMETRES = 4
 _APPLICATION = "METACLOAK"
 _LABEL = "{http://www.inkscape.org/namespaces/inkscape}label"
 _BYLAYER = 256
+_WIDEST_TAB = 1.01  # mm, with the kerf; parts are larger
 _FLATNESS = 2e-4  # mm, to which curves become polygons
 _TURN = np.linspace(0.0, 2.0 * np.pi, 128, endpoint=False)
 _CIRCLE = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
@@ -46,6 +48,7 @@ class Curve:
         points: vertices (n, 2) in mm, a closed curve without the repeated first one.
         closed: whether the file says that it ends where it starts.
         own_colour: whether it has another colour than its layer's.
+        tabs: (k, 2, 2) ends of the places of an outer cut that the file leaves uncut.
     """
 
     part: str
@@ -54,6 +57,7 @@ class Curve:
     points: Floats
     closed: bool
     own_colour: bool = False
+    tabs: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
 
     @property
     def polygon(self) -> Polygon:
@@ -116,6 +120,7 @@ def read_drawing(path: Path) -> Drawing:
         UserError: it cannot be read as what its name says.
     """
     drawing = _read_svg(path) if path.suffix == ".svg" else _read_dxf(path)
+    drawing = replace(drawing, curves=tuple(_joined(drawing.curves)))
     outlines = [(part, outline) for part, outline in drawing.outlines() if part]
     tree = STRtree([outline for _, outline in outlines])
 
@@ -126,6 +131,34 @@ def read_drawing(path: Path) -> Drawing:
         return outlines[int(min(around))][0] if len(around) else ""
 
     return replace(drawing, curves=tuple(replace(c, part=owner(c)) for c in drawing.curves))
+
+
+def _joined(curves: Iterable[Curve]) -> Iterator[Curve]:
+    """Closes outer cuts that tabs interrupt, piece after piece; others stay open.
+
+    A cut is closed where a piece ends a tab's width from where the first one begins.
+    """
+    run: list[Curve] = []
+    for curve in curves:
+        piece = curve.layer == OUTER and not curve.closed and len(curve.points) > 1
+        if not piece or (run and (curve.part != run[0].part or not _near(run[-1], curve))):
+            yield from run
+            run = []
+        if not piece:
+            yield curve
+            continue
+        run.append(curve)
+        if _near(curve, run[0]):
+            tabs = [(a.points[-1], b.points[0]) for a, b in pairwise([*run, run[0]])]
+            points = np.concatenate([each.points for each in run])
+            yield replace(run[0], points=points, closed=True, tabs=np.array(tabs))
+            run = []
+    yield from run
+
+
+def _near(one: Curve, other: Curve) -> bool:
+    """Tests that no more than a tab is between the end of one curve and the start of another."""
+    return bool(np.linalg.norm(other.points[0] - one.points[-1]) < _WIDEST_TAB)
 
 
 def _read_dxf(path: Path) -> Drawing:
@@ -204,10 +237,11 @@ def _svg_curves(group: Any, layer: str, height: float) -> Iterator[tuple[Curve, 
             yield Curve("", layer, kind, np.empty((0, 2)), closed=False), str(element.stroke)
         elif isinstance(element, Shape):
             part = str(element.values["attributes"].get(_LABEL, ""))
-            strokes = [_svg_points(stroke) for stroke in Path(element).as_subpaths()]
             if isinstance(element, Circle):
                 centre = [element.implicit_center.x, element.implicit_center.y]
                 strokes = [(centre + float(element.implicit_r) * _CIRCLE, True)]
+            else:
+                strokes = [_svg_points(stroke) for stroke in Path(element).as_subpaths()]
             for points, closed in strokes:
                 turned = points * [1.0, -1.0] + [0.0, height]
                 yield Curve(part, layer, kind, turned, closed), str(element.stroke)

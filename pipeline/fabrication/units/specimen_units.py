@@ -19,7 +19,7 @@ from pipeline.fabrication.parts import (
     Unit,
 )
 from pipeline.fabrication.units.prebend import prebend
-from pipeline.fabrication.units.tracking_dots import dots
+from pipeline.fabrication.units.tracking_dots import dots, pin_holes
 from pipeline.fabrication.units.unit_bodies import UnitBody, unit_bodies
 from pipeline.fabrication.units.unit_network import UnitNetwork, refuse_overlaps
 from pipeline.fabrication.units.unit_outlines import cut, filleted
@@ -95,6 +95,8 @@ def build_unit(
         remedy = "ask for larger units in the design (constraints.edge_length)"
         key = "fabrication.labels.height"
         raise UnbuildableUnitError(what, (design,), outline, file=file, key=key, remedy=remedy)
+    mark = orientation_mark(outline, body, placed.box, settings.labels)
+    written = (*placed.strokes, *mark)
     grown = body.area - filleted(design, settings.fillet_radius).area
     return Unit(
         number,
@@ -104,12 +106,13 @@ def build_unit(
         outline,
         slots,
         placed.strokes,
-        orientation_mark(outline, body, placed.box, settings.labels),
+        mark,
         dots(outline, settings.markers),
         settings.thickness,
         placed.mirrored,
         float(grown) if grown > _HAIR else 0.0,
         "" if words == label else words,
+        pin_holes(outline, written, settings) if settings.laminated else (),
     )
 
 

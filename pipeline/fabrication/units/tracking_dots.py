@@ -1,13 +1,18 @@
-"""Places the tracking dots of a unit."""
+"""Places the tracking dots of a unit, and the holes for the pins that align its layers."""
+
+from itertools import combinations
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from pipeline.fabrication.parts import Circle
-from pipeline.problem.sections import Markers
+from pipeline.fabrication.parts import Circle, Strokes
+from pipeline.problem.sections import Fabrication, Markers
 
 _RIM = 0.2  # mm between a dot and the rim of the unit
+_CLEAR = 0.3  # mm between a hole and a letter
+_GRID = 1e-3  # mm, of holes
+_CHORD = 5e-3  # mm by which round offsets fall short
 _SHARES = (1.0, 0.75, 0.5)  # of the set diameter
 _SPREADS = np.array([1.0, 0.9, 0.8, 0.7, 0.6, 0.5])
 _ANGLES = np.deg2rad(np.arange(0.0, 180.0, 5.0))
@@ -58,3 +63,19 @@ def _line(
 def _one(free: shapely.Geometry, outline: Polygon, diameter: float) -> Circle:
     spot = outline.centroid if free.contains(outline.centroid) else free.representative_point()
     return Circle((float(spot.x), float(spot.y)), diameter)
+
+
+def pin_holes(outline: Polygon, written: Strokes, settings: Fabrication) -> tuple[Circle, ...]:
+    """Places two holes as far apart as walls and letters allow; one or none without room.
+
+    A wall around a hole is as thick as those around slots, between two holes as well.
+    """
+    pin, wall = settings.laser.pin, settings.minimum_wall
+    letters = shapely.MultiLineString(list(written)).buffer(pin / 2 + _CLEAR)
+    room = outline.buffer(-(pin / 2 + wall + _CHORD)).difference(letters)
+    if room.is_empty:
+        return ()
+    spots = np.unique(np.round(shapely.get_coordinates(room) / _GRID) * _GRID, axis=0)
+    far = max(combinations(spots, 2), key=lambda pair: float(np.linalg.norm(pair[1] - pair[0])))
+    kept = far if np.linalg.norm(far[1] - far[0]) >= pin + wall else far[:1]
+    return tuple(Circle((float(x), float(y)), pin) for x, y in kept)

@@ -23,6 +23,7 @@ _LEAST_LABEL = 2.0  # mm; smaller letters can neither be engraved nor printed
 _LEAST_RIM = 2.0  # mm around a bolt's hole
 _MOST_PLAY = 1.0  # mm beside a unit in its pocket
 _WIDEST_SLOT = 8.0  # mm
+_WIDEST_TAB = 1.0  # mm, with the kerf
 _THINNEST_LAYER = 1.0  # mm; thinner sheets warp under the laser, and glue adds up
 
 Clearances = Annotated[tuple[Gap, ...], Field(min_length=1, max_length=20)]
@@ -60,6 +61,20 @@ class Slots(Section):
         return self
 
 
+class Tabs(Section):
+    """Tabs that hold the pieces of foil in their sheet until they are twisted out.
+
+    They are on the edges that stand level with the faces of the units, within the slots.
+
+    Attributes:
+        width: of the foil that is left between two cuts.
+        count: tabs of each piece.
+    """
+
+    width: Length = 0.4
+    count: Literal[1, 2, 3, 4] = 2
+
+
 class Shims(Section):
     """Strips that join the units.
 
@@ -68,14 +83,26 @@ class Shims(Section):
         young_modulus: of the foil, for its moment before any load; that of polyester.
         prebend_strain: largest strain of a shim before any load; beyond it nothing is drawn.
         spares: extra pieces of each length, as a ratio; at least one.
-        strips: also draw the authors' continuous paths, one per row and one per column.
+        tabs: that hold the pieces in their sheet; null cuts each piece free.
+        strips: one strip for each row and each column instead; refused, as slots end inside units.
     """
 
     thickness: Length = 0.25
     young_modulus: Modulus = 4500.0
     prebend_strain: Ratio = 0.3
     spares: Ratio = 0.1
+    tabs: Tabs | None = Tabs()
     strips: bool = False
+
+    @model_validator(mode="after")
+    def _slots_end_inside(self) -> Self:
+        if self.strips:
+            what = "slots end inside the units: a strip cannot go on from one to the next"
+            remedy = (
+                "leave it out (slots right across would cut a unit in two); tabs hold the pieces"
+            )
+            raise fault(what, f"{remedy} of a sheet together", "strips")
+        return self
 
 
 class Labels(Section):
@@ -128,6 +155,7 @@ class Laser(Section):
         template_thickness: of the template with the tracking dots and of the spacer comb.
         aspect_ratio: largest depth of a slot that is cut over its width; a unit that is thicker
             is glued from layers.
+        pin: diameter of the pins that align the layers of a unit.
     """
 
     kerf: Gap = 0.15
@@ -136,6 +164,7 @@ class Laser(Section):
     gap: Length = 2.0
     template_thickness: Length = 1.0
     aspect_ratio: Positive = 3.0
+    pin: Length = 1.5
 
 
 class Print(Section):
@@ -240,6 +269,10 @@ class Fabrication(Section):
         if self.shims.thickness + 2.0 * max(self.coupon) > _WIDEST_SLOT:
             what = f"the coupon has no room for slots wider than {_WIDEST_SLOT:g} mm"
             raise fault(what, "give smaller clearances", "coupon")
+        most = min(self.slots.depth_min, _WIDEST_TAB) - self.laser.kerf
+        if self.shims.tabs is not None and self.shims.tabs.width > most:
+            what = f"tabs of {self.shims.tabs.width:g} mm do not stand within the slots"
+            raise fault(what, f"give at most {most:g} mm", "shims.tabs.width")
         return self
 
     @property
@@ -248,15 +281,25 @@ class Fabrication(Section):
         return math.ceil(self.thickness / (self.laser.aspect_ratio * self.slot_width) - 1e-9)
 
     @property
+    def laser_sheet_thickness(self) -> float:
+        """Thickness of the sheet that units, or their layers, are cut from, mm."""
+        return self.thickness / self.laser_layers
+
+    @property
+    def laminated(self) -> bool:
+        """Tests that units are cut by laser in layers, to be pinned and glued."""
+        return self.laser_layers > 1 and self.laser_sheet_thickness >= _THINNEST_LAYER
+
+    @property
     def laser_route(self) -> str:
         """Tells in words how units can be cut by laser, if they can."""
-        layers, each = self.laser_layers, self.thickness / self.laser_layers
+        layers, each = self.laser_layers, self.laser_sheet_thickness
         if layers == 1:
             return f"cut from sheet of {self.thickness:g} mm"
         slot = f"slots of {self.slot_width:g} mm are cut {self.laser.aspect_ratio:g} times as deep"
-        if each < _THINNEST_LAYER:
+        if not self.laminated:
             return f"print only: {slot}, which would take {layers} layers of {each:.2f} mm"
-        return f"cut {layers} times from sheet of {each:.2f} mm and glue: {slot}"
+        return f"cut {layers} times from sheet of {each:.2f} mm, pin and glue: {slot}"
 
     @property
     def solid_density(self) -> float:

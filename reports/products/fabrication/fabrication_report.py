@@ -64,12 +64,18 @@ class PictureGroup:
 
 @dataclass(frozen=True)
 class PackageSection:
-    """Holds one structure's part of the page; `files` are paths in its folder and their hashes."""
+    """Holds one structure's part of the page.
+
+    Attributes:
+        foil: ways to handle the shims: name, parts, cuts with their length and time.
+        files: paths in its folder and their hashes.
+    """
 
     name: str
     title: str
     facts: Sequence[PackageFact]
     groups: Sequence[PictureGroup]
+    foil: Sequence[tuple[str, str, str]]
     files: Sequence[tuple[str, str]]
 
 
@@ -121,6 +127,11 @@ def package(folder: Path, problem: Problem) -> PackageSection:
         TITLES.get(name, name),
         list(_facts(folder, told)),
         [PictureGroup(title, list(found)) for title, found in _groups(folder, problem)],
+        [
+            (row["id"], row["count"], row["note"])
+            for row in read_bill(folder / "bom.csv")
+            if row["item"] == "foil"
+        ],
         sorted(told["files"].items()),
     )
 
@@ -159,7 +170,7 @@ def _facts(folder: Path, told: Mapping[str, Any]) -> Iterator[PackageFact]:
         yield PackageFact(f"{len(letters)}", "units with a letter for their id", note)
     volume = float(units["volume_mm3"]) / 1000.0
     yield PackageFact(f"{volume:.0f} cm³", "volume of the units", "as if solid")
-    sheets = sum(row["item"] == "sheet" and "_nominal" in row["id"] for row in bill)
+    sheets = sum(int(r["count"]) for r in bill if r["item"] == "sheet" and "_nominal" in r["id"])
     plates = sum(row["item"] in {"plate", "fixture"} for row in bill)
     yield PackageFact(
         f"{sheets} / {plates}", "sheets to cut / plates to print", "fixtures included"

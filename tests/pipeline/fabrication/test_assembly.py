@@ -83,6 +83,7 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     specimen = handmade.specimen()
     contents = {
         "laser/units_01_nominal.dxf": [unit.label for unit in specimen.units],
+        "laser/shims_01_nominal.dxf": ["S8.25"],
         "print/plate_01.3mf": ["A1", "B1"],
     }
     write_bill(tmp_path / "bom.csv", specimen, ASKED, DENSITY, contents, PRINTS, 0.62)
@@ -101,7 +102,8 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert (shim["count"], shim["length_mm"], shim["width_mm"]) == ("8", "8.2500", "8.1000")
     foil = 8.25e-3 * 8.1e-3 * ASKED.shims.thickness * 1e-3 * 1380.0  # kg, of 1380 kg/m^3
     assert float(shim["mass_g"]) == pytest.approx(1e3 * foil, abs=1e-4)
-    assert [row["item"] for row in found if "/" in row["id"]] == ["sheet", "plate"]
+    files = [(row["item"], row["count"]) for row in found if "/" in row["id"]]
+    assert files == [("sheet", "6"), ("sheet", "1"), ("plate", "1")]  # units are cut in six layers
     total = next(row for row in found if row["item"] == "total")
     assert float(total["mass_g"]) == pytest.approx(
         sum(float(row["mass_g"]) for row in found if row["item"] == "unit"), abs=1e-3
@@ -109,11 +111,16 @@ def test_the_bill_lists_units_shims_files_and_totals(tmp_path: Path) -> None:
     assert "print 62 % full" in total["note"]
     plate = next(row for row in found if row["item"] == "plate")
     assert plate["note"] == "2 parts; about 1 h 05 min, 2.0 m or 6 g"
-    shims = next(row for row in found if row["item"] == "total" and row["id"] == "shims")
-    assert shims["note"] == (  # 8 rectangles of 32.7 mm; 2 rows and 3 columns, scored 18 times
-        "polyester; 8 cuts of 0.26 m, about 0.5 min;"
-        " 5 strips in the place of all: 23 cuts of 0.35 m, about 0.8 min"
-    )
+    # 8 rectangles of 32.7 mm, each on two tabs of 0.4 mm; 2 rows and 3 columns, scored 18 times
+    assert [(row["id"], row["count"], row["note"]) for row in found if row["item"] == "foil"] == [
+        ("free pieces", "8", "8 cuts of 0.26 m, about 0.5 min; for comparison, not drawn"),
+        ("sheets of pieces on tabs", "1", "16 cuts of 0.26 m, about 0.6 min; drawn"),
+        (
+            "strips, one a row and a column",
+            "5",
+            "23 cuts of 0.35 m, about 0.8 min; for comparison, not drawn",
+        ),
+    ]
     prints = found[-1]
     assert (prints["id"], prints["count"]) == ("prints", "1")
     assert float(prints["mass_g"]) == pytest.approx(2000 * np.pi / 4 * 1.75**2 * 1.24e-3, rel=1e-4)

@@ -51,6 +51,14 @@ MISTAKES: dict[str, tuple[Edit, tuple[str, ...]]] = {
         parameters(laser={"sheet": ["20 mm", "20 mm"]}),
         ("does not fit on a sheet", "fabrication.laser.sheet"),
     ),
+    "strips": (
+        parameters(shims={"strips": True}),
+        ("a strip cannot go on from one to the next", "fabrication.shims.strips", "tabs hold"),
+    ),
+    "wide tabs": (
+        parameters(shims={"tabs": {"width": "0.9 mm"}}),
+        ("do not stand within the slots", "fabrication.shims.tabs.width", "at most 0.85 mm"),
+    ),
     "negative kerf": (parameters(laser={"kerf": "-0.1 mm"}), ("fabrication.laser.kerf",)),
     "wide kerf": (
         parameters(laser={"kerf": "0.5 mm"}),

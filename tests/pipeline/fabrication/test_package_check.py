@@ -18,6 +18,8 @@ from pipeline.fabrication.checks.package_record import PackageRecord, expected_p
 from pipeline.fabrication.papers import MANIFEST
 from pipeline.fabrication.readback import Drawing, read_drawing, read_stl
 from pipeline.problem import Problem
+from pipeline.problem.fields import SIM_UNITS
+from pipeline.problem.sections import Fabrication
 from pipeline.runtime import UserError
 from tests.pipeline.fabrication import built
 from tests.pipeline.fabrication.files import write_stl
@@ -158,7 +160,18 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
         "unit A1: it is not on the assembly sheet",
     ),
     "pdf cut short": (halved("assembly.pdf"), "the assembly sheet"),
+    "pins": (edited("bom.csv", "pin,PIN1.5,12", "pin,PIN1.5,11"), "11 pins for 12 holes"),
 }
+
+OTHERS: dict[str, tuple[dict[str, object], str]] = {
+    "fewer tabs": ({"shims": {"tabs": {"count": 3}}}, "part S8.25: 2 tabs instead of 3"),
+    "no tabs": ({"shims": {"tabs": None}}, "part S8.25: 2 tabs instead of 0"),
+    "wide tabs": ({"shims": {"tabs": {"width": 0.5}}}, "a tab 0.400 mm wide instead of 0.5 mm"),
+    "tabs": ({"slots": {"depth_min": 0.6}}, "a tab that is not on a long edge, within the slots"),
+    "pins": ({"laser": {"pin": 1.6}}, "a hole of 1.500 mm for pins of 1.6 mm"),
+    "thick layers": ({"laser": {"aspect_ratio": 4.1}}, "a hole 1.50 mm wide in material of 1.62"),
+}
+"""Packages made with the defaults, checked against other settings."""
 
 
 def test_a_package_passes_as_it_is_written(whole: tuple[Path, Problem]) -> None:
@@ -173,6 +186,16 @@ def test_a_damaged_package_is_refused(
     damage, expected = DAMAGES[name]
     damage(package)
     assert expected in refused(package, whole[1])
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_package_of_other_tabs_or_pins_is_refused(whole: tuple[Path, Problem], name: str) -> None:
+    given, expected = OTHERS[name]
+    asked = Fabrication.model_validate(given, context=SIM_UNITS)
+    with pytest.raises(UserError) as raised:
+        check(whole[0], whole[1].model_copy(update={"fabrication": asked}))
+    shutil.rmtree(whole[0].with_name("faults"), ignore_errors=True)
+    assert expected in str(raised.value)
 
 
 def test_shims_that_do_not_reach_from_slot_end_to_slot_end_are_found(

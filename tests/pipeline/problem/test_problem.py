@@ -357,7 +357,7 @@ def test_a_bound_of_the_strain_makes_the_design_depend_on_the_foil(
     ("made", "layers", "words"),
     [
         ({"thickness": 1.3}, 1, "cut from sheet of 1.3 mm"),
-        ({}, 6, "cut 6 times from sheet of 1.35 mm and glue"),
+        ({}, 6, "cut 6 times from sheet of 1.35 mm, pin and glue"),
         ({"shims": {"thickness": 0.1}}, 9, "print only"),
         ({"laser": {"aspect_ratio": 20.0}}, 1, "cut from sheet of 8.1 mm"),
     ],
