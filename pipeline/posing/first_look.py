@@ -7,13 +7,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pipeline.problem import Problem
-from pipeline.problem.sections import single_drives
+from pipeline.problem.sections import SingleDrive, Triangular, single_drives
 from sim.core import Ints
 from sim.scene import Scene, estimate_cost, sample_times
 from sim.structure import Lattice
 
 FAR = 0.25
 """Of a displacement, over the length of the lattice."""
+BUCKLING = 1.5e-3
+"""Likewise, of a push along the rows of a triangular lattice (0.0018 for 8 x 8 hexagons)."""
 MANY = 3000
 """Units beyond which necks are not looked for."""
 START = 20.0
@@ -25,7 +27,7 @@ two and a half in the eight studies of a static path."""
 
 def cost_line(asked: Problem, scene: Scene) -> str:
     """Says size, unknowns, memory and time to expect of a problem's optimisation."""
-    cost = estimate_cost(scene, len(sample_times(scene)))
+    cost = estimate_cost(scene, sample_times(scene))
     optimiser = asked.optimiser
     budget = {name: method.evaluations for name, method in optimiser.methods.chosen.items()}
     if "sqp" in budget:
@@ -56,8 +58,25 @@ def doubts(asked: Problem, scene: Scene) -> Iterator[str]:
                 f"the drive goes {push:g} mm, {share:.0%} of the lattice's length; lower"
                 " `drive.amplitude` if that is not meant"
             )
+        if (
+            isinstance(asked.lattice, Triangular)
+            and push > BUCKLING * size
+            and _inward(drive, scene)
+        ):
+            yield (
+                f"rows of hexagons buckle when they are pushed by {BUCKLING * size:.2g} mm or so,"
+                " which no cloak hides: pull them (`drive.directions: [0 deg]`), or push them less"
+            )
     yield from _picture(asked)
     yield from _necks(scene.lattice)
+
+
+def _inward(drive: SingleDrive, scene: Scene) -> bool:
+    """Tells a drive that pushes its units towards the others in a load case."""
+    sites, driven = scene.lattice.site, scene.loads.driven
+    outward = sites[driven].mean(axis=0) - sites.mean(axis=0)
+    ways = np.array(getattr(drive, "directions", ()))
+    return bool((np.cos(ways) * outward[0] + np.sin(ways) * outward[1] < -1e-6).any())
 
 
 def _picture(asked: Problem) -> Iterator[str]:

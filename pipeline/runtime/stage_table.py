@@ -376,6 +376,16 @@ labelled SYNTHETIC.""",
                 help="a void under slow compression, or a shaken unit (default: %(default)s)",
             ),
             _file("--image", "FILE", "shape of the void (PNG, JPG, SVG); is copied"),
+            option(
+                *("--threshold",),
+                type=float,
+                help="grey level, 0 (black) to 1 (white), below which a pixel is in the shape",
+            ),
+            option(
+                *("--invert",),
+                action="store_true",
+                help="the shape is light on a dark ground",
+            ),
             _file(
                 *("--folder", "DIR", "where the studies are (default: %(default)s)"),
                 default=Path("experiments"),

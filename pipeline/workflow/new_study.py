@@ -20,7 +20,7 @@ _DISC = "disc:\n  centre: centre\n  radius: 45 mm # 3 spacings"
 _SMALL_DISC = "disc:\n  radius: 18 mm"
 _IMAGE = (
     "image: # what is dark on a light ground; PNG, JPG or SVG\n"
-    "  file: {file}\n"
+    "  file: {file}\n{grey}"
     "  width: 120 mm # 8 spacings; the height follows\n"
     "  centre: centre # or [142.5 mm, 142.5 mm]\n"
     "  orientation: 0 deg # counter-clockwise\n"
@@ -41,21 +41,28 @@ def work(args: argparse.Namespace) -> None:
         if args.image is not None:
             shutil.copyfile(args.image, aside / args.image.name)
         made = aside / "problem.yaml"
-        made.write_text(text(args.name, args.kind, args.image), encoding="utf-8")
-        for preset in (None, "quick"):
-            problem.load(made, preset)
+        made.write_text(text(args), encoding="utf-8")
+        try:
+            for preset in (None, "quick"):
+                problem.load(made, preset)
+        except UserError as error:  # the template is sound: it is the image
+            error.file, error.line = str(args.image), None
+            raise
     LOG.info("made %s; a draft: %s %s@quick", folder / "problem.yaml", BUILD, args.name)
 
 
-def text(name: str, kind: str, image: Path | None) -> str:
+def text(args: argparse.Namespace) -> str:
     """Fills in the problem file of a new study."""
+    name, image = args.name, args.image
     if image is None:
         void, small = _DISC, _SMALL_DISC
     else:
         plain = re.fullmatch(r"[A-Za-z][\w.-]*", image.name)
         file = image.name if plain else json.dumps(image.name, ensure_ascii=False)
-        void, small = _IMAGE.format(file=file), _SMALL_IMAGE
-    template = (TEMPLATES / f"{kind}.yaml").read_text(encoding="utf-8")
+        grey = "" if args.threshold is None else f"  threshold: {args.threshold:g}\n"
+        grey += "  invert: true\n" if args.invert else ""
+        void, small = _IMAGE.format(file=file, grey=grey), _SMALL_IMAGE
+    template = (TEMPLATES / f"{args.kind}.yaml").read_text(encoding="utf-8")
     return Template(template).substitute(
         name=name,
         build=BUILD,
@@ -78,4 +85,4 @@ def _check(args: argparse.Namespace, folder: Path) -> None:
         remedy = "leave --image out, or take --kind static"
         raise UserError("the dynamic template has no void", key="--image", remedy=remedy)
     with found_in(args.image):
-        read_outlines(args.image)
+        read_outlines(args.image, threshold=args.threshold, invert=args.invert)

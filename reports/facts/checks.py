@@ -10,7 +10,7 @@ from pipeline.posing import design_hash
 from pipeline.problem import Problem
 from reports.facts import foil, measures
 from reports.facts.fact_records import Fact, number, percent, within, worded
-from reports.study import RigidUnits
+from reports.study import RigidUnits, display_name
 from sim.core import instruction_set
 
 JUMPED = 2
@@ -101,35 +101,34 @@ def path_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
     """Yields voids, gaps, overlaps, contacts, stability and shims of every structure on its way."""
     yield from foil.strain_facts(problem, response)
     for name in (str(name) for name in response["structure"].values):
-        part = response.sel(structure=name)
+        part, words = response.sel(structure=name), display_name(problem, name).lower()
         void, gap = float(np.degrees(part["min_void_angle"].min())), float(part["min_gap"].min())
-        label = f"Smallest void angle, {name}"
+        label = f"Smallest void angle, {words}"
         yield number(f"void_angle_{name}", label, void, "deg", digits=3, note="of all loads")
         note = "of all loads, by geometry"
-        yield number(f"gap_{name}", f"Smallest gap, {name}", gap, "mm", digits=3, note=note)
+        yield number(f"gap_{name}", f"Smallest gap, {words}", gap, "mm", digits=3, note=note)
         crossed = int(part["overlaps"].max())
-        yield number(f"overlaps_{name}", f"Overlapping pairs, {name}, most", crossed, note=note)
+        yield number(f"overlaps_{name}", f"Overlapping pairs, {words}, most", crossed, note=note)
         touching, when = part["contact_pairs"], "at any time"
         if problem.static:
             touching, when = touching.isel(time=-1), "at the end of the path"
-        label = f"Pairs in contact, {name}"
+        label = f"Pairs in contact, {words}"
         yield number(f"contact_pairs_{name}", label, int(touching.max()), note=when)
-        yield from stability_facts(name, part)
+        yield from stability_facts(name, part, words)
 
 
-def stability_facts(name: str, part: xr.Dataset) -> Iterator[Fact]:
+def stability_facts(key: str, part: xr.Dataset, words: str) -> Iterator[Fact]:
     """Yields equilibria of a structure (its name in words), unstable or reached by a jump."""
     flags = part["stability"].values
-    key = name.replace(" ", "_")
     if (flags >= 0).any():
-        label, count = f"Unstable equilibria, {name}", int((flags == 0).sum())
+        label, count = f"Unstable equilibria, {words}", int((flags == 0).sum())
         note = f"of {flags.size}; where the tangent is not positive definite"
         yield number(f"unstable_{key}", label, count, note=note)
-        label, count = f"Jumps to another branch, {name}", int((flags >= JUMPED).sum())
+        label, count = f"Jumps to another branch, {words}", int((flags >= JUMPED).sum())
         note = "loads reached only past a limit point or a branching"
         yield number(f"jumps_{key}", label, count, note=note)
         least = float(part["eigenvalue"].min())
-        label = f"Smallest eigenvalue of the tangent, {name}"
+        label = f"Smallest eigenvalue of the tangent, {words}"
         note = "of all loads, at fixed supports and drive; the path ends where it vanishes"
         yield number(f"eigenvalue_{key}", label, least, "N/mm", digits=3, note=note)
 

@@ -9,6 +9,7 @@ import xarray as xr
 from pipeline.posing import altered_lattice_of, flat_vertices, lattice_of, material_of
 from pipeline.problem import Problem
 from reports.facts.fact_records import Fact, percent, share
+from reports.study import display_name
 from sim.core import Floats
 from sim.scene import foil_strains
 from sim.structure import parameters, shape
@@ -24,14 +25,18 @@ def strain_facts(problem: Problem, response: xr.Dataset) -> Iterator[Fact]:
             f" (of {np.degrees(float(bend.max())):.3g}° at most) and by shear, and stretched;"
             f" limit {percent(limit)}: " + ("kept" if strains[case] <= limit else "exceeded")
         )
-        label = f"Largest shim strain, {name}"
+        label = f"Largest shim strain, {display_name(problem, name).lower()}"
         yield share(f"shim_strain_{name}", label, float(strains[case]), note=note)
 
 
 def strain_warning(problem: Problem, response: xr.Dataset) -> Iterator[str]:
     """Yields a line on the structures whose shims exceed their limit, if there are any."""
     limit, found = strain_limit(problem), largest_strains(problem, response)
-    over = [f"{name} {percent(s.max())}" for name, s in found.items() if s.max() > limit]
+    over = [
+        f"{display_name(problem, name).lower()} {percent(s.max())}"
+        for name, s in found.items()
+        if s.max() > limit
+    ]
     if over:
         yield (
             f"shims of {problem.shim_thickness:g} mm are strained beyond {percent(limit)}:"

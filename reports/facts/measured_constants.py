@@ -7,6 +7,7 @@ import xarray as xr
 
 from pipeline.problem import Problem
 from reports.facts.fact_records import Fact, percent, worded
+from reports.study import display_name
 from sim.core import Floats
 
 _ENDS = (0.025, 0.975)
@@ -33,7 +34,7 @@ def constants_facts(
         return
     failed = f", {(~sound).sum()} of them failed" if not sound.all() else ""
     for key, label, values, own in (
-        ("start", "Loss, altered", altered, nominal[0]),
+        ("start", f"Loss, {display_name(asked, 'altered').lower()}", altered, nominal[0]),
         ("end", "Loss, cloaked", cloaked, nominal[1]),
     ):
         told = _quantity(values, unit)
@@ -43,7 +44,7 @@ def constants_facts(
     low, high = (percent(float(end)) for end in np.quantile(gain, _ENDS))
     own = 1 - nominal[1] / nominal[0]
     words, mean = f"{percent(float(gain.mean()))} ({low} to {high})", 100 * float(gain.mean())
-    note = f"nominal {percent(own)}; of each draw's own altered structure"
+    note = f"nominal {percent(own)}; of each draw's own structure without a cloak"
     yield Fact("constants_reduction", "Loss reduced by", mean, "%", words, note=note)
 
 

@@ -61,7 +61,7 @@ def study_text(
     *,
     credit: str,
     headline: Sequence[str],
-    figure_title: str = "",
+    figure_title: str = "Figure",
     note: str = "",
     robust: RobustTable | None = None,
 ) -> PageText:
@@ -70,7 +70,7 @@ def study_text(
     title = study.problem.title or study.name
     shown = [by_key[key] for key in headline if key in by_key]
     lead = study.problem.doc.strip()
-    return PageText(title, lead, credit, figure_title or title, caption, shown, note, robust)
+    return PageText(title, lead, credit, figure_title, caption, shown, note, robust)
 
 
 @dataclass(frozen=True)

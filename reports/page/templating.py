@@ -8,6 +8,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
+from pipeline.runtime import BUILD
+
 _TEMPLATES = Path(__file__).parent / "templates"
 
 
@@ -26,6 +28,7 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
     )
     environment.filters["groupby_order"] = _in_order
     environment.filters["symbols"] = _symbols
+    environment.globals["build"] = BUILD
     return environment.get_template(template).render(values)
 
 

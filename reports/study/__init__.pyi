@@ -17,3 +17,4 @@ from .rigid_units import middle_of_top_edge as middle_of_top_edge
 from .rigid_units import unit_at as unit_at
 from .study_results import RedesignResults as RedesignResults
 from .study_results import StudyResults as StudyResults
+from .study_results import display_name as display_name

@@ -206,3 +206,14 @@ def check_problem(posed: Problem, stage: str, data: xr.Dataset, path: Path) -> N
             value=found,
             remedy="run its stage again with this problem, or give the problem it was made from",
         )
+
+
+def display_name(problem: Problem, structure: str) -> str:
+    """Tells what figures and pages call a structure."""
+    if structure != "altered":
+        return structure.capitalize()
+    if problem.void is not None:
+        return "Voided"
+    if problem.inclusion is not None:
+        return "Stiffened"
+    return "Uncloaked" if problem.static else "Altered"

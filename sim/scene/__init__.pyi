@@ -12,11 +12,11 @@ from .objectives import estimated_errors as estimated_errors
 from .objectives import scales as scales
 from .objectives import strain_energies as strain_energies
 from .parameter_map import ParameterMap as ParameterMap
+from .parameter_map import concrete_parameters as concrete_parameters
 from .parameter_map import parameters_of_design as parameters_of_design
 from .path_constraints import PathConstraints as PathConstraints
 from .path_constraints import foil_strains as foil_strains
 from .plan import Plan as Plan
-from .plan import concrete_parameters as concrete_parameters
 from .plan import make_plan as make_plan
 from .plan import sample_times as sample_times
 from .relaxation import AsBuilt as AsBuilt

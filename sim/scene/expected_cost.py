@@ -4,7 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.core import Floats
+from sim.scene.equal_cases import equal_cases
+from sim.scene.parameter_map import concrete_parameters
 from sim.scene.scene import Scene
+from sim.scene.time_solver import expected_steps
 
 ENTRIES = 8.0
 """Of a factor, over n log2(n) unknowns: 7.0 of 120 thousand (`make bench`)."""
@@ -12,8 +16,10 @@ SECONDS, SECONDS_EACH = 6e-9, 2e-7
 """To factorise a tangent of n unknowns, over n^1.5; and of all loops, over n."""
 FACTORISATIONS, IN_TIME = 4, 8
 """For each load, and for each implicit step with its adjoint."""
+SECONDS_EXPLICIT = 7e-7
+"""Of an explicit step with its adjoint, over n (fig7: 6.5e-7, a draft of it: 8e-7)."""
 STEPS, FIRST_STEPS = 20, 30
-"""Implicit steps in each period of the drive, and at its start."""
+"""States held in each period of the drive, and at its start."""
 HELD_STATES = 4
 """Arrays of all states that a solve and its adjoint hold."""
 
@@ -24,8 +30,7 @@ class Cost(NamedTuple):
     Attributes:
         unknowns: number of free degrees of freedom.
         memory: bytes of one load case.
-        seconds: of one core for loss and gradient of a design; a lower bound where motions in time
-            need explicit steps.
+        seconds: of one core for loss and gradient of a design.
     """
 
     unknowns: int
@@ -33,14 +38,25 @@ class Cost(NamedTuple):
     seconds: float
 
 
-def estimate_cost(scene: Scene, n_times: int) -> Cost:
-    """Estimates the cost of a scene that is asked for at a number of times."""
-    n, loads = 3 * scene.lattice.n_units - len(scene.loads.held), scene.loads
-    each = SECONDS * n**1.5 + SECONDS_EACH * n
+def estimate_cost(scene: Scene, times: Floats) -> Cost:
+    """Estimates the cost of a scene that is asked for at times (n_times,), s."""
+    n, loads = count_unknowns(scene), scene.loads
+    each, n_cases, states = SECONDS * n**1.5 + SECONDS_EACH * n, len(loads.cases), len(times)
     if loads.static:
-        work, states = FACTORISATIONS * n_times, n_times
+        path = FACTORISATIONS * len(times) * each
     else:
+        vertices = scene.lattice.vertices
+        values = concrete_parameters(scene, vertices)
+        integrator, steps = expected_steps(scene, values, times)
+        path = steps * (IN_TIME * each if integrator == "implicit" else SECONDS_EXPLICIT * n)
         states = int(FIRST_STEPS + STEPS * (loads.drive_frequency or 1.0) * loads.duration)
-        work = IN_TIME * states
+        if scene.design.symmetry == "C4" and scene.design.copies is None:
+            n_cases = len(np.unique(equal_cases(scene, vertices, values)))
     memory = 8.0 * (ENTRIES * n * np.log2(max(n, 2)) + HELD_STATES * states * n)
-    return Cost(n, memory, each * work * len(loads.cases))
+    n_copies = 1 if scene.design.copies is None else len(scene.design.copies)
+    return Cost(n, memory, path * n_cases * n_copies)
+
+
+def count_unknowns(scene: Scene) -> int:
+    """Counts the free degrees of freedom."""
+    return 3 * scene.lattice.n_units - len(scene.loads.held)

@@ -13,8 +13,8 @@ from sim.core import Floats, Numbers
 from sim.energy import counted_from_rest
 from sim.quasistatics import StaticSolver
 from sim.scene.scene import Scene
-from sim.solvers import LinearRamp, differentiable_motion
-from sim.structure import Parameters, parameters, shape
+from sim.solvers import LinearRamp, concrete, differentiable_motion
+from sim.structure import ConcreteParameters, Parameters, parameters, shape
 
 
 class ParameterMap:
@@ -98,3 +98,9 @@ def parameters_of_design(scene: Scene, copy: int | None = None) -> ParameterMap:
         return parameters(scene.lattice, made, built)
 
     return RestingMap(scene, of_design) if space.turning else ParameterMap(of_design)
+
+
+def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
+    """Computes the parameters of a structure as NumPy arrays."""
+    made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
+    return concrete(made)

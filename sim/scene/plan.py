@@ -8,11 +8,12 @@ import numpy as np
 from sim.core import Floats, Ints
 from sim.quasistatics import StaticSolver
 from sim.scene.equal_cases import equal_cases
+from sim.scene.parameter_map import concrete_parameters
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_scene
 from sim.scene.time_solver import time_solver
-from sim.solvers import Solver, check_free_dofs, concrete
-from sim.structure import ConcreteParameters, parameters, shape
+from sim.solvers import Solver, check_free_dofs
+from sim.structure import ConcreteParameters
 from sim.time_integration import ImplicitSolver
 
 
@@ -85,7 +86,7 @@ def make_plan(
     check_free_dofs(scene.topology)
     values = concrete_parameters(scene, structure)
     decisions: list[str] = []
-    skipped = [_reference_line(scene)]
+    skipped = [_reference_line(scene)] if vertices is None else []
 
     symmetric = scene.design.symmetry == "C4" and scene.design.copies is None
     may_repeat = not every_case and (vertices is not None or symmetric)
@@ -94,9 +95,7 @@ def make_plan(
     if copies := int((case_of != every).sum()):
         skipped.append(f"{copies} of {len(every)} load cases: copies turned by 90 deg")
     n_designed, n_ligaments = len(scene.topology.designed), scene.lattice.n_ligaments
-    if vertices is not None:
-        skipped.append("parameter derivatives: none are asked for")
-    elif n_designed < n_ligaments:
+    if vertices is None and n_designed < n_ligaments:
         skipped.append(
             f"parameter derivatives of {n_ligaments - n_designed} of {n_ligaments} ligaments: the"
             " design does not move them"
@@ -132,12 +131,6 @@ def sample_times(scene: Scene) -> Floats:
             scene.loads.duration * np.arange(1, scene.objective.steps + 1) / scene.objective.steps
         )
     return np.linspace(0.0, scene.loads.duration, scene.objective.samples)
-
-
-def concrete_parameters(scene: Scene, vertices: Floats) -> ConcreteParameters:
-    """Computes the parameters of a structure as NumPy arrays."""
-    made = parameters(scene.lattice, shape(scene.lattice, vertices), scene.structure.material)
-    return concrete(made)
 
 
 def _contact_line(values: ConcreteParameters, solver: ImplicitSolver) -> str:

@@ -7,8 +7,7 @@ import numpy as np
 
 from sim.core import Floats
 from sim.energy import RestState, rest_state
-from sim.scene.parameter_map import rest_motion
-from sim.scene.plan import concrete_parameters
+from sim.scene.parameter_map import concrete_parameters, rest_motion
 from sim.scene.scene import Scene
 from sim.scene.simulation import simulate
 

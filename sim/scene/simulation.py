@@ -22,8 +22,8 @@ from sim.scene.objectives import (
     combined,
     extent,
 )
-from sim.scene.parameter_map import parameters_of_design
-from sim.scene.plan import Plan, concrete_parameters, make_plan, sample_times
+from sim.scene.parameter_map import concrete_parameters, parameters_of_design
+from sim.scene.plan import Plan, make_plan, sample_times
 from sim.scene.scene import Scene
 from sim.scene.soundness import check_cases, check_units
 from sim.solvers import Case, PrescribedMotion, Solver, concrete, differentiable_motion, solve_cases

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from sim.core import Floats, SimulationError
-from sim.scene.expected_cost import estimate_cost
+from sim.scene.expected_cost import count_unknowns, estimate_cost
 from sim.scene.scene import DOFS, Scene
 from sim.solvers import DISPLACEMENT, PrescribedMotion, TimeSeries, single_motions
 from sim.structure import Lattice, polygons
@@ -56,7 +56,7 @@ def check_scene(
     asked = np.array([0.0, scene.loads.duration]) if times is None else times
     check_units(scene.lattice, scene.lattice.vertices if vertices is None else vertices)
     _check_ids(scene)
-    found = [*_loose_units(scene), *_size(scene, len(asked))]
+    found = [*_loose_units(scene), *_size(scene, asked)]
     for number, drive in enumerate(scene.loads.cases):
         if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(drive.motion)):
             found += _drive(scene, drive, f"load case {number}", float(asked[-1]))
@@ -141,15 +141,15 @@ def _loose_units(scene: Scene) -> Iterator[str]:
         )
 
 
-def _size(scene: Scene, n_times: int) -> Iterator[str]:
+def _size(scene: Scene, times: Floats) -> Iterator[str]:
     """Estimates memory and time of a large structure.
 
     Raises:
         SceneError: it needs more memory than there is.
     """
-    n, memory, seconds = estimate_cost(scene, n_times)
-    if n < LARGE:
+    if count_unknowns(scene) < LARGE:
         return
+    n, memory, seconds = estimate_cost(scene, times)
     told = f"{scene.lattice.n_units} units: {n} unknowns, about {memory / 1e9:.2g} GB"
     installed = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     if memory > installed:

@@ -9,7 +9,7 @@ Explicit steps, which cannot be longer than stable ones, are compared with the l
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 import scipy.sparse.linalg as spla
@@ -129,12 +129,26 @@ def time_solver(
     return chosen
 
 
+def expected_steps(
+    scene: Scene, values: ConcreteParameters, times: Floats
+) -> tuple[Literal["implicit", "explicit"], int]:
+    """Guesses integrator and number of steps of a motion, without solving for any."""
+    explicit, asked = _explicit(scene, values, times, 1).n_steps, scene.numerics.integrator
+    if _implicit_first(scene, values, [], SLOW / 2):  # nearer to resonance they are cut too often
+        implicit = len(_graded(scene, float(times[-1]))[0]) - 1
+        if asked != "auto" or implicit * EXPLICIT_STEPS <= explicit:
+            return "implicit", implicit
+    return "explicit", explicit
+
+
 def _same_share(n_steps: int) -> int:
     """Counts the leapfrog's steps at the same share of its stability limit."""
     return int(np.ceil(n_steps * BLANES_MOAN.stability / LEAPFROG.stability))
 
 
-def _implicit_first(scene: Scene, values: ConcreteParameters, decisions: list[str]) -> bool:
+def _implicit_first(
+    scene: Scene, values: ConcreteParameters, decisions: list[str], slow: float = SLOW
+) -> bool:
     """Tells whether an implicit grid is tried, and says why."""
     if scene.numerics.integrator != "auto":
         decisions.append("integrator as asked for")
@@ -150,7 +164,7 @@ def _implicit_first(scene: Scene, values: ConcreteParameters, decisions: list[st
         return True
     lowest = lowest_frequency(scene.topology, values) / (2 * np.pi)
     decisions.append(f"drive at {driven:.4g} Hz, lowest eigenfrequency {lowest:.4g} Hz")
-    return driven < SLOW * lowest
+    return driven < slow * lowest
 
 
 class _Error:
@@ -270,6 +284,13 @@ def _n_steps(solver: TimeSolver) -> int:
     return solver.n_steps if isinstance(solver, ExplicitSolver) else len(solver.times) - 1
 
 
+def _graded(scene: Scene, end: float) -> tuple[Floats, float]:
+    """Grades a grid by the drive's frequency; also returns its longest step, s."""
+    rule, frequency = RULES[scene.numerics.accuracy], scene.loads.drive_frequency
+    largest = (end if frequency is None else 1 / frequency) / rule.per_period
+    return time_grid.graded(end, min(rule.first, largest), rule.growth, largest), largest
+
+
 def _first_grid(
     scene: Scene, values: ConcreteParameters, times: Floats, threads: int, most: int
 ) -> ImplicitSolver:
@@ -279,8 +300,7 @@ def _first_grid(
         float(times[-1]),
         scene.loads.drive_frequency,
     )
-    largest = (end if frequency is None else 1 / frequency) / rule.per_period
-    steps = time_grid.graded(end, min(rule.first, largest), rule.growth, largest)
+    steps, largest = _graded(scene, end)
     drives = different_drives(scene)
     stops = np.unique(np.concatenate([breakpoints(each.motion, end) for each in drives]))
     solver = ImplicitSolver(

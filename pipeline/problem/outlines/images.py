@@ -67,7 +67,9 @@ def read_outlines(
         what = "a drawing has no grey levels"
         raise UserError(what, remedy="remove `threshold` and `invert`; its filled parts are read")
     if not outlines:
-        remedy = "draw the void dark on a light ground, or give `invert: true` for a light void"
+        remedy = (
+            "draw it dark on a light ground, or say that it is light: `invert: true` (`--invert`)"
+        )
         raise UserError("the image shows no shape", remedy=remedy)
     read = tuple(
         tuple((round(float(x), 6), round(-float(y), 6)) for x, y in points) for points in outlines
@@ -124,7 +126,10 @@ def _dark(held: bytes, threshold: float | None, invert: bool) -> NDArray[np.uint
     between = float(np.mean((grey >= DARK) & (grey <= LIGHT)))
     if threshold is None and between > LARGEST_BLUR:
         what = f"the image is not binary: {between:.0%} of its pixels are neither dark nor light"
-        remedy = "save it as black on white, or give the grey level that parts it: `threshold: 0.5`"
+        remedy = (
+            "save it as black on white, or give the grey level below which a pixel is in the shape:"
+            " `threshold: 0.5` (`--threshold 0.5`; 0.95 takes every colour on white or on nothing)"
+        )
         raise UserError(what, remedy=remedy)
     level = (DARK + LIGHT) / 2 if threshold is None else 255 * threshold
     return ((grey >= level) if invert else (grey < level)).astype(np.uint8)

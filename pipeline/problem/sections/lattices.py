@@ -11,7 +11,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
-from pydantic import Discriminator, Field, StringConstraints, Tag, ValidationInfo, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    ValidationInfo,
+    model_validator,
+)
 from pydantic.json_schema import SkipJsonSchema
 
 from pipeline.problem.fields import FOLDER, SIM_UNITS, Angle, Coordinate, Length, Section, fault
@@ -187,7 +195,7 @@ class Honeycomb(_WithNetwork, Regular):
     """
 
     corners: ClassVar[int] = 3
-    kind: Literal["honeycomb"]
+    kind: Annotated[Literal["honeycomb", "hexagonal"], AfterValidator(lambda _: "honeycomb")]
     bias_angle: Angle = 0.0
 
     def network(self) -> Network:
@@ -347,7 +355,7 @@ class ListedNetwork(_WithNetwork):
 
 def _kind(value: object) -> str:
     named = value.get("kind", "quads") if isinstance(value, dict) else getattr(value, "kind", "")
-    return str(named)
+    return "honeycomb" if named == "hexagonal" else str(named)
 
 
 Lattice = Annotated[

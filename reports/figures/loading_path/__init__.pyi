@@ -3,7 +3,6 @@ from . import facts as facts
 from . import figure as figure
 from . import measures as measures
 from .abscissa import abscissa_of as abscissa_of
-from .abscissa import display_name as display_name
 from .abscissa import structures as structures
 from .contact_comparison import overlapping as overlapping
 from .curves import measure_panel as measure_panel

@@ -125,17 +125,6 @@ def structures(response: xr.Dataset) -> tuple[str, ...]:
     return tuple(name for name in ORDER if name in held)
 
 
-def display_name(problem: Problem, structure: str) -> str:
-    """Tells what a figure calls a structure."""
-    if structure != "altered":
-        return structure.capitalize()
-    if getattr(problem, "void", None) is not None:
-        return "Voided"
-    if getattr(problem, "inclusion", None) is not None:
-        return "Stiffened"
-    return "Uncloaked"
-
-
 def lattice_size(lattice: Lattice) -> str:
     """Tells how many units a lattice has, in words."""
     if isinstance(lattice, ListedNetwork):

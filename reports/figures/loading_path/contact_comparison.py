@@ -5,11 +5,12 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import xarray as xr
 
+from pipeline.problem import Problem
 from reports.facts import Fact, number, percent, share, stability_facts, worded
 from reports.figures.loading_path import measures
 from reports.figures.loading_path.abscissa import structures
 from reports.figures.loading_path.curves import over_cases
-from reports.study import RedesignResults, StudyResults
+from reports.study import RedesignResults, StudyResults, display_name
 
 
 def contact_facts(study: StudyResults) -> Iterator[Fact]:
@@ -20,13 +21,13 @@ def contact_facts(study: StudyResults) -> Iterator[Fact]:
     if not study.problem.static:
         return
     names = [name for name in structures(study.response) if name != "intact"]
-    yield from _by_law(study.response, names, study.problem.contact.law)
+    yield from _by_law(study.problem, study.response, names, study.problem.contact.law)
     if study.redesign is not None:
         yield from _again(study, study.redesign)
 
 
 def _by_law(
-    response: xr.Dataset, names: Sequence[str], own: str, whose: str = ""
+    problem: Problem, response: xr.Dataset, names: Sequence[str], own: str, whose: str = ""
 ) -> Iterator[Fact]:
     """Yields a row for every structure and law; the other law's tells the change from `own`."""
     losses = response["loss_by_contact"].mean("case")
@@ -36,7 +37,8 @@ def _by_law(
             part = response.sel(structure=name, contact_law=law)
             loss = float(losses.sel(structure=name, contact_law=law))
             key = f"contact_{law}_{whose or name}"
-            label = f"Loss, {name}{whose and ', second design'}, contact by the {law} law"
+            words = display_name(problem, name).lower()
+            label = f"Loss, {words}{whose and ', second design'}, contact by the {law} law"
             if np.isnan(loss):
                 yield Fact(key, label, loss, unit, "—", note="no result")
                 continue
@@ -69,10 +71,10 @@ def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
         words = f"optimised again, {again.evaluations} evaluations"
     yield Fact("second_design", "Second design", np.nan, "1", words, note=note)
     if again.changed:
-        yield from _by_law(again.response, ["cloaked"], "angle", "second")
+        yield from _by_law(study.problem, again.response, ["cloaked"], "angle", "second")
     loss = over_cases(study.problem, again.response["loss"])
     start, end = (float(loss.sel(structure=name)) for name in ("altered", "cloaked"))
-    note = "from that of the altered lattice, both with contact on distance"
+    note = "from that of the lattice without a cloak, both with contact on distance"
     yield share("second_loss_reduction", "Its loss reduced by", 1.0 - end / start, note=note)
     measure = measures.measure_of(study.problem)
     values = over_cases(study.problem, measure.of(again.response)).isel(time=-1)
@@ -84,7 +86,7 @@ def _again(study: StudyResults, again: RedesignResults) -> Iterator[Fact]:
     gap = worded(float(part["min_gap"].min()), "mm", 2)
     note = f"the most of all loads, by geometry; smallest gap {gap}"
     yield number("second_overlaps", "Its overlapping pairs", int(part["overlaps"].max()), note=note)
-    yield from stability_facts("second design", part)
+    yield from stability_facts("second_design", part, "second design")
     history = again.design.isel(method=0)
     violation = float(history["violation"].isel(evaluation=int(history["best_evaluation"])))
     label = "Its largest constraint violation"

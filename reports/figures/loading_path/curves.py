@@ -15,13 +15,12 @@ from reports.figures.loading_path.abscissa import (
     SECOND,
     Abscissa,
     abscissa_of,
-    display_name,
     load_names,
     structures,
 )
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
-from reports.study import RedesignResults, StudyResults
+from reports.study import RedesignResults, StudyResults, display_name
 
 BAND = (5.0, 95.0)
 """Percentiles of the imperfect copies that a band spans."""

@@ -27,7 +27,6 @@ from reports.figures.loading_path import contact_comparison, measured, measures,
 from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
-    display_name,
     driven_side,
     lattice_size,
     load_kind,
@@ -36,7 +35,7 @@ from reports.figures.loading_path.abscissa import (
 )
 from reports.figures.loading_path.curves import over_cases
 from reports.page import RobustTable
-from reports.study import StudyResults, from_dataset
+from reports.study import StudyResults, display_name, from_dataset
 from sim.core import Floats
 
 
@@ -261,7 +260,7 @@ def contraction_facts(study: StudyResults, path: Abscissa) -> Iterator[Fact]:
         time=-1
     )
     count = len(middle_units(study.problem, "top"))
-    note = f"loss of distance between top and bottom rows, mean of the middle {count} units"
+    note = f"how much nearer top and bottom rows come, mean of the middle {count} units"
     for name in structures(study.response):
         label = f"Contraction, {display_name(study.problem, name).lower()}"
         value = float(nearer.sel(structure=name))

@@ -14,7 +14,6 @@ from reports.figures.loading_path import curves, measures, tables
 from reports.figures.loading_path.abscissa import (
     Abscissa,
     abscissa_of,
-    display_name,
     lattice_size,
     structures,
 )
@@ -36,7 +35,7 @@ from reports.panels import (
     structure_clip,
     with_recordings,
 )
-from reports.study import StudyResults
+from reports.study import StudyResults, display_name
 
 TALLEST_SNAPSHOTS = 116.0
 """Height that all snapshots may take, mm."""

@@ -10,10 +10,10 @@ from pipeline.comparison import compute_reduction
 from reports.base import style
 from reports.facts import MEASURED, Fact, intervals, number, share
 from reports.figures.loading_path import measures
-from reports.figures.loading_path.abscissa import Abscissa, display_name
+from reports.figures.loading_path.abscissa import Abscissa
 from reports.figures.loading_path.measures import Measure
 from reports.panels import measured_overlay
-from reports.study import RecordedMotion, StudyResults
+from reports.study import RecordedMotion, StudyResults, display_name
 from sim.core import Floats
 
 Of = Callable[[xr.Dataset], xr.DataArray]

@@ -110,7 +110,7 @@ def squares(displacement: xr.DataArray, scale: tuple[float, float, float]) -> xr
 
 
 def contraction(problem: Problem, response: xr.Dataset) -> xr.DataArray:
-    """Loss of distance in mm between the top and the bottom units of the lattice's middle half."""
+    """Finds how much nearer top and bottom units of the lattice's middle half come, mm."""
     top, bottom = (middle_units(problem, side) for side in ("top", "bottom"))
     rise = response["displacement"].sel(dof="uy")
     nearer: xr.DataArray = rise.sel(unit=bottom).mean("unit") - rise.sel(unit=top).mean("unit")

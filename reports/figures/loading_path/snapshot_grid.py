@@ -14,13 +14,12 @@ from reports.figures.loading_path.abscissa import (
     SECOND,
     Abscissa,
     abscissa_of,
-    display_name,
     load_names,
     structures,
 )
 from reports.figures.loading_path.structure_panels import UnitColouring, shade_of
 from reports.panels import colour_bar, draw
-from reports.study import StudyResults, from_dataset
+from reports.study import StudyResults, display_name, from_dataset
 
 LABEL, BAR, GAP = 6.0, 14.0, 1.2
 """Room for labels left of snapshots and for the bar of colours, and between snapshots; mm."""

@@ -10,7 +10,6 @@ from reports.figures.loading_path import (
     UnitColouring,
     abscissa_of,
     curves,
-    display_name,
     measures,
     shade_bar,
     shade_of,
@@ -18,7 +17,7 @@ from reports.figures.loading_path import (
     structures,
 )
 from reports.panels import Panel, PanelFigure
-from reports.study import StudyResults
+from reports.study import StudyResults, display_name
 
 PER_BAND = 2
 """Studies beside one another, each with its altered and its cloaked structure."""

@@ -10,11 +10,11 @@ from pipeline.runtime import UserError
 from reports.base import Table
 from reports.facts import Fact, fact_records
 from reports.figures import loading_path
-from reports.figures.loading_path import abscissa_of, display_name, measures, structures
+from reports.figures.loading_path import abscissa_of, measures, structures
 from reports.figures.several_studies.figure import heading, several_studies_figure
 from reports.page import PageText, Report, publish, study_page
 from reports.panels import Animation, case_labels, structure_clip
-from reports.study import StudyResults, study_results
+from reports.study import StudyResults, display_name, study_results
 
 
 def several_studies_report(
@@ -33,7 +33,7 @@ def several_studies_report(
         title=asked.title or ", ".join(map(heading, studies)),
         lead=asked.doc.strip(),
         credit=_credit(studies),
-        figure_title=asked.title,
+        figure_title="Figure",
         caption=_caption(studies),
         headline=headline,
     )
@@ -76,8 +76,8 @@ def _caption(studies: Sequence[StudyResults]) -> str:
     names = ", ".join(heading(study).lower() for study in studies)
     return (
         f"Structures ({names}) before loading and at full load, true to scale, coloured by "
-        "u<sub>y</sub>: intact, altered and cloaked. Below, for each: the loss of distance between "
-        "the top and the bottom row, mean over the middle columns, and the mimicking error along "
+        "u<sub>y</sub>: intact, without and with a cloak. Below, for each: how much nearer the top "
+        "and the bottom row come, mean over the middle columns, and the mimicking error along "
         f"the load{loading_path.marks(studies)}."
     )
 

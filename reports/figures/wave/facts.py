@@ -9,7 +9,6 @@ from pipeline.problem.sections import RampHarmonicDrive
 from reports.facts import Fact, checks, grouped, number, share, within, worded
 from reports.figures.loading_path import (
     abscissa_of,
-    display_name,
     loss_facts,
     measures,
     over_cases,
@@ -19,7 +18,7 @@ from reports.figures.loading_path import (
 )
 from reports.figures.wave.closed_voids import edge_contacts
 from reports.figures.wave.monitored_places import places, relative_error
-from reports.study import StudyResults
+from reports.study import StudyResults, display_name
 
 
 def wave_facts(study: StudyResults) -> list[Fact]:

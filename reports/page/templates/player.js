@@ -131,7 +131,8 @@
   if (data.cases.length > 1) {
     menu("Load", data.cases, state.load, (index) => { state.load = index; }).id = "player-case";
   }
-  menu("Colour", data.fields.map((field) => field.label.replace("_", "")), 0,
+  const named = { u_x: "displacement along x", u_y: "displacement along y" }; // no index in a menu
+  menu("Colour", data.fields.map((field) => named[field.label] || field.label), 0,
     (index) => { state.field = index; paintBar(); }).id = "player-field";
   if (residual.some((cases) => cases.some(Boolean))) {
     menu("View", ["motion", "residual: measured less simulated"], 0,

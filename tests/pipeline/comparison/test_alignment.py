@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from pipeline.comparison.alignment import (
     LOADING,
@@ -29,9 +30,13 @@ def sine(time: np.ndarray) -> np.ndarray:
 NOMINAL = SampledMotion(TIMES, sine(TIMES))
 
 
-def filmed(lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0) -> SampledMotion:
+def filmed(
+    lag: float, frames: int = 90, noise: float = 0.0, seed: int = 0, alike: float = 0.0
+) -> SampledMotion:
+    """Films the drive with noise, whose neighbours are correlated by `alike`."""
     time = np.arange(frames) / RATE
     drawn = np.random.default_rng(seed).normal(0.0, noise, (frames, 2))
+    drawn = lfilter([np.sqrt(1 - alike**2)], [1.0, -alike], drawn, axis=0)
     return SampledMotion(time, sine(time - lag) + drawn)
 
 
@@ -43,8 +48,11 @@ def test_a_known_lag_is_found_to_a_hundredth_of_a_frame(lag: float) -> None:
     assert found.gain == pytest.approx(1.0, abs=1e-3)
 
 
-def test_the_stated_uncertainty_of_the_lag_is_that_of_the_result() -> None:
-    found = [find_lag(filmed(0.21, noise=0.05, seed=seed), NOMINAL) for seed in range(40)]
+@pytest.mark.parametrize("alike", [0.0, 0.8])
+def test_the_stated_uncertainty_of_the_lag_is_that_of_the_result(alike: float) -> None:
+    found = [
+        find_lag(filmed(0.21, noise=0.05, seed=seed, alike=alike), NOMINAL) for seed in range(40)
+    ]
     off = np.array([(each.value - 0.21) / each.sigma for each in found])
     assert 0.65 < np.std(off) < 1.35
     assert found[0].sigma < 0.05 / RATE

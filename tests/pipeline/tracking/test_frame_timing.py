@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.tracking.frames import video
-from pipeline.tracking.motion import frame_timing, uncertainty
+from pipeline.tracking.motion import frame_timing, uncertainty, video_tracking
 
 NOISE = 0.004
 FRAMES = 60
@@ -52,6 +52,16 @@ def test_a_varying_rate_is_no_row_of_gaps() -> None:
 def test_a_specimen_that_rests_is_no_row_of_repeated_frames() -> None:
     moved = motion(np.maximum(np.arange(FRAMES) - 20.0, 0.0))
     assert faults(moved, same=tuple(range(1, 20))) == {}
+    assert faults(motion(np.arange(FRAMES)), same=tuple(range(20, 25))) == {}
+
+
+def test_a_picture_is_the_same_but_for_a_codec() -> None:
+    """Up to half a percent of the pixels may differ by more than a level."""
+    before = np.full((100, 100), 90, dtype=np.uint8)
+    for differing, by, same in ((10_000, 1, True), (49, 2, True), (50, 2, False)):
+        image = before.copy()
+        image.flat[:differing] += by
+        assert video_tracking._same(before, image) == same
 
 
 def test_frames_shown_again_are_found() -> None:
@@ -60,6 +70,9 @@ def test_frames_shown_again_are_found() -> None:
     moved = motion(clock)
     moved[25] = moved[24]
     assert faults(moved, same=(25,)) == {25: frame_timing.DUPLICATE}
+    held = np.arange(FRAMES) - np.clip(np.arange(FRAMES) - 24, 0, 4)  # four in a row
+    again = tuple(range(25, 29))
+    assert faults(motion(held), same=again) == dict.fromkeys(again, frame_timing.DUPLICATE)
 
 
 @pytest.mark.parametrize("step", [0.05, 0.5, 5.0])

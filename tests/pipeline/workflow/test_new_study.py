@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from PIL import Image, ImageDraw
 
 from pipeline.__main__ import run_stage
 from pipeline.problem import void_units
@@ -31,12 +32,31 @@ def test_an_image_becomes_the_void(tmp_path: Path, name: str) -> None:
     assert len(void_units(load(tmp_path / "cat/problem.yaml"))) > 30
 
 
+def test_a_coloured_logo_becomes_the_void(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Neither dark nor light on nothing; then light on dark."""
+    logo, shape = Image.new("RGBA", (200, 200)), (20, 20, 180, 180)
+    ImageDraw.Draw(logo).ellipse(shape, fill=(200, 160, 40, 255))
+    logo.save(tmp_path / "logo.png")
+    words = ["--image", str(tmp_path / "logo.png"), "--folder", str(tmp_path)]
+    assert run_stage("new", ["one", *words]) == 2
+    assert "--threshold" in capsys.readouterr().err
+    assert run_stage("new", ["one", *words, "--threshold", "0.95"]) == 0
+    Image.alpha_composite(Image.new("RGBA", logo.size, "black"), logo).save(tmp_path / "logo.png")
+    assert run_stage("new", ["two", *words, "--threshold", "0.2", "--invert"]) == 0
+    one, two = (void_units(load(tmp_path / name / "problem.yaml")) for name in ("one", "two"))
+    assert one == two
+    assert len(one) == 52
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
         (["2fast"], "not a name for a study"),
         (["taken"], "there is a study of this name"),
         (["x", "--image", "none.png"], "the image cannot be read"),
+        (["x", "--image", str(CAT), "--threshold", "7"], f"file:   {CAT}"),
         (["x", "--image", str(CAT), "--kind", "dynamic"], "the dynamic template has no void"),
     ],
 )

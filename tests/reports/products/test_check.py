@@ -48,7 +48,7 @@ def test_the_cost_grows_as_the_factor_does(tmp_path: Path) -> None:
     for size in (15, 30):
         path = static.write(tmp_path, static.SHIELD if size == 15 else static.HEART, size=size)
         scene = scene_of(load(path), tmp_path)
-        costs.append(estimate_cost(scene, len(sample_times(scene))))
+        costs.append(estimate_cost(scene, sample_times(scene)))
     assert costs[1].unknowns > 3.5 * costs[0].unknowns
     assert costs[1].seconds > 3.5 * costs[0].seconds
     assert "min on one core" not in cost_line(load(path), scene)

@@ -20,7 +20,7 @@ from sim.scene import (
     scales,
     simulate,
 )
-from sim.scene.time_solver import RULES, different_drives
+from sim.scene.time_solver import RULES, different_drives, expected_steps
 from sim.solvers import Harmonic, MotionLaw, Pulse, TimeSeries, breakpoints, solve_case
 from sim.structure import ContactModel, DistanceContact, VoidAngleContact
 from sim.time_integration import ExplicitSolver, ImplicitSolver
@@ -71,6 +71,27 @@ def test_implicit_steps_end_where_a_drive_turns(drive: str) -> None:
     turns = breakpoints(DRIVES[drive], 0.2)
     assert len(turns) >= 3
     assert np.abs(solver.times[:, None] - turns).min(axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("motion", "duration"),
+    [
+        (Harmonic(3.0, 2.0, 0.6), 1.0),
+        (DRIVES["near the lowest eigenfrequency"], 0.2),
+        (DRIVES["a short late pulse"], 0.2),
+    ],
+)
+def test_steps_are_guessed_without_a_solve(motion: MotionLaw, duration: float) -> None:
+    scene = posed(motion, duration=duration, frequency=getattr(motion, "frequency", None))
+    values, solver = concrete_parameters(scene, scene.lattice.vertices), make_plan(scene).solver
+    integrator, guessed = expected_steps(scene, values, sample_times(scene))
+    if isinstance(solver, ImplicitSolver):
+        steps, kind = len(solver.times) - 1, "implicit"
+    else:
+        assert isinstance(solver, ExplicitSolver)
+        steps, kind = solver.n_steps, "explicit"
+    assert integrator == kind
+    assert 0.5 < guessed / steps < 2
 
 
 def test_a_straight_series_has_no_kinks() -> None:
