@@ -134,7 +134,11 @@ format: dev
 bench: dev
 	$(BIN)/python -m benchmarks
 
+# In an environment of its own: pyvale brings another OpenCV and pins netCDF4.
 bench-tracking: dev
+	@test -x .cache/pyvale/bin/python || { $(BIN)/uv venv --quiet .cache/pyvale && $(BIN)/uv pip install --quiet \
+	    --only-binary :all: --python .cache/pyvale/bin/python pyvale==2026.10.2; } || \
+	    { rm -rf .cache/pyvale; echo "pyvale cannot be installed here: its columns stay empty"; }
 	$(BIN)/python -m benchmarks tracking $(if $(VIDEOS),--videos "$(VIDEOS)")
 
 stress: dev

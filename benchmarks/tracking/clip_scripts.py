@@ -194,6 +194,12 @@ def _off_corner(time: Floats) -> Floats:
     return 150.0 * 0.5 * (1 - np.cos(np.pi * time[:, None] / 0.8)) * np.array([-1.0, -0.9])
 
 
+def _steadied(time: Floats) -> Floats:
+    """Sways as a phone does whose lens is steadied, mm."""
+    x, y = 1.5 * np.sin(2 * np.pi * 0.6 * time), 0.05 * np.sin(2 * np.pi * 5.3 * time) - 1.0 * time
+    return np.stack([x, y], axis=-1)
+
+
 def _shaken(time: Floats) -> Floats:
     """Shakes as hands do: slow sway and tremor, mm."""
     return np.stack(
@@ -266,8 +272,17 @@ SCRIPTS: dict[str, ClipScript] = {
         cover=_second,
     ),
     "glare": ClipScript(cover=_glare, hidden=_under_glare, times=_FAST),
+    "shaken_and_rolling": ClipScript(
+        shift=_shaken,
+        view=View(readout=0.02),
+        keys={"readout": 0.02, "follows_supports": True},
+        follows=True,
+    ),
     "returns_turned": ClipScript(
-        shift=_off_corner, turn=lambda t: 2.6 * np.clip((t - 0.7) / 0.2, 0, 1), times=_LONG
+        shift=_off_corner,
+        turn=lambda t: 2.6 * np.clip((t - 0.7) / 0.2, 0, 1),
+        times=_LONG,
+        grid={**GRID, "grid": [9, 8]},
     ),
     "turns_over_in_view": ClipScript(
         turn=lambda t: 5.0 * t, view=View(size=(800, 800)), times=_FAST
@@ -280,7 +295,7 @@ SCRIPTS: dict[str, ClipScript] = {
         shift=_shaken, keys={"follows_supports": True}, follows=True, times=_LONG
     ),
     "phone": ClipScript(
-        shift=_shaken,
+        shift=_steadied,
         pace=_sway,
         view=View(readout=0.02, exposure=0.008, size=(720, 720)),
         cover=_bolts,

@@ -1,10 +1,14 @@
 """Measures patches of photographs and of DIC Challenge images whose motions are known.
 
 Every patch is found unaided, then fitted by the tracker's correlation and, from the same start, by
-OpenCV's pyramidal optical flow.
+OpenCV's pyramidal optical flow. pyvale correlates the same pictures by itself, from where they move
+least, in an environment of its own.
 """
 
 import csv
+import logging
+import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +23,10 @@ from pipeline.tracking.geometry import rigid_motion, rotation_matrix
 from pipeline.tracking.motion import Patch, find_motion, fit_motion
 from sim.core import Floats
 
+LOG = logging.getLogger("pipeline.benchmarks")
+
+PYVALE = Path(".cache/pyvale/bin/python")
+"""Environment that `make bench-tracking` makes."""
 IMAGES = Path("tests/data/tracking/dic")
 PICTURES = Path("experiments/validation/pictures.yaml")
 _HALF, _STEP = 20, 4
@@ -94,37 +102,83 @@ def flowed(patch: Patch, start: Floats) -> Floats:
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
     kept = good.ravel() > 0
-    if kept.sum() < 3:
+    return _rigid(patch, points[kept], found[kept].astype(float))
+
+
+def _rigid(patch: Patch, before: Floats, after: Floats) -> Floats:
+    """Fits the motion (3,) to points (n, 2) of a patch; NaN if they are too few."""
+    if len(before) < 3:
         return np.full(3, np.nan)
-    turn, shift = rigid_motion(about[kept], found[kept] - patch.centre)
+    turn, shift = rigid_motion(before - patch.centre, after - patch.centre)
     return np.append(shift, turn)
+
+
+def correlated(known: list[KnownPatch]) -> Floats:
+    """Fits motions (patches, 3) to points that pyvale follows; NaN where it finds none.
+
+    Each pair of pictures is correlated once, whatever patches are in it.
+    """
+    pairs: dict[tuple[bytes, bytes], list[int]] = {}
+    for number, one in enumerate(known):
+        key = one.patch.before.tobytes(), one.patch.after.tobytes()
+        pairs.setdefault(key, []).append(number)
+    given: dict[str, np.ndarray] = {}
+    out = np.full((len(known), 3), np.nan)
+    for k, numbers in enumerate(pairs.values()):
+        least = min(numbers, key=lambda one: float(np.linalg.norm(known[one].motion)))
+        patch = known[least].patch
+        given |= {f"before_{k}": patch.before, f"after_{k}": patch.after, f"seed_{k}": patch.centre}
+    with tempfile.TemporaryDirectory() as folder:
+        pictures, found = Path(folder) / "pictures.npz", Path(folder) / "points.npz"
+        np.savez(pictures, allow_pickle=False, **given)
+        script = Path(__file__).resolve().with_name("pyvale_points.py")
+        command = [PYVALE.absolute(), script, pictures, found]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=folder)
+        points = dict(np.load(found))
+    for k, numbers in enumerate(pairs.values()):
+        for number in numbers:
+            patch, seen = known[number].patch, points[f"points_{k}"]
+            shape = patch.outline.astype(np.float32)
+            inside = [cv2.pointPolygonTest(shape, one[:2].tolist(), False) > 0 for one in seen]
+            kept = seen[np.array(inside, bool)]
+            out[number] = _rigid(patch, kept[:, :2], kept[:, 2:])
+    return out
 
 
 def table(folder: Path = IMAGES) -> str:
     """Measures all patches; returns the lines of their table: mean and spread of the errors."""
-    errors: dict[str, list[tuple[Floats, Floats]]] = {}
-    for known in patches(folder):
-        patch, start = known.patch, find_motion(known.patch)
-        both = [np.full(3, np.nan), np.full(3, np.nan)]
+    known = list(patches(folder))
+    errors = np.full((len(known), 3, 3), np.nan)
+    for error, one in zip(errors, known, strict=True):
+        start = find_motion(one.patch)
         if start is not None:
-            both[0] = fit_motion(patch, start, whole=known.whole) - known.motion
-            both[1] = flowed(patch, start) - known.motion
-        for error in both:
-            error[2] = np.angle(np.exp(1j * error[2]))
-        errors.setdefault(known.group, []).append((both[0], both[1]))
+            error[0] = fit_motion(one.patch, start, whole=one.whole) - one.motion
+            error[1] = flowed(one.patch, start) - one.motion
+    named = "pyvale"
+    if PYVALE.exists():
+        errors[:, 2] = correlated(known) - [one.motion for one in known]
+    else:
+        named = "pyvale (not installed)"
+        LOG.warning("warning: %s is not there: `make bench-tracking` installs pyvale", PYVALE)
+    errors[..., 2] = np.angle(np.exp(1j * errors[..., 2]))
+    told = "found | bias x, y px; deg | spread x, y px; deg"
     lines = [
-        "| patches | found | own: bias x, y px; deg | spread x, y px; deg |"
-        " optical flow: bias x, y px; deg | spread x, y px; deg |",
-        "|---|---|---|---|---|---|",
+        f"| patches | own: {told} | optical flow: {told} | {named}: {told} |",
+        "|---" * 10 + "|",
     ]
-    for group, found in errors.items():
-        measured = np.array(found)
-        seen = np.isfinite(measured[:, 0, 0])
-        own, flow = (_cells(measured[seen, method]) for method in range(2))
-        lines.append(f"| {group} | {seen.sum()} of {len(seen)} | {own} | {flow} |")
+    for group in dict.fromkeys(one.group for one in known):
+        chosen = errors[[one.group == group for one in known]]
+        lines.append(f"| {group} | {' | '.join(map(_cells, chosen.swapaxes(0, 1)))} |")
     return "\n".join(lines)
 
 
 def _cells(error: Floats) -> str:
-    bias, spread = np.nanmean(error, axis=0), np.nanstd(error, axis=0)
-    return " | ".join(f"{x:.4f}, {y:.4f}; {np.rad2deg(turn):.3f}" for x, y, turn in (bias, spread))
+    """Describes errors (patches, 3): how many there are, their mean, their spread."""
+    seen = error[np.isfinite(error[:, 0])]
+    if not len(seen):
+        return f"0 of {len(error)} | |"
+    told = [
+        f"{x:.4f}, {y:.4f}; {np.rad2deg(turn):.3f}"
+        for x, y, turn in (seen.mean(axis=0), seen.std(axis=0))
+    ]
+    return f"{len(seen)} of {len(error)} | {' | '.join(told)}"

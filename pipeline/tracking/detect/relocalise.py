@@ -10,7 +10,6 @@ from pipeline.tracking.detect.lattice_votes import Placement, locate_lattice
 from pipeline.tracking.geometry import Camera, SpecimenOutlines
 from sim.core import Floats, Mask
 
-_MOST_TURN = np.deg2rad(44.0)
 _MARGIN = 1.0
 """A unit nearer to the rim of the picture is not expected to be a patch of its own, radii."""
 _CLEAR, _FEWEST = 0.1, 3
@@ -18,6 +17,13 @@ _CLEAR, _FEWEST = 0.1, 3
 _BETTER, _HALF_SEEN, _AGREEING = 1.2, 0.5, 0.2
 _ELSEWHERE = 0.5
 """Distance of places that are others, pitches."""
+
+
+class LatticePlace(NamedTuple):
+    """Holds poses (units, 3) of a lattice, and its turn since it was seen last, rad."""
+
+    pose: Floats
+    turn: float
 
 
 class Relocaliser(NamedTuple):
@@ -38,11 +44,10 @@ class Relocaliser(NamedTuple):
         place = self.camera.project(self.specimen.centre + pose[:, :2])
         return self._inside(place, margin)
 
-    def placed_again(self, image: Picture, pose: Floats, now: Floats) -> Floats | None:
-        """Returns poses (units, 3) of the lattice where patches show it, or nothing.
+    def placed_again(self, image: Picture, pose: Floats, now: Floats) -> list[LatticePlace]:
+        """Returns where patches show the lattice; places that explain as much go by rising turn.
 
-        Nothing is returned where fewer patches match than good units claim, or where two places
-        explain the picture about as well.
+        Nothing is returned where fewer patches match than good units claim.
 
         Args:
             image: the frame.
@@ -54,24 +59,27 @@ class Relocaliser(NamedTuple):
         patches = self.camera.unproject(find_blobs(image, self.specimen, scale, self.bright))
         good = np.isfinite(now[:, 0])
         if len(patches) <= _BETTER * good.sum():
-            return None
+            return []
 
         def inside(place: Floats) -> Mask:
             return self._inside(self.camera.project(place), _MARGIN)
 
         before = centre + pose[:, :2]
-        found = locate_lattice(before, self.specimen.joint, patches, 1.0, inside, _MOST_TURN)
+        found = locate_lattice(before, self.specimen.joint, patches, 1.0, inside)
         if not found:
-            return None
+            return []
         best = found[0]
         moved = np.linalg.norm(best.place - centre - now[:, :2], axis=1)[good]
         if len(best.unit) <= _BETTER * good.sum() or best.missing > _HALF_SEEN * len(best.unit):
-            return None
+            return []
         if (moved < _ELSEWHERE * pitch).sum() > _AGREEING * len(best.unit):
-            return None  # what is found is where it was taken to be
-        if any(self._rivals(best, other) for other in found[1:]):
-            return None
-        return np.column_stack([best.place - centre, pose[:, 2] + best.turn])
+            return []  # what is found is where it was taken to be
+        alike = [best, *(other for other in found[1:] if self._rivals(best, other))]
+        alike.sort(key=lambda one: abs(one.turn))
+        return [
+            LatticePlace(np.column_stack([one.place - centre, pose[:, 2] + one.turn]), one.turn)
+            for one in alike
+        ]
 
     def _rivals(self, best: Placement, other: Placement) -> bool:
         apart = np.median(np.linalg.norm(best.place - other.place, axis=1))

@@ -230,8 +230,9 @@ def _derive(look: TemplateArrays, state: Floats, pixels: int, room: FitBuffers) 
         rows[1, k] = -sin * along_x - cos * along_y
         rows[2, k] = (along_x * y - along_y * x) * step
         rows[4, k] = 1
-        rows[5, k] = x * per_half
-        rows[6, k] = y * per_half
+        lit = per_half * rows[3, k]
+        rows[5, k] = x * lit
+        rows[6, k] = y * lit
         model = gain * rows[3, k] + offset + slope_x * rows[5, k] + slope_y * rows[6, k]
         residual[k] -= model
 

@@ -3,7 +3,7 @@
 The raw pixels of a frame are compared with the template of a unit, seen through the camera: no
 frame is interpolated, so its noise is not either. Four photometric unknowns (gain, offset and its
 slopes) go along with the three of the pose; weights of Geman and McClure take care of what does not
-belong to the unit.
+belong to the unit. Light scales what it falls on, so its slopes do too.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class PoseFits(NamedTuple):
 
     Attributes:
         pose: (units, 3) displacement in mm and rotation in rad.
-        photometry: (units, 4) gain, offset and its slopes over `half`.
+        photometry: (units, 4) gain, offset, and the gain's slopes over `half`.
         curvature: (units, 5, 5) covariance of the pose and of the light's slopes, for residuals of
             standard deviation one.
         scatter: (units, 5, 5) the same from the scores of blocks of pixels, which may be

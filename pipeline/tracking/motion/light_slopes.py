@@ -1,9 +1,9 @@
 """Filters the light's slopes over units in time, and takes out of poses what their noise put in.
 
-A slope of the light over a unit looks like a shift of it: fitted anew in each frame, it nearly
-doubles the variance of places. Light changes slowly, so the slopes follow a random walk, whose
-steps the units tell together (Kalman, J. Basic Eng. 82 (1960) 35). A unit whose slopes leave it, in
-the shadow of a hand, counts by what it shows alone, and starts anew.
+A slope of the light over a unit, as a part of its brightness, looks like a shift of it: fitted anew
+in each frame, it nearly doubles the variance of places. Light changes slowly, so the slopes follow
+a random walk, whose steps the units tell together (Kalman, J. Basic Eng. 82 (1960) 35). A unit
+whose slopes leave it, in the shadow of a hand, counts by what it shows alone, and starts anew.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class LightSlopes:
         self._noisier = 1 + 1 / averaged
         self._mean = np.zeros((units, 2))
         self._variance = np.zeros((units, 2, 2))
-        self._walk = 0.0
+        self._walk = np.zeros(2)
         self._straying = np.ones(units)
 
     def apply(self, fits: PoseFits, good: Mask) -> None:
@@ -45,7 +45,7 @@ class LightSlopes:
         units = np.flatnonzero(good & np.isfinite(fits.curvature[:, 0, 0]))
         if not len(units):
             return
-        self._variance += max(self._walk, 0.0) * np.eye(2)
+        self._variance += np.diag(np.maximum(self._walk, 0.0))
         white = fits.noise[units, None, None] ** 2
         covariance = self._noisier * coded * white * fits.curvature[units]
         known = self._variance[units]
@@ -55,8 +55,8 @@ class LightSlopes:
         far = np.einsum("ui,uij,uj->u", surprise, inverse, surprise)
         self._straying[units] += (1 - _KEPT_OWN) * (far / 2 - self._straying[units])
         spread = np.einsum("uii->ui", total)
-        excess = np.median(surprise**2) / _CHI_SQUARE - np.median(spread)
-        self._walk = _KEPT * self._walk + (1 - _KEPT) * float(excess)
+        excess = np.median(surprise**2, axis=0) / _CHI_SQUARE - np.median(spread, axis=0)
+        self._walk = _KEPT * self._walk + (1 - _KEPT) * excess
         anew = (far > _SURPRISE) | (self._straying[units] > _STRAYING)
         lost = units[anew]
         self._mean[lost], self._variance[lost] = fits.photometry[lost, 2:], covariance[anew, 3:, 3:]

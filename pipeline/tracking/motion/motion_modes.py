@@ -21,7 +21,7 @@ IEEE Trans. Inf. Theory 60 (2014) 5040)."""
 _COMMON = 8
 _FILLINGS, _FILLED = 80, 0.1
 """Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
-_REACHES = (1, 2, 3, 4, 5)
+_REACHES = (1, 2, 3, 4, 5, 6)
 """Frames to either side of one whose place the polynomial through them tells."""
 _TELLING = 4
 """Fewest frames that tell how much a polynomial of higher order leaves."""
@@ -119,24 +119,26 @@ def constant_share(amplitude: Floats) -> float:
 def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
     """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
-    The order is the lowest that leaves little more than the next ones: more is motion. A jolt is
-    motion too, so values are held to a few times the usual; frames at the ends are as the next.
+    The order is the lowest that leaves little more than the next ones: more is motion. Where none
+    is, as the motion is too quick or too short, nothing is told. A jolt is motion too, so values
+    are held to a few times the usual; frames at the ends are as the next.
     """
     found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
     usual = np.full((len(found), amplitude.shape[1]), np.inf)
     for order, one in enumerate(found):
         told = np.isfinite(one).all(axis=1)
-        if told.sum() >= (_TELLING if order else 1):
+        if told.sum() >= _TELLING:
             usual[order] = np.median(np.abs(one[told]), axis=0) / 0.6745
-    usual = np.where(np.isfinite(usual).any(axis=0), usual, 0.0)
-    out = np.empty_like(amplitude)
+    last = int(np.isfinite(usual[:, :1]).sum()) - 1
+    out = np.zeros_like(amplitude)
     for column in range(amplitude.shape[1]):
         order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
+        if order >= last:
+            continue
         values, most = found[order][:, column], _JOLT * usual[order, column]
         known = np.nonzero(np.isfinite(values))[0]
-        if len(known):
-            values = np.interp(np.arange(len(values)), known, values[known])
-        out[:, column] = np.clip(np.nan_to_num(values), -most, most)
+        values = np.interp(np.arange(len(values)), known, values[known])
+        out[:, column] = np.clip(values, -most, most)
     return out
 
 

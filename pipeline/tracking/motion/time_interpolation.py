@@ -5,12 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.core import Floats, Ints, Mask, Reals
+from sim.core import Floats, Ints, Reals
 
 _KNOTS, _FEWEST = 7, 4
-"""Poses that a polynomial passes through, and the least beside the first and the last one."""
-_SPREAD = 1.5
-"""Seven frames that take longer than so many times the usual have a gap between them."""
+"""Poses that a polynomial passes through, at most and at least."""
 
 
 class _Interpolated(NamedTuple):
@@ -18,13 +16,11 @@ class _Interpolated(NamedTuple):
 
     Attributes:
         known: (n,) frames in which it is seen.
-        beside: (n,) which of them have none before, none after, or a gap beside.
         pose: (orders, n, 3) at the frames' times.
         growth: (orders, n, 3) variance over that of the poses seen.
     """
 
     known: Ints
-    beside: Mask
     pose: Floats
     growth: Floats
 
@@ -35,8 +31,8 @@ def at_frame_times(
     """Computes poses (frames, units, 3) at frames' times (frames,), by polynomials in time.
 
     A picture shows the mean over its exposure: x + bend x'', to second order. Polynomials pass
-    through the poses that are nearest in time. At and beyond the first and the last one, and in
-    gaps, they have the order with the least error: noise, and what the highest changes.
+    through the poses that are nearest in time, and have the order with the least error: noise, and
+    what the highest changes.
 
     Args:
         motion: as seen, NaN where missing.
@@ -51,26 +47,22 @@ def at_frame_times(
         is not known of the motion in between, and of the reference.
     """
     out, spread, missed = motion.copy(), sigma.copy(), np.zeros_like(motion)
-    usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     own, rest = averaged / (averaged + 1), 1 / (averaged + 1)
     error = np.zeros((_KNOTS - _FEWEST + 1, *motion.shape[::2]))
     for turn, unit in itertools.product(range(2), range(motion.shape[1])):
-        found = _unit_interpolated(motion[:, unit], time, late[:, unit], bend[:, unit], usual)
+        found = _unit_interpolated(motion[:, unit], time, late[:, unit], bend[:, unit])
         if found is None:
             continue
-        known, beside, pose, growth = found
+        known, pose, growth = found
         told = sigma[known, unit].astype(float)
         change = (pose[-1] - pose[:-1]) ** 2 - growth[-1] * told**2
         if turn == 0:  # all units tell of the order
-            ends = known[beside]
-            error[: len(change), ends] += (change / told**2 + growth[:-1])[:, beside]
-            error[len(change) :, ends] = np.inf
+            error[: len(change), known] += change / told**2 + growth[:-1]
+            error[len(change) :, known] = np.inf
             continue
-        last, beside = len(change) - 1, beside[:, None]
-        best = np.where(beside, np.minimum(np.argmin(error[:, known], axis=0), last), last)
+        best = np.minimum(np.argmin(error[:, known], axis=0), len(change) - 1)
         at = best, np.arange(len(known))[:, None], np.arange(3)
-        left = np.where(beside, np.maximum(change[at], 0.0), 0.0)
-        grown, first = growth[at], known < averaged
+        left, grown, first = np.maximum(change[at], 0.0), growth[at], known < averaged
         out[known, unit] = pose[at]
         spread[known, unit] = told * np.sqrt(own * grown + rest)
         if first.any():
@@ -92,7 +84,7 @@ def middle_speed(motion: Reals, time: Floats, frame: int) -> Floats:
 
 
 def _unit_interpolated(
-    motion: Reals, time: Floats, late: Floats, bend: Reals, usual: float
+    motion: Reals, time: Floats, late: Floats, bend: Reals
 ) -> _Interpolated | None:
     """Passes polynomials of rising order through the poses (frames, 3) of a unit, if they suffice.
 
@@ -106,14 +98,7 @@ def _unit_interpolated(
     most = min(_KNOTS + 1, len(known))
     found = [_passed(seen, now, shown, share, knots) for knots in range(_FEWEST, most + 1)]
     pose, growth = (np.array(values) for values in zip(*found, strict=True))
-    return _Interpolated(known, _beside(seen, now, usual), pose, growth)
-
-
-def _beside(seen: Floats, now: Floats, usual: float) -> Mask:
-    """Tells times that lie at or beyond the ends of those seen, or near a gap."""
-    near = _nearest(seen, now, min(_KNOTS, len(seen)))
-    wide = np.ptp(seen[near], axis=1) > _SPREAD * usual * (near.shape[1] - 1)
-    return np.asarray(wide | (now <= seen[0]) | (now >= seen[-1]))
+    return _Interpolated(known, pose, growth)
 
 
 def _nearest(seen: Floats, now: Floats, knots: int) -> Ints:

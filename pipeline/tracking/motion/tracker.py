@@ -1,17 +1,20 @@
 """Tracks units from frame to frame: predicted, fitted, judged, and relocalised."""
 
+import logging
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.runtime import Picture
-from pipeline.tracking.detect import Relocaliser
+from pipeline.tracking.detect import LatticePlace, Relocaliser
 from pipeline.tracking.fit import ExposureBlur, PoseFits, PoseFitter, SideWalls
 from pipeline.tracking.geometry import SpecimenOutlines
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.prediction import Neighbourhood, latest_velocity
 from sim.core import Floats, Ints, Mask, Reals
+
+LOG = logging.getLogger(__name__)
 
 GOOD, OUT_OF_FRAME, HIDDEN, GLARE, POOR_FIT, STRAYED = range(6)
 """Quality of a unit in a frame, and the reason why it is missing."""
@@ -49,6 +52,8 @@ _WHOLE = 0.8
 _OWN_TURNS = np.deg2rad([0, 15, -15, 30, -30])
 """Tried of every unit, beside the turn of a lattice that is found again; the first that fits. None
 but the first unless nearly all are in view, since a lattice turned so may lie a unit aside."""
+_OTHER_TURN = np.deg2rad(20.0)
+"""Between turns at which a lattice may look alike."""
 _CLOSE = 0.5
 """Two units nearer to each other than this part of their least distance at rest are one."""
 _ROUNDS = 40
@@ -98,6 +103,19 @@ class TrackedFrame(NamedTuple):
     quality: Ints
 
 
+class _Trial(NamedTuple):
+    """Holds what fits (units,) where a lattice may be, and whether these are most of its units."""
+
+    place: LatticePlace
+    fits: PoseFits
+    good: Mask
+    enough: bool
+
+
+def _otherwise_turned(one: LatticePlace, other: LatticePlace) -> bool:
+    return bool(np.abs(np.angle(np.exp(1j * (one.turn - other.turn)))) > _OTHER_TURN)
+
+
 class Tracker:
     """Follows all units through frames given in sequence.
 
@@ -109,6 +127,7 @@ class Tracker:
         shutter: of the camera.
         blur: by the exposure; without it, none is allowed for.
         slopes: of the light; without it, each frame tells its own.
+        seen: (units,) which are not hidden in the first frame; others have no reference.
 
     Attributes:
         exposure: of a row, s; zero as long as it is not known.
@@ -124,6 +143,7 @@ class Tracker:
         shutter: Shutter = _GLOBAL,
         blur: ExposureBlur | None = None,
         slopes: LightSlopes | None = None,
+        seen: Mask | None = None,
     ) -> None:
         self._fitter, self._relocaliser, self._walls = fitter, relocaliser, walls
         self._shutter, self._blur, self._slopes = shutter, blur, slopes
@@ -131,7 +151,9 @@ class Tracker:
         self._open = shutter.exposure is None and blur is not None
         self.blurs: list[MotionBlur] = []
         self._past: list[tuple[float, Floats]] = []
+        self._out_of_sight = False
         self._time, self._interval = 0.0, 0.0
+        self._seen = np.ones(specimen.count, bool) if seen is None else seen
         self._stray = _STRAY * specimen.pitch
         self._neighbours = Neighbourhood(specimen.centre)
         self._centre = specimen.centre
@@ -258,7 +280,7 @@ class Tracker:
             quick = np.linalg.norm((fits.pose - self._pose)[:, :2], axis=1) > _QUICK * self._pixel
             fitting &= ~(quick & (seen < _SHARP))
         lit = (relative > _GAIN[0]) & (relative < _GAIN[1]) & (fits.share > share)
-        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit
+        return np.isfinite(fits.pose[:, 0]) & settled & fitting & lit & self._seen
 
     def _complete(self, image: Picture, fits: PoseFits, good: Mask) -> Mask:
         """Looks for what is missing, where the good ones say."""
@@ -269,19 +291,62 @@ class Tracker:
     def _relocalise(self, image: Picture, fits: PoseFits, good: Mask) -> tuple[PoseFits, Mask]:
         """Tries all units anew where the lattice is found; keeps what is more."""
         now = np.where(good[:, None], fits.pose, np.nan)
-        placed = self._relocaliser.placed_again(image, self._whole, now)
-        if placed is None:
+        places = self._relocaliser.placed_again(image, self._whole, now)
+        if not places:
             return fits, good
-        again, new = fits.copy(), np.zeros_like(good)
-        self._pose = placed
-        most = self._relocaliser.in_view(placed).mean() > _WHOLE
+        before = self._pose
+        most = self._relocaliser.in_view(places[0].pose).mean() > _WHOLE
         for own in _OWN_TURNS if most else _OWN_TURNS[:1]:
-            guess = placed + np.array([0.0, 0.0, own])
-            new = self._try(image, again, new, (guess, self._photometry, None, _SHARE))
-            if new.sum() > _HALF * len(new):
+            tried = self._tried(image, fits, places, own)
+            enough = [trial for trial in tried if trial.enough]
+            if enough:
                 break
-        new = self._complete(image, again, new)
-        return (again, new) if new.sum() > good.sum() else (fits, good)
+        best = max(tried, key=lambda trial: trial.good.sum()) if not enough else enough[0]
+        if len(enough) < 2 or self._is_least_turn(best.place, enough[1].place):
+            self._pose = best.place.pose
+            new = self._complete(image, best.fits, best.good)
+            if new.sum() > good.sum():
+                return best.fits, new
+        self._pose = before
+        return fits, good
+
+    def _tried(
+        self, image: Picture, fits: PoseFits, places: list[LatticePlace], own: float
+    ) -> list[_Trial]:
+        """Fits all units where the lattice may be, each turned by some angle of its own.
+
+        All places are tried where nothing was seen before; else those turned least.
+        """
+        out: list[_Trial] = []
+        for place in places:
+            enough = [trial.place for trial in out if trial.enough]
+            if enough and not self._out_of_sight and _otherwise_turned(enough[0], place):
+                break
+            again, none = fits.copy(), np.zeros(len(place.pose), bool)
+            self._pose = place.pose
+            guess = place.pose + np.array([0.0, 0.0, own])
+            good = self._try(image, again, none, (guess, self._photometry, None, _SHARE))
+            there = self._relocaliser.in_view(place.pose).sum()
+            out.append(_Trial(place, again, good, bool(good.sum() > _HALF * there)))
+        return out
+
+    def _is_least_turn(self, best: LatticePlace, other: LatticePlace) -> bool:
+        """Tells whether one of two places that fit is right, for its turn is the lesser one.
+
+        After a specimen was out of sight this is a guess, of which a warning tells, and none where
+        it may be another part of the lattice that is in view.
+        """
+        if not _otherwise_turned(best, other):
+            return False
+        if self._out_of_sight:
+            if not self._relocaliser.in_view(best.pose).all():
+                return False
+            LOG.warning(
+                "warning: nothing of the specimen was seen before %.4g s, and its lattice looks the"
+                " same when it is turned: it is taken to be turned as little as may be",
+                self._time,
+            )
+        return True
 
     def _reachable(self, guess: Floats) -> Mask:
         """Tells guesses (units, 3) that are in view, if only in part."""
@@ -371,6 +436,7 @@ class Tracker:
         reasons = np.full(len(good), HIDDEN)
         reasons[np.isfinite(fits.pose[:, 0]) & (fits.share > _SHARE)] = POOR_FIT
         reasons[(relative < _GLARE) & (fits.photometry[:, 1] > 0)] = GLARE
+        reasons[~self._seen] = HIDDEN
         reasons[~inside] = OUT_OF_FRAME
         reasons[good] = GOOD
         return reasons
@@ -387,6 +453,7 @@ class Tracker:
         relative = fits.noise / np.abs(fits.photometry[:, 0])
         if not still:
             self._usual = np.where(good, relative, self._usual)
+        self._out_of_sight = not good.any()
         seen = np.where(good[:, None], fits.pose, np.nan)
         self._past = [*self._past, (self._time, seen)][-_PAST:]
         self._pose = pose

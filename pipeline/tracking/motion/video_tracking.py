@@ -25,7 +25,7 @@ from pipeline.tracking.motion.camera_motion import remove_camera_motion, row_tim
 from pipeline.tracking.motion.frame_timing import DUPLICATE, timing_faults
 from pipeline.tracking.motion.light_slopes import LightSlopes
 from pipeline.tracking.motion.time_interpolation import at_frame_times, middle_speed
-from pipeline.tracking.motion.tracker import Shutter, Tracker
+from pipeline.tracking.motion.tracker import POOR_FIT, Shutter, Tracker
 from pipeline.tracking.reference_frame import (
     CameraCalibration,
     RecordingSetup,
@@ -34,6 +34,7 @@ from pipeline.tracking.reference_frame import (
     average_at_rest,
     calibrate_camera,
     check_outlines,
+    outlines_seen,
     recognise,
 )
 from sim.core import Floats, Ints, Reals, Singles
@@ -49,6 +50,8 @@ _OF_DOF = [0, 0, 1]
 """Which of these shares a shift, or a rotation, has."""
 _CODED = 1.8
 """Likeness from which on a codec is at work."""
+_UNSURE = 0.25
+"""Standard deviation of a pose that is not known at its frame's time, px."""
 _CHANGED = 0.005
 """Part of the pixels that differ in a picture that is shown again, at most."""
 
@@ -124,6 +127,15 @@ def track_video(
         late = row_times(motion, specimen, calibration, setup)
         bend = exposure**2 / 24 * shares[..., _OF_DOF]
         motion, sigmas, missed = at_frame_times(motion, sigmas, time, late, bend, shown.averaged)
+        unsure = missed[..., :2].max(axis=-1) > (_UNSURE * calibration.pixel) ** 2
+        if unsure.any():
+            motion[unsure], qualities[unsure] = np.nan, POOR_FIT
+            LOG.warning(
+                "warning: %.0f %% of the poses are lost, as more moves from frame to frame than"
+                " tells where units were when other rows were read: film at a higher rate, or rest"
+                " in the first frame",
+                100 * unsure.mean(),
+            )
     motion = _since_rest(motion, shown.averaged, offset)
     remove_camera_motion(motion, sigmas, specimen, calibration.pixel, setup)
     faults = timing_faults(time, motion.astype(float), sigmas.astype(float), same)
@@ -230,4 +242,5 @@ def _tracker(
     relocaliser = Relocaliser(specimen, camera, calibration.bright)
     shutter = Shutter(setup.exposure, setup.readout, noise)
     fitter, slopes = PoseFitter(camera, templates), LightSlopes(specimen.count, shown.averaged)
-    return Tracker(specimen, fitter, relocaliser, walls, shutter, blur, slopes)
+    seen = outlines_seen(calibration.outlines)
+    return Tracker(specimen, fitter, relocaliser, walls, shutter, blur, slopes, seen)

@@ -4,6 +4,7 @@ from .camera_calibration import RecordingSetup as RecordingSetup
 from .camera_calibration import calibrate_camera as calibrate_camera
 from .recognition import ambiguity_text as ambiguity_text
 from .recognition import check_outlines as check_outlines
+from .recognition import outlines_seen as outlines_seen
 from .recognition import recognise as recognise
 from .still_frames import StillFrames as StillFrames
 from .still_frames import average_at_rest as average_at_rest

@@ -40,6 +40,8 @@ _MARKED = 0.3
 _STRANGE = 0.1
 """Most part of the units whose outlines may be others."""
 _QUARTER = np.pi / 4
+_FAINT = 0.12
+"""Contrast of a unit, over the usual one, below which it is hidden."""
 
 
 def recognise(
@@ -117,6 +119,15 @@ def agreeing_outlines(specimen: SpecimenOutlines, outlines: PoseFits) -> Mask:
     upright = np.abs(outlines.pose[:, 2]) < _TURNED
     usual = max(_MISFIT * float(np.nanmedian(ratio)), _MARKED)
     return np.asarray(near & upright & (ratio < usual))
+
+
+def outlines_seen(outlines: PoseFits) -> Mask:
+    """Marks units (units,) that stand out from what is behind them as most do, or are cut off.
+
+    One under a hand or a glare looks like that: what is learned of it follows the hand.
+    """
+    gain = outlines.photometry[:, 0]
+    return np.asarray(~(gain / np.nanmedian(gain) < _FAINT))
 
 
 def units_in_frame(specimen: SpecimenOutlines, calibration: CameraCalibration) -> Mask:
