@@ -273,10 +273,7 @@ SCRIPTS: dict[str, ClipScript] = {
     ),
     "glare": ClipScript(cover=_glare, hidden=_under_glare, times=_FAST),
     "shaken_and_rolling": ClipScript(
-        shift=_shaken,
-        view=View(readout=0.02),
-        keys={"readout": 0.02, "follows_supports": True},
-        follows=True,
+        shift=_shaken, view=View(readout=0.02), keys={"readout": 0.02}
     ),
     "returns_turned": ClipScript(
         shift=_off_corner,

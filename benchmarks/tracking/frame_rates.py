@@ -81,7 +81,8 @@ def measure(folder: Path, limits: MeasuringLimits, tell: Tell) -> xr.Dataset:
         if thinning == 1:
             tell(f"{one.name:<24}{method:<14}{line()}")
     with tempfile.TemporaryDirectory() as made:
-        tell(wild_clips.table(Path(made)))
+        for row in wild_clips.table(Path(made)):
+            tell(row)
     tell(known_patches.table())
     rate = np.array([[one.rate / thinning for thinning in THINNINGS] for one in clips])
     dims = ("video", "tracker", "thinning")

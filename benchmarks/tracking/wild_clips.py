@@ -100,25 +100,24 @@ def errors(clip: WildClip, track: Track) -> Errors:
     )
 
 
-def table(folder: Path) -> str:
-    """Makes and tracks all clips; returns the lines of their table."""
-    lines = [
+def table(folder: Path) -> Iterator[str]:
+    """Makes and tracks all clips; yields the lines of their table as they are known."""
+    yield (
         "| clip | rms px (bound) | rms deg (bound) | gross and silent | lost % |"
-        " error/sigma x, y, rotation | faults found, false |",
-        "|---|---|---|---|---|---|---|",
-    ]
+        " error/sigma x, y, rotation | faults found, false |"
+    )
+    yield "|---" * 7 + "|"
     for name in SCRIPTS:
         clip = make(name, folder)
         found = errors(clip, tracked(clip))
         least, turn = bound(name)
         honest = " ".join(f"{value:.2f}" for value in found.honesty)
-        lines.append(
+        yield (
             f"| {name.replace('_', ' ')} | {found.rms:.4f} ({least:.4f}) |"
             f" {found.turn:.3f} ({turn:.3f}) | {found.gross} of"
             f" {found.good} | {100 * found.lost:.1f} | {honest} |"
             f" {found.found} of {int(clip.fault.sum())}, {found.false} |"
         )
-    return "\n".join(lines)
 
 
 def bound(name: str) -> tuple[float, float]:
