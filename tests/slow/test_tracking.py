@@ -57,6 +57,8 @@ def test_speckled_units_agree_with_an_independent_correlation() -> None:
         ("leaves_and_returns", 44, 0.012, 0.02),
         ("low_light", 8, 0.06, 0.0),
         ("tripod_knocked", 16, 0.008, 0.0),
+        ("returns_turned", 44, 0.012, 0.25),
+        ("shaken_and_rolling", 16, 0.5, 1.0),
     ],
 )
 def test_no_unit_is_wrong_and_called_good(

@@ -91,7 +91,7 @@ def detect_lattice(
     Args:
         image: the first frame.
         specimen: what to look for.
-        px_per_mm: roughly; without it, the specimen is looked for at a third of the image and up.
+        px_per_mm: roughly; without it, the specimen is looked for at a fifth of the image and up.
 
     Returns:
         All ways of seeing it that match nearly as many units as the best: a lattice may look the
@@ -99,7 +99,7 @@ def detect_lattice(
     """
     extent = np.ptp(specimen.centre, axis=0) + 2 * specimen.radius.mean()
     most = min(image.shape[1] / extent[0], image.shape[0] / extent[1])
-    shares = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 1.15)
+    shares = (0.95, 0.8, 0.67, 0.56, 0.47, 0.39, 0.32, 0.27, 0.22, 1.15)
     scales = [px_per_mm] if px_per_mm else [float(most * share) for share in shares]
     found: list[LatticeDetection] = []
     for marked in (True, False):

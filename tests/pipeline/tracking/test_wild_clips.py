@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.tracking.rendering import View, pose_bound
+from benchmarks.tracking.rendering import Renderer, View, eight_bit, pose_bound
 from benchmarks.tracking.wild_clips import WildClip, errors, make, specimen, tracked
 from pipeline.runtime import UserError
+from pipeline.tracking.detect import detect_lattice
 from pipeline.tracking.fit import frame_fit
 from pipeline.tracking.motion import Track, track_video
 from pipeline.tracking.reference_frame import RecordingSetup
@@ -27,6 +28,8 @@ def shown(name: str, folder: Path, frames: int) -> tuple[WildClip, Track]:
         ("fisheye", 6, 0.01, 0.0),
         ("red_on_teal", 6, 0.03, 0.0),
         ("bolts_and_tape", 6, 0.01, 0.0),
+        ("glare", 5, 0.05, 0.02),
+        ("mains_flicker", 6, 0.012, 0.0),
     ],
 )
 def test_no_unit_is_wrong_and_called_good(
@@ -59,6 +62,13 @@ def test_sigma_holds(name: str, frames: int, tmp_path: Path) -> None:
     assert (track.timing == 0).all()
     assert errors(clip, track).honesty.min() > 0.7
     assert errors(clip, track).honesty.max() < 1.4
+
+
+def test_a_specimen_is_found_without_a_scale_however_small_it_is() -> None:
+    squares, still = specimen(), np.zeros((1, 81, 3))
+    view = View(size=(720, 720), scale=1.6)
+    image = eight_bit(Renderer(squares, lambda _: still, view).frame(0.0))
+    assert len(detect_lattice(image, squares, None)[0].unit) == 81
 
 
 def test_the_blur_of_a_camera_is_measured(tmp_path: Path) -> None:
