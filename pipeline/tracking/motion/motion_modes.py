@@ -23,7 +23,7 @@ _FILLINGS, _FILLED = 80, 0.1
 """Rounds in which missing motions are filled, at most; a change, over the noise, of no use."""
 _REACHES = (1, 2, 3, 4, 5, 6)
 """Frames to either side of one whose place the polynomial through them tells."""
-_TELLING = 4
+_TELLING = 3
 """Fewest frames that tell how much a polynomial of higher order leaves."""
 _LITTLE_MORE = 1.3
 _JOLT = 3.0
@@ -116,12 +116,13 @@ def constant_share(amplitude: Floats) -> float:
     return float(np.sum(basis.sum(axis=0) ** 2) / len(basis))
 
 
-def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
+def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats, coded: bool) -> Floats:
     """Measures amplitudes (frames, n) against polynomials in time through those beside, per frame.
 
-    The order is the lowest that leaves little more than the next ones: more is motion. Where none
-    is, as the motion is too quick or too short, nothing is told. A jolt is motion too, so values
-    are held to a few times the usual; frames at the ends are as the next.
+    The order is the lowest that leaves little more than the next ones: more is motion. Where even
+    the last one may be, as the motion is too quick or too short, a codec's jitter is taken to be as
+    large, and that of others to be none. A jolt is motion too, so values are held to a few times
+    the usual; frames at the ends are as the next.
     """
     found = [_differences(amplitude, steady, time, reach) for reach in _REACHES]
     usual = np.full((len(found), amplitude.shape[1]), np.inf)
@@ -133,7 +134,7 @@ def amplitude_jitter(amplitude: Floats, steady: Mask, time: Floats) -> Floats:
     out = np.zeros_like(amplitude)
     for column in range(amplitude.shape[1]):
         order = int(np.argmax(usual[:, column] <= _LITTLE_MORE * usual[:, column].min()))
-        if order >= last:
+        if last < 0 or (order == last and not coded):
             continue
         values, most = found[order][:, column], _JOLT * usual[order, column]
         known = np.nonzero(np.isfinite(values))[0]
