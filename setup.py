@@ -23,7 +23,7 @@ _TOLD = "python -m pipeline"
 def installed(path: Path, text: str) -> str:
     """Rewrites imports and commands of a source file to those of the installed package."""
     text = _IMPORTED.sub(r"\g<before>metacloak.\g<room>", text)
-    if path.suffix in (".py", ".yaml"):
+    if path.suffix in (".py", ".toml", ".yaml"):
         text = text.replace(_TOLD, "metacloak")
     return _RUN.sub(r"\g<before>metacloak.\g<room>", text)
 
@@ -47,7 +47,7 @@ class BuildRooms(build_py):
     @staticmethod
     def _copy(path: Path, copy: Path) -> None:
         copy.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix in (".py", ".pyi", ".smk", ".yaml") or path.name == "Snakefile":
+        if path.suffix in (".py", ".pyi", ".smk", ".toml", ".yaml") or path.name == "Snakefile":
             copy.write_text(installed(path, path.read_text(encoding="utf-8")), encoding="utf-8")
         else:
             shutil.copy(path, copy)

@@ -16,7 +16,7 @@ from pathlib import Path
 from pipeline.runtime.locations import ROOT
 from sim.core import PACKAGES, import_closure, locate
 
-RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".yaml"}
+RESOURCES = {".css", ".csv", ".html", ".j2", ".js", ".json", ".mplstyle", ".svg", ".toml", ".yaml"}
 
 
 @cache
