@@ -36,19 +36,12 @@ from sim.structure import (
 
 
 class ReferenceStructure(NamedTuple):
-    """Holds the inputs of the definition.
+    """Holds the inputs of the definition."""
 
-    Attributes:
-        lattice: its polygons, all with the same number of corners.
-        vertices: (n_vertices, 2) where they are at rest, mm.
-        values: of its parameters.
-        contact: law by which units touch.
-    """
-
-    lattice: Lattice
-    vertices: Floats
-    values: ConcreteParameters
-    contact: ContactModel
+    lattice: Lattice  # its polygons, all with the same number of corners
+    vertices: Floats  # (n_vertices, 2) where they are at rest, mm
+    values: ConcreteParameters  # of its parameters
+    contact: ContactModel  # law by which units touch
 
 
 class ReferenceForces(NamedTuple):

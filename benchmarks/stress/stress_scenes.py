@@ -42,15 +42,10 @@ NONE = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class StressScene:
-    """Poses a structure under one drive.
+    """Poses a structure under one drive."""
 
-    Attributes:
-        scene: with a single load case.
-        vertices: (n_vertices, 2) of the structure, mm.
-    """
-
-    scene: Scene
-    vertices: Floats
+    scene: Scene  # with a single load case
+    vertices: Floats  # (n_vertices, 2) of the structure, mm
 
     @property
     def topology(self) -> Topology:

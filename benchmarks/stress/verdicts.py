@@ -4,14 +4,17 @@ A case is solved if everything that is checked of its answer keeps within its
 limit, refused if it ends in an error that says what to do, and wrong otherwise.
 """
 
+import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+import yaml
 
 from sim.core import SimulationError
 
@@ -25,19 +28,12 @@ REMEDIES = ("; try ", "; ask for ", "; loosen ", "; hold ", "or mend ", "; make 
 
 
 class Check(NamedTuple):
-    """Checks one number of an answer by an independent calculation.
+    """Checks one number of an answer by an independent calculation."""
 
-    Attributes:
-        name: with the number's unit.
-        value: the number.
-        limit: the largest that passes; NaN does not.
-        stated: whether the result itself tells that number, as an estimate of its error.
-    """
-
-    name: str
-    value: float
-    limit: float
-    stated: bool = False
+    name: str  # with the number's unit
+    value: float  # the number
+    limit: float  # the largest that passes; NaN does not
+    stated: bool = False  # whether the result itself tells that number, as an estimate of its error
 
     @property
     def kept(self) -> bool:
@@ -52,18 +48,13 @@ class Check(NamedTuple):
 
 @dataclass(frozen=True)
 class StressCase:
-    """Poses one attempt.
+    """Poses one attempt."""
 
-    Attributes:
-        name: what is tried.
-        attempt: solves and returns what it checked of the answer.
-        wanted: a solution, as a study may ask for it and a refusal counts against the solver; a
-            refusal, as there is no answer and any would be wrong; or either, and then an answer
-            may also be one whose own estimate of error says that it is none.
-    """
-
-    name: str
-    attempt: Callable[[], Sequence[Check]]
+    name: str  # what is tried
+    attempt: Callable[[], Sequence[Check]]  # solves and returns what it checked of the answer
+    # a solution, as a study may ask for it and a refusal counts against the solver; a refusal, as
+    # there is no answer and any would be wrong; or either, and then an answer may also be one whose
+    # own estimate of error says that it is none
     wanted: Wanted = "solution"
 
 
@@ -99,9 +90,14 @@ class StressFamily(NamedTuple):
     cases: Cases
 
 
-def family(tried: str, judged: str) -> Callable[[Cases], StressFamily]:
-    """Decorates a function that makes cases: a family of its name."""
-    return lambda cases: StressFamily(cases.__name__, tried, judged, cases)
+_TEXTS = yaml.safe_load(Path(__file__).with_name("families.yaml").read_text(encoding="utf-8"))
+
+
+def family(cases: Cases) -> StressFamily:
+    """Decorates a function that makes cases: a family of its name, told of in families.yaml."""
+    name, known = cases.__name__, vars(sys.modules[cases.__module__])
+    texts = {key: text.format_map(known) for key, text in _TEXTS[name].items()}
+    return StressFamily(name, **texts, cases=cases)
 
 
 @dataclass(frozen=True)

@@ -44,26 +44,15 @@ MOVED = np.array([-5.0, 2.0, 0.2])
 
 
 class EquivalentProblem(NamedTuple):
-    """Poses the same problem in other coordinates and order.
+    """Poses the same problem in other coordinates and order."""
 
-    Attributes:
-        turn: (2, 2) rotation, or rotation and mirror.
-        shift: (2,) mm.
-        order: (n_units,) the unit that comes at each place.
-        exchanged: (n_ligaments,) whether a ligament's ends change places.
-    """
-
-    turn: Floats
-    shift: Floats
-    order: Ints
-    exchanged: np.ndarray
+    turn: Floats  # (2, 2) rotation, or rotation and mirror
+    shift: Floats  # (2,) mm
+    order: Ints  # (n_units,) the unit that comes at each place
+    exchanged: np.ndarray  # (n_ligaments,) whether a ligament's ends change places
 
 
-@family(
-    "random designs turned by any angle, mirrored, moved by 1 m, their units renumbered, the"
-    " ends of their ligaments exchanged, all of these: statics and motions, both contacts",
-    "the answer must be the first one turned and renumbered likewise",
-)
+@family
 def symmetry(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     draws = RandomDesigns(squares(COLUMNS), np.zeros(0, dtype=np.int64), 2.0, 0.8)
@@ -145,12 +134,7 @@ KNOTS = np.linspace(0.0, 0.006, 13)
 LOADS = np.linspace(0.04, 1.0, 25)
 
 
-@family(
-    f"random designs of {SIDE} x {SIDE} units with random constants, supports and drives:"
-    " equilibria, motions by either integrator",
-    "equilibria against SciPy's trust-region minimiser, motions against SciPy's DOP853, both on"
-    " the definition of the energy",
-)
+@family
 def agreement(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     draws = RandomDesigns(squares(SIDE), NONE, 2.0, 0.8)

@@ -33,11 +33,7 @@ CHAOS = 0.1
 """What half the steps may change where units collide again and again."""
 
 
-@family(
-    "starts on and beyond the contact barrier, explicit steps too large, compression to 25 %,"
-    " 8 mm at 30 Hz, both laws of contact",
-    "balance by the definition, void angles and overlaps by geometry, half the steps",
-)
+@family
 def barrier(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     side = 5 if small else 9
@@ -101,11 +97,7 @@ SINGLE = 1e-4
 """Change of an answer by 32-bit input, relative: 1e-7 times what a lattice makes of it."""
 
 
-@family(
-    "parameters, drives and times of 32 bits; void angles at the cutoff of contact and up to"
-    " 1e-12 deg beside it; parameters that are no numbers, zero, negative, huge",
-    "the answer of 64 bits, as 64 bits; balance by the definition; a refusal of what is none",
-)
+@family
 def inputs(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for name, solver in _solvers():

@@ -40,12 +40,7 @@ SIDE = 5
 LOADS = np.array([0.5, 1.0])
 
 
-@family(
-    "each stiffness, and that of an inclusion, 1e-3 to 1e6 times the paper's; no damping to 1e9"
-    " times the paper's; masses even and spread over 6 decades: pressed, shaken at 2 and 60 Hz",
-    "balance by the definition, void angles by geometry, half the steps; tight where the"
-    " default accuracy does not do, as its message or estimate of error says",
-)
+@family
 def constants(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for ratio in (1e3,) if small else 10.0 ** np.arange(-3, 7):
@@ -97,12 +92,7 @@ DURATION = 0.1
 ERROR = {"draft": 0.2, "default": 0.05, "tight": 5e-3}
 
 
-@family(
-    "drives of 0.1 to 200 Hz and pulses at every accuracy; 1 to 1 000 000 explicit steps, to"
-    " 100 000 load steps, to 10 000 implicit steps",
-    "balance by the definition at loads and stages, void angles by geometry, half the steps;"
-    " tight where the accuracy asked for does not do by its own estimate of error",
-)
+@family
 def times(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     few = (0.1, 200.0)
@@ -173,12 +163,7 @@ PUSHED = 2e-3
 """The drive is over then, s."""
 
 
-@family(
-    "a unit pushed and turned once, then held: free or clamped lattices, undamped, damped, with"
-    " and without contact, up to 100 000 explicit steps, implicit steps",
-    "energy against work and damping, momentum against the impulse of the held units, by the"
-    " definition at every output",
-)
+@family
 def balances(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for n_steps in (2_000,) if small else (2_000, 20_000, 100_000):

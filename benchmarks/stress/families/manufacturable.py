@@ -28,12 +28,7 @@ SIDE = 9
 LOADS = np.array([0.5, 1.0])
 
 
-@family(
-    f"random designs of {SIDE} x {SIDE} units that can be made, shifts up to {LARGEST} mm: each"
-    " pressed by 10 %, a third shaken slowly, a third fast, a third with contact on distances",
-    "balance by the definition, void angles and overlaps by geometry, half the steps; tight"
-    " where the default accuracy does not do, as its message or estimate of error says",
-)
+@family
 def designs(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     lattice = squares(SIDE)
@@ -73,11 +68,7 @@ AT_BOUNDS = 0.3
 """Smallest margin of a design that counts as being at the bounds, mm."""
 
 
-@family(
-    f"designs of {WIDTH} x {WIDTH} units cut back from shifts of {WIDEST:g} mm until they just"
-    " keep to edges of 3 mm, corners of 30 deg, gaps of 0.2 mm: pressed by 10 %, shaken",
-    "as the random designs; and the design's own smallest margin",
-)
+@family
 def slender(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     lattice = squares(WIDTH)

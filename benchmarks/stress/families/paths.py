@@ -26,12 +26,7 @@ from sim.solvers import LinearRamp, TimeSeries
 from sim.structure import quads
 
 
-@family(
-    "straight chains that buckle, bowed ones that snap through, thin lattices that fold: by few"
-    " load steps and by many",
-    "every state a minimum of the definition's energy; a path without a jump in the record ends"
-    " where one of ten times the steps does",
-)
+@family
 def branches(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     lengths = (9,) if small else (5, 9, 21, 41)
@@ -79,11 +74,7 @@ def _followed(case: StressScene, n_loads: int) -> Sequence[Check]:
 PERIOD = 0.05
 
 
-@family(
-    "a free lattice turned as a whole up to 100 times, a chain twisted and rolled up beyond two"
-    " turns: equilibria and motions",
-    "balance by the definition, void angles by geometry modulo a turn, rigid rotation exactly",
-)
+@family
 def windings(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for turns in (1.0,) if small else (0.5, 0.75, 1.0, 3.0, 100.0):

@@ -55,11 +55,7 @@ def _judged(true: float, stated: float) -> list[Check]:
     return checks
 
 
-@family(
-    "four directions at once, each of many a turned copy of another: stiffness that differs from"
-    " ligament to ligament or side to side, a few ligaments missing, or neither",
-    "losses of all directions where each is solved alone, in states that balance by the definition",
-)
+@family
 def skips(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     yield from _tries("four directions", small, _turned)
@@ -89,11 +85,7 @@ def _turned(seed: int) -> Sequence[Check]:
     return checks
 
 
-@family(
-    "5 x 5 units shaken at 0.05 to 5 times their lowest eigenfrequency, with 0.05 to 1 times the"
-    " paper's damping",
-    "the motion by SciPy's DOP853; what the result states is at least a third of its true error",
-)
+@family
 def drives(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     yield from _tries("harmonic", small, _harmonic)
@@ -110,10 +102,7 @@ def _harmonic(seed: int) -> Sequence[Check]:
     return _in_time(motion, periods / frequency, float(damping), frequency=frequency)
 
 
-@family(
-    "pulses of 1 to 30 ms that come at any time",
-    "the motion by SciPy's DOP853; what the result states is at least a third of its true error",
-)
+@family
 def pulses(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     yield from _tries("pulse", small, _pulse)
@@ -178,10 +167,7 @@ def _by_dop853(case: StressScene, motion: Harmonic | Pulse) -> Floats:
     return out.reshape(1, len(times), -1, 3)
 
 
-@family(
-    "5 x 5 units with vertices off by up to 1.5 mm, pressed by up to 15 % over random loads",
-    "the path traced by arc length: the loads at which it turns, and the states before",
-)
+@family
 def grids(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     yield from _tries("crumpled", small, _crumpled)
@@ -195,10 +181,7 @@ def _crumpled(seed: int) -> Sequence[Check]:
     return _traced(corners, np.append(np.sort(random.uniform(0.05, 1.0, 7)), 1.0))
 
 
-@family(
-    "chains of 5 to 15 units, bent by 1e-8 to 0.3 mm, that buckle under random loads",
-    "the path traced by arc length: the loads at which it turns, and the states before",
-)
+@family
 def bifurcations(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     yield from _tries("chain", small, _bent)

@@ -32,11 +32,7 @@ TOUCHING = 30
 """Largest lattice that is also pressed with contact on distances."""
 
 
-@family(
-    f"squares of {SIDES[0]} to {SIDES[-1]} units a side, and strips: pressed by 10 %, shaken by"
-    " either integrator",
-    "balance by the definition, void angles and overlaps by geometry, half the steps",
-)
+@family
 def sizes(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     shapes = [(side, side) for side in SIDES] + [(60, 2), (3, 40), (2, 2)]
@@ -69,11 +65,7 @@ ASKED = np.linspace(0.0, 0.02, 21)
 HUM = Harmonic(0.5, 60.0)
 
 
-@family(
-    "floating units and halves, ends that hang on one ligament, supports along x alone, all"
-    " units held, no ligament, a single unit; cloaks of one unit",
-    "equilibria and motions as elsewhere; gradients of the loss against differences",
-)
+@family
 def pieces(small: bool) -> Iterator[StressCase]:
     """Yields the cases."""
     for name, lattice, wanted in list(_structures())[:2] if small else _structures():
